@@ -137,7 +137,8 @@ def fail_if_skipped(report):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    return Shares(config, log) if config.getvalue("dist") == "loadscope" else None
+    has_shares = config.getvalue("dist") == "loadscope" and config.pluginmanager.has_plugin("cacheprovider")
+    return Shares(config, log) if has_shares else None
 
 
 @pytest.fixture(autouse=True, scope="session")

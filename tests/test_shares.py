@@ -94,6 +94,36 @@ def test_every_test_runs_once_in_the_order_of_its_file(count):
         assert len(files_of(tests)) == len(tests) / 4
 
 
+class EndedWorker(Worker):
+    """Its channel is closed already, and the scheduler has not heard of it."""
+
+    def send_runtest_some(self, indices):
+        raise OSError("cannot send (already closed?)")
+
+
+def test_a_crash_gives_no_files_to_a_worker_that_still_starts_and_takes_them_back_from_one_that_has_ended():
+    names, config = (
+        list(FIRST_SLOW),
+        SimpleNamespace(
+            cache=SimpleNamespace(get=lambda key, default: default, set=None),
+            add_cleanup=lambda function: None,
+            getvalue={"tx": ["popen"] * 2}.get,
+            option=SimpleNamespace(loadscopereorder=True),
+        ),
+    )
+    shares, sound, ended, new = Shares(config), Worker(), EndedWorker(), Worker()
+    for worker in (sound, ended):
+        shares.add_node(worker)
+        shares.add_node_collection(worker, names)
+    shares.schedule()
+    shares.add_node(new)
+    assert shares.remove_node(ended) in names
+    assert new.queue == []
+    shares.add_node_collection(new, names)
+    shares.schedule()
+    assert new.queue != []
+
+
 def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_path):
     """Two of seven files have such a test, and leave a single test to the new worker."""
     (tmp_path / "conftest.py").write_text(

@@ -13,7 +13,7 @@ _ABOVE = {"report", "cli", "__main__.py"}
 
 
 def origin(arch: str) -> dict[str, str]:
-    """What tells results apart that may differ: a digest of the sources, versions, the device."""
+    """Return what results depend on: a digest of the sources, versions, the device."""
     return {"sources": _digest(), "taichi": version("taichi"), "numpy": version("numpy"), "arch": arch}
 
 

@@ -11,7 +11,7 @@ from taichi_soft.core.cores import available_cores
 from taichi_soft.core.types import ArchName
 
 TIME_LIMIT = 1800.0
-"""Of a point [s]."""
+"""Longest time of a point [s]."""
 
 LOOK = 0.5
 """Time limits are looked at this often, and Ctrl-C is where it does not interrupt a wait [s]."""

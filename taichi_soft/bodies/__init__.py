@@ -1,1 +1,1 @@
-"""What a body is: asset, layout, fields, and what follows from its material."""
+"""Bodies: assets, layout, fields, and quantities that follow from their material."""

@@ -1,4 +1,4 @@
-"""What all bodies of one kind share: made once, placed many times."""
+"""Assets: the data that all bodies of one kind share, made once and placed many times."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.calibration import calibrated
-from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
+from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, Contact
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
 from taichi_soft.bodies.hull import BoundHull, bind
@@ -52,45 +52,44 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 DAMPING_INTERVAL = 0.5
-"""Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 12
-times in its period."""
+"""Interval between two dampings of vibrations, over the time in which the first mode turns by one radian:
+about 12 dampings per period."""
 
-APART = 0.25
-"""Of a body's size, by which the sides of a level of detail may lie away from those of the finest."""
+MAX_BOX_DIFFERENCE = 0.25
+"""Largest difference between the bounding boxes of a level of detail and the finest, in sizes of the body."""
 
 
 @dataclass(frozen=True, eq=False)
 class SoftBodyAsset:
-    """A kind of body, immutable: what the bodies share that worlds make of it.
+    """A kind of body, immutable: the data that its bodies in all worlds share.
 
     Args:
-        mesh: rest shape. A `ParticleMesh` (rope, cloth) takes law "springs".
+        mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs".
         material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
         law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
             along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
-            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4). None takes
-            "neo_hookean"; "virial" where strain or another way with flips is chosen, or for an
+            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4). None:
+            "neo_hookean"; "virial" if `strain` or other `flips` are given, or for an
             `AnisotropicMaterial`; "springs" for a `SpringMaterial`.
-        strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
-        flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
-            takes the law's own. A law with an energy does what follows from it, and takes no other.
-        damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
-        pinned: vertices that stay where they are.
-        contact: how its surface touches others, in a world with colliders or soft contact.
-        spare_vertices: how many copies of vertices there is room for where `Body.cut` splits them; 0 for a
-            body that is not cut. Takes laws that look at tetrahedra. A cut through a body of n vertices needs
-            about n^(2/3).
-        plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
+        strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
+        flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None: the
+            law's default. The energy of a law determines its own value, and no other is accepted.
+        damping_model: "edge" (eq. 3.9) or "tet_mean" (rejected in section 6.4, because it stops rotation).
+        pinned: vertices that stay in place.
+        contact: contact properties of its surface, in a world with colliders or soft contact.
+        spare_vertices: room for copies of vertices that `Body.cut` splits; 0 for a body that is not cut.
+            Needs a law on tetrahedra. A cut through a body of n vertices needs about n^(2/3).
+        plasticity: permanent deformation; None for none. Needs a law on tetrahedra and a `Material`.
+        tearing: strength at which it tears, using its spare vertices; None for no tearing. Needs a
             `Material`.
-        tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
-        skin: what is drawn in place of its surface, as `read_surfaces` takes it: a file, a trimesh.Trimesh or
+        skin: surface that is drawn instead of its own, as for `read_surfaces`: a file, a trimesh.Trimesh or
             Scene. See `Body.render_meshes`.
-        hull: by what it touches others in place of the surface of its tetrahedra: by points of its skin and
-            triangles between them, so many (12 to 20,000) or, if True, enough; or by the vertices and
-            triangles of a surface of your own, as `read_surfaces` takes it. None for the surface. See
-            docs/artists-mesh.md. Takes tetrahedra, no spare vertices, and no contact of the body with itself.
-        coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
-            for `Body.set_level`. Takes no spare vertices and no plasticity.
+        hull: contact surface instead of that of its tetrahedra. A number (12 to 20,000), or True for a
+            suitable one, makes a hull of as many points of its skin and triangles between them. A surface, as
+            for `read_surfaces`, gives its own vertices and triangles. None: the surface of the tetrahedra.
+            See docs/artists-mesh.md. Needs tetrahedra; not possible with spare vertices or self-contact.
+        coarser: assets of the same body with fewer and fewer tetrahedra, as `with_coarser` makes them: levels
+            of detail for `Body.set_level`. Not possible with spare vertices or plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
     Example:
         crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
@@ -125,20 +124,26 @@ class SoftBodyAsset:
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
         as_count(self.spare_vertices, "spare_vertices", 0)
         if self.spare_vertices and model.has_bonds:
-            raise OptionError(f"law {self.law!r} cannot be cut: it looks at edges, 'virial' at tetrahedra")
+            raise OptionError(
+                f"law {self.law!r} cannot be cut, because it acts along edges: use one on tetrahedra, "
+                "such as 'virial'"
+            )
         if self.tearing is not None:
             self._require_tears(model)
         if self.plasticity is not None:
             self._require_flow(model)
         surfaces = () if isinstance(self.skin, tuple) and not self.skin else read_surfaces(self.skin)
         if surfaces and not isinstance(self.mesh, TetMesh):
-            raise MeshError(f"a skin needs tetrahedra to hang on, and {self.mesh!r} has none")
+            raise MeshError(f"a skin needs tetrahedra, but {self.mesh!r} has none")
         if model.has_bonds and isinstance(self.mesh, CageMesh):
-            raise OptionError(f"law {self.law!r} takes no cage: it looks at edges, 'virial' at tetrahedra")
+            raise OptionError(
+                f"law {self.law!r} is not possible with a cage, because it acts along edges: use one on "
+                "tetrahedra, such as 'virial'"
+            )
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
-        _ = description.bonds  # made now, because a pairwise law may refuse the mesh
+        _ = description.bonds  # computed now, because a pairwise law can refuse the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
@@ -149,71 +154,77 @@ class SoftBodyAsset:
         object.__setattr__(self, "coarser", self._checked_levels(self.coarser))
 
     def _checked_levels(self, coarser: object) -> tuple[SoftBodyAsset, ...]:
-        """Raises: OptionError, MeshError for what are no levels of detail of this asset."""
+        """Check levels of detail of this asset. Raises: OptionError, MeshError."""
         if not isinstance(coarser, (tuple, list)) or not all(
             isinstance(each, SoftBodyAsset) for each in coarser
         ):
             raise OptionError(f"coarser must be a tuple of assets, got {coarser!r}")
         if coarser and (self.spare_vertices or self.plasticity is not None):
-            raise OptionError("an asset that is cut, tears or is bent for good has no levels of detail")
+            raise OptionError(
+                "an asset with spare_vertices, tearing or plasticity has no levels of detail: leave out "
+                "coarser"
+            )
         for level, each in enumerate(coarser, start=1):
             if each.coarser or each.spare_vertices or each.plasticity is not None:
-                raise OptionError(f"level {level} must be without levels, cuts and plasticity of its own")
+                raise OptionError(f"level {level} must not have levels, spare_vertices or plasticity")
             if each.description.model != self.description.model or each.contact != self.contact:
-                raise OptionError(f"level {level} must have the law and the contact of the finest")
+                raise OptionError(f"level {level} must have the law and the contact of the finest level")
             if each.hull is not self.hull and digest_of(each.hull) != digest_of(self.hull):
-                raise OptionError(f"level {level} must have the hull of the finest")
+                raise OptionError(f"level {level} must have the hull of the finest level")
             if not _are_same(each.skin, self.skin):
                 raise OptionError(
-                    f"level {level} must have the skin of the finest: with_coarser gives it that"
+                    f"level {level} must have the skin of the finest level: make it by with_coarser"
                 )
             if self.description.bonds is not None:
-                raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
+                raise OptionError(
+                    f"law {self.law!r} has no levels of detail, because it acts along edges: use one on "
+                    "tetrahedra, such as 'virial'"
+                )
             self._require_coarser((self, *coarser)[level - 1], each, level)
         return tuple(coarser)
 
     def _require_coarser(self, before: SoftBodyAsset, asset: SoftBodyAsset, level: int) -> None:
-        """Raises: MeshError for a level that is not coarser than the one before, or of something else."""
+        """Check that a level is coarser than the one before, and of the same shape. Raises: MeshError."""
         room, needed = room_of(self.arrays, 0), room_of(asset.arrays, 0)
         if len(asset.mesh.tets) >= len(before.mesh.tets) or any(
             n > m for n, m in zip(needed, room, strict=True)
         ):
             raise MeshError(
                 f"level {level}: {len(asset.mesh.tets)} tetrahedra and {needed[0]} vertices are not fewer "
-                f"than the {len(before.mesh.tets)} and {len(before.mesh.vertices)} of the level before: take "
-                "fewer cells, or leave smaller cells round thin limbs out (from_surface, refine=0)"
+                f"than the {len(before.mesh.tets)} and {len(before.mesh.vertices)} of the level before: use "
+                "fewer cells, or no smaller cells around thin limbs (from_surface, refine=0)"
             )
         (low, high), (own_low, own_high) = (
             (each.mesh.vertices.min(axis=0), each.mesh.vertices.max(axis=0)) for each in (self, asset)
         )
         size = float((high - low).max())
-        if max(np.abs(own_low - low).max(), np.abs(own_high - high).max()) > APART * size:
+        if max(np.abs(own_low - low).max(), np.abs(own_high - high).max()) > MAX_BOX_DIFFERENCE * size:
             raise MeshError(
                 f"level {level} lies from {own_low.round(4).tolist()} to {own_high.round(4).tolist()} m, the "
-                f"finest from {low.round(4).tolist()} to {high.round(4).tolist()}: it must be the same thing"
+                f"finest from {low.round(4).tolist()} to {high.round(4).tolist()}: it must be the same body"
             )
 
     @property
     def levels(self) -> tuple[SoftBodyAsset, ...]:
-        """All levels of detail, the finest first, which is this one."""
+        """All levels of detail, from the finest, which is this asset, to the coarsest."""
         return (self, *self.coarser)
 
     def with_coarser(self, *meshes: TetMesh) -> SoftBodyAsset:
-        """The same with levels of detail of these meshes, each coarser than the one before.
+        """Return the asset with levels of detail of these meshes, each coarser than the one before.
 
-        Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
-        seconds for each.
+        The materials of the levels are calibrated to the same mass and the same frequencies of the slowest
+        modes, which takes seconds for each.
         Args:
-            meshes: rest shapes of fewer and fewer tetrahedra.
-        Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
-            number for each constant; OptionError for a body that is cut, tears, is bent for good, or whose
-            law looks at edges. All of them before that work begins.
+            meshes: rest shapes with fewer and fewer tetrahedra.
+        Raises: MeshError for a mesh that is not coarser; MaterialError unless the material is a `Material`
+            with one number for each constant; OptionError for spare vertices, tearing, plasticity or a law
+            along edges. All checks precede the calibration.
         """
         material = self.material
         if not isinstance(material, Material) or any(
             np.ndim(getattr(material, name)) for name in ("young", "poisson", "density")
         ):
-            raise MaterialError("levels of detail take a Material with one number for each constant")
+            raise MaterialError("levels of detail need a Material with one number for each constant")
         plain = {
             name: getattr(self, name)
             for name in ("law", "strain", "flips", "damping_model", "contact", "skin", "hull")
@@ -222,40 +233,44 @@ class SoftBodyAsset:
         for mesh in meshes:
             if not isinstance(mesh, TetMesh):
                 raise MeshError(f"a level of detail must be a TetMesh, got {mesh!r}")
-            held = mesh.vertices[:, None] - self.mesh.vertices[self.description.pinned]
-            pinned = np.unique((held**2).sum(axis=2).argmin(axis=0)) if held.shape[1] else ()
+            offsets = mesh.vertices[:, None] - self.mesh.vertices[self.description.pinned]
+            pinned = np.unique((offsets**2).sum(axis=2).argmin(axis=0)) if offsets.shape[1] else ()
             levels.append(SoftBodyAsset(mesh, material, pinned=pinned, **plain))
         self._checked_levels(levels)
-        # Takes seconds: only now that nothing is refused.
+        # After all checks, because it takes seconds.
         materials = calibrated(self.description, [each.description for each in levels])
-        fitted = (replace(each, material=its) for each, its in zip(levels, materials, strict=True))
+        fitted = (
+            replace(each, material=calibrated_material)
+            for each, calibrated_material in zip(levels, materials, strict=True)
+        )
         return replace(self, coarser=tuple(fitted))
 
     def _require_hull(self) -> None:
         if not isinstance(self.mesh, TetMesh):
-            raise MeshError(f"a hull needs tetrahedra to hang on, and {self.mesh!r} has none")
+            raise MeshError(f"a hull needs tetrahedra, but {self.mesh!r} has none")
         if self.spare_vertices:
-            raise OptionError("an asset that is cut or tears takes no hull: it cannot follow a cut")
+            raise OptionError("a hull cannot follow a cut: leave out hull, or spare_vertices and tearing")
         if self.contact.itself:
-            raise OptionError("contact of a body with itself takes no hull: leave out the one or the other")
+            raise OptionError("a hull is not possible with self-contact: leave out hull or contact.itself")
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
             raise OptionError(f"tearing must be a Tearing or None, got {self.tearing!r}")
         if self.spare_vertices == 0:
-            raise OptionError("tearing takes spare_vertices: a tear makes copies of vertices")
+            raise OptionError("tearing needs spare_vertices: a tear copies vertices")
         if model.is_anisotropic:
-            raise MaterialError("an AnisotropicMaterial takes no tearing: its strength has directions too")
+            raise MaterialError("an AnisotropicMaterial cannot tear: its strength would depend on direction")
 
     def _require_flow(self, model: ElementModel) -> None:
         if not isinstance(self.plasticity, Plasticity):
             raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
         if model.has_bonds:
             raise OptionError(
-                f"law {self.law!r} takes no plasticity: it looks at edges, 'virial' at tetrahedra"
+                f"law {self.law!r} has no plasticity, because it acts along edges: use one on tetrahedra, "
+                "such as 'virial'"
             )
         if model.is_anisotropic:
-            raise MaterialError("an AnisotropicMaterial takes no plasticity: it does not yield by von Mises")
+            raise MaterialError("an AnisotropicMaterial has no plasticity: it does not yield by von Mises")
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"
@@ -276,37 +291,37 @@ class SoftBodyAsset:
         scale: float = 1.0,
         **options: Any,
     ) -> SoftBodyAsset:
-        """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
+        """Make a body from an artist's mesh: a cage of tetrahedra with the mesh as its skin.
 
-        The surface may have holes, faces turned round, walls within and parts that overlap: see
+        The surface can have holes, flipped faces, inner walls and parts that overlap: see
         `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
         Args:
             surface: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh or Scene, or
                 (vertices (n, 3) [m], triangles (m, 3)).
-            material: of the solid.
-            cells: of the cage along the longest side; 10 if neither this nor cell_size is given. Several
-                numbers, the largest first, make levels of detail: see `with_coarser`.
+            material: material of the solid.
+            cells: number of cells of the cage along the longest side; 10 if neither this nor cell_size is
+                given. Several numbers, the largest first, make levels of detail: see `with_coarser`.
             cell_size: edge of a cell [m], instead of `cells`.
-            method: of making the tetrahedra. "lattice" takes every surface, needs no other package and gives
-                the longest substeps. Two others fill the surface, in a process of their own: "ftetwild"
-                (extra `ftetwild`: fTetWild, MPL-2.0) follows it within a twentieth of a cell, and is not the
-                same on every run. "tetgen" (extra `tetgen`) keeps every triangle of a closed one. TetGen's
-                licence is the AGPL: it asks for the source of all that is shipped or served with it.
-            time_limit: of such a process, after which it is ended [s]; None takes 120.
-            refine: of "lattice": how often cells are halved, at most, round limbs and sheets that would be
-                left out, thinner than about a sixteenth of a cell: 0 to 3, and 1 if None. Each time halves
-                the substep. What stays left out is drawn, but neither bends nor touches anything. Both is
-                logged, with the `cell_size` that keeps it.
-            up: axis that points up in the file, "y" or "z"; None takes "y" for .glb, .gltf and .obj, and "z"
-                for all else, which is what most programs write.
-            center: move the middle of the box round it to the origin, as a file needs that lies kilometres
-                away from it (geographic coordinates): positions are 32-bit numbers.
+            method: method that makes the tetrahedra. "lattice" accepts every surface, needs no other package
+                and gives the longest substeps. Two others fill the surface, in a separate process: "ftetwild"
+                (extra `ftetwild`: fTetWild, MPL-2.0) follows it within a twentieth of a cell, and differs
+                from run to run. "tetgen" (extra `tetgen`) keeps every triangle of a closed surface. TetGen's
+                licence is the AGPL: it requires the source of everything that is shipped or served with it.
+            time_limit: time after which such a process is killed [s]; None: 120.
+            refine: for "lattice", the largest number of halvings of cells around limbs and sheets that would
+                be left out, thinner than about a sixteenth of a cell: 0 to 3; None: 1. Each halving also
+                halves the substep. Parts that are still left out are drawn, but neither bend nor collide.
+                Both are logged, with the `cell_size` that keeps the parts.
+            up: axis that points up in the file, "y" or "z"; None: "y" for .glb, .gltf and .obj, and "z" for
+                all others, as most programs write.
+            center: move the centre of the bounding box to the origin. A file that lies kilometres away from
+                it (geographic coordinates) needs this, because positions are 32-bit numbers.
             scale: factor from the unit of the file to metres: 0.001 for millimetres.
-            options: further arguments of `SoftBodyAsset`. A `skin` is drawn in place of the surface.
-        What was assumed, repaired or left out of the file is logged (logger `taichi_soft`).
-        Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
-            process that crashes or takes too long; OptionError for cells out of range, with the memory that
-            they would take; MissingExtraError without the package of the method.
+            options: further arguments of `SoftBodyAsset`. A `skin` is drawn instead of the surface.
+        Assumptions about the file, repairs and omissions are logged (logger `taichi_soft`).
+        Raises: MeshError, with a suggested fix, for a surface that cannot be read or encloses nothing, and
+            for a process that crashes or takes too long; OptionError for cells out of range, with the memory
+            that they would need; MissingExtraError without the package of the method.
         Example:
             duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
             print(duck.mesh.quality.summary())
@@ -320,7 +335,7 @@ class SoftBodyAsset:
         if isinstance(cells, (tuple, list, np.ndarray)):
             numbers = [as_count(number, "cells", 1, 1_000_000) for number in cells]
         if not numbers:
-            raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
+            raise OptionError("cells is empty: pass a number, or several for levels of detail")
         meshes: list[TetMesh] = []
         for number in numbers:
             made = tetrahedra_of(
@@ -333,15 +348,15 @@ class SoftBodyAsset:
             )
             if method != "lattice":
                 warn_of_short_steps(made.mesh, made.cell_size, method)
-            for words in made.told:
-                _log.warning("%s", words)
+            for note in made.notes:
+                _log.warning("%s", note)
             meshes.append(made.mesh)
         asset = cls(meshes[0], material, **{"skin": surfaces, **options})
         return asset.with_coarser(*meshes[1:]) if meshes[1:] else asset
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:
-        """Surfaces that are drawn in place of its own, bound to its tetrahedra."""
+        """Surfaces of the skin, bound to the tetrahedra."""
         if not self.skin:
             return ()
         assert isinstance(self.mesh, TetMesh)
@@ -349,7 +364,7 @@ class SoftBodyAsset:
 
     @cached_property
     def bound_hull(self) -> BoundHull | None:
-        """Its hull, bound to its tetrahedra."""
+        """The hull, bound to the tetrahedra."""
         if self.hull is None:
             return None
         assert isinstance(self.mesh, TetMesh)
@@ -357,7 +372,7 @@ class SoftBodyAsset:
 
     @cached_property
     def arrays(self) -> BodyArrays:
-        """The body in the order in which the kernels walk it: slow to make, and made once."""
+        """The body in kernel order: slow to make, and made once."""
         arrays, hull = arrange(self.description), self.bound_hull
         if hull is None:
             return arrays
@@ -365,7 +380,7 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m].
+        """Positions of the points that touch colliders, for vertices at `x`.
 
         Args:
             x: positions of the vertices, (n, 3) [m].
@@ -373,7 +388,9 @@ class SoftBodyAsset:
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
-        return np.asarray((hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1))  # corner by corner
+        return np.asarray(
+            (hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1)
+        )  # in the order of corners
 
     @cached_property
     def stable_step(self) -> StableStep:
@@ -382,20 +399,22 @@ class SoftBodyAsset:
 
     @cached_property
     def first_frequency(self) -> float:
-        """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by less
-        than a fifth; 0 for ropes and cloth, which bend freely."""
+        """Angular frequency of the slowest vibration of the free body [rad/s], too high by less than a fifth.
+
+        It is 0 for ropes and cloth, which bend freely.
+        """
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
-        """About the same, sooner found; 0 also for pairwise laws."""
+        """Estimate of `first_frequency` that is faster to compute; 0 also for pairwise laws."""
         return guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
-        """How vibrations of a body of this asset fade, which may be cut or of another material: at what rate
-        [1/s], and after what time at most they are damped again [s].
+        """Decay of vibrations of a body of this asset: rate [1/s], and longest interval of damping [s].
 
-        Of another material the frequency goes with the root of its mean stiffness over its mass.
+        The body can be cut or have another material: its frequency is then scaled by the square root of its
+        mean stiffness over its mass.
         Args:
             body: description of that body.
         """
@@ -408,11 +427,11 @@ class SoftBodyAsset:
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
 
     def kind_row(self, *, is_implicit: bool) -> tuple[float, ...]:
-        """What `BodyFields.load` takes of a body of this asset: `body_edge`, `body_stride`,
-        `body_sound_speed` and `vibration_row`.
+        """Row of `BodyFields.load` for a body of this asset: `body_edge`, `body_stride`, `body_sound_speed`
+        and `vibration_row`.
 
         Args:
-            is_implicit: its world steps by implicit Euler, whose substeps have any length: no stride.
+            is_implicit: True for implicit Euler, whose substeps have any length: the stride is 0.
         """
         speed = self.description.sound_speed
         stride = 0.0 if is_implicit else self.stable_step.recommended * speed
@@ -420,25 +439,27 @@ class SoftBodyAsset:
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
-        """Friction, thickness [m] and mean edge [m] of what touches: the hull, or the surface, or all edges
-        where there are no triangles."""
+        """Friction, thickness [m] and mean edge [m] of the contact surface.
+
+        It is the hull, else the surface, else all edges if there are no triangles.
+        """
         corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
         ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
         edge = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
         if self.bound_hull is not None:
             edge = self.bound_hull.mean_edge
         thickness = self.contact.thickness
-        return self.contact.friction, THIN * edge if thickness is None else thickness, edge
+        return self.contact.friction, DEFAULT_THICKNESS * edge if thickness is None else thickness, edge
 
     @cached_property
     def center_of_mass(self) -> Floats:
-        """Of its mesh, (3,) [m]."""
+        """Centre of mass of the mesh, (3,) [m]."""
         masses = self.description.masses
         return np.asarray(weighted_sum(masses, self.mesh.vertices) / masses.sum())
 
     @cached_property
     def rest_rows(self) -> Floats32:
-        """Position, velocity, inverse mass and mass of each vertex, (n, 8), of a body where its mesh is."""
+        """Position, velocity, inverse mass and mass of each vertex at rest, (n, 8)."""
         rows = np.zeros((len(self.mesh.vertices), 8), dtype=np.float32)
         rows[:, :3] = self.mesh.vertices
         rows[:, 6] = 1.0 / self.description.masses
@@ -454,39 +475,41 @@ class SoftBodyAsset:
         angular_velocity: ArrayLike,
         floor: float | None,
     ) -> Floats32:
-        """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
+        """Position, velocity, inverse mass and mass of each vertex of a body that starts there, (n, 8).
 
         Args:
-            position, rotation, velocity, angular_velocity: as `World.spawn` takes them.
+            position, rotation, velocity, angular_velocity: as for `World.spawn`.
             floor: height of the floor [m], or None.
-        Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
-            floor, which would crush the body.
+        Raises: OptionError for bad values, a vertex that is too fast, and a position out of range or below
+            the floor, which would crush the body.
         """
-        origin, turn = as_vector(position, "position", "m"), as_rotation(rotation)
-        drift = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
+        origin, rotation_matrix = as_vector(position, "position", "m"), as_rotation(rotation)
+        start_velocity = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
         spin = as_vector(angular_velocity, "angular_velocity", "rad/s")
-        x = turned(self.mesh.vertices, turn) + origin
-        self._require_place(x, origin, floor)
+        x = turned(self.mesh.vertices, rotation_matrix) + origin
+        self._check_position(x, origin, floor)
         rows: Floats32 = self.rest_rows.copy()
         rows[:, :3] = x
-        rows[:, 3:6] = drift
+        rows[:, 3:6] = start_velocity
         if spin.any():
             a, b, c = spin
-            turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
-            center = turned(self.center_of_mass[None], turn) + origin
-            rows[:, 3:6] += turned(x - center, turning)
+            spin_matrix = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = spin_matrix @ r
+            center = turned(self.center_of_mass[None], rotation_matrix) + origin
+            rows[:, 3:6] += turned(x - center, spin_matrix)
             fastest = float(np.abs(rows[:, 3:6]).max())
             if not fastest < VELOCITY_LIMIT:
                 raise OptionError(
-                    f"angular_velocity {spin.tolist()} rad/s makes a vertex as fast as {fastest:.4g} m/s: "
-                    f"stay below {VELOCITY_LIMIT:g}"
+                    f"angular_velocity={spin.tolist()} rad/s gives a vertex a speed of {fastest:.4g} m/s: "
+                    f"keep it below {VELOCITY_LIMIT:g}"
                 )
         rows[self.description.pinned, 3:6] = 0.0
         return rows
 
-    def _require_place(self, x: Floats, origin: Floats, floor: float | None) -> None:
+    def _check_position(self, x: Floats, origin: Floats, floor: float | None) -> None:
         if not np.abs(x).max() < POSITION_LIMIT:
-            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+            raise OptionError(
+                f"position puts the body beyond {POSITION_LIMIT:g} m: place it nearer to the origin"
+            )
         lowest, highest = float(self.touching_points(x)[:, 2].min()), float(x[:, 2].max())
         if floor is not None and lowest < floor - 1e-3 * (highest - lowest):
             depth = floor - lowest
@@ -505,7 +528,7 @@ def _are_same(skin: tuple[Surface, ...], other: tuple[Surface, ...]) -> bool:
 
 
 def _mean_stiffness(body: BodyDescription) -> float:
-    """Mean stiffness of a body over its mean density, but for a factor [m^2/s^2]."""
+    """Mean stiffness of a body over its mean density, up to a constant factor [m^2/s^2]."""
     mesh, material = body.mesh, body.material
     assert isinstance(mesh, TetMesh)
     assert isinstance(material, Material | AnisotropicMaterial)

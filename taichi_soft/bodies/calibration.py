@@ -1,9 +1,9 @@
-"""Constants with which a coarser mesh weighs and vibrates as a finer one.
+"""Calibrate the material of a coarser mesh to the mass and the frequencies of a finer one.
 
-A coarse mesh of linear tetrahedra is too stiff, more so in some modes than in others. Young's modulus of each
-of its tetrahedra is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995): of a
-mode u with u^T M u = 1, the share of tetrahedron t in u^T K u says by how much the square of the frequency
-goes with its modulus. Of all moduli with the right frequencies those are taken that change least.
+A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. Young's modulus of each of
+its tetrahedra is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995): for a
+mode u with u^T M u = 1, the part of tetrahedron t in u^T K u is the sensitivity of the squared frequency to
+its modulus. Among all moduli with the right frequencies, those with the smallest change are chosen.
 """
 
 from __future__ import annotations
@@ -25,67 +25,67 @@ _log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
 
 MODES = 4
-"""That are to have the same frequencies: what is seen of a body that wobbles are its slowest."""
+"""Number of modes whose frequencies must agree: the slowest ones dominate the visible wobble."""
 
-EXACT = 2e-3
-"""Change of squared frequencies at which modes are known well enough."""
+MODE_TOLERANCE = 2e-3
+"""Relative change of squared frequencies at which modes have converged."""
 
-CLOSE = 0.01
-"""Of the frequencies, at which the update ends."""
+TOLERANCE = 0.01
+"""Relative error of the frequencies at which the update ends."""
 
-PROMISED = 0.05
-"""Beyond it a word is said."""
+WARNING_ERROR = 0.05
+"""Relative error of the frequencies above which a warning is logged."""
 
-MOST_UPDATES = 6
+MAX_UPDATES = 6
 
-ALIKE = 0.1
-"""Singular values of the sensitivities below this part of the largest belong to modes that no modulus can
-tell apart, such as the two bending modes of a round bar."""
+RCOND = 0.1
+"""Singular values of the sensitivities below this fraction of the largest are ignored. They belong to modes
+that no modulus can separate, such as the two bending modes of a round bar."""
 
-MOST_CHANGE = 3.0
-"""Of a modulus, as a factor beside that of all of them: beyond, the body would be of another kind."""
+MAX_CHANGE = 3.0
+"""Largest factor between a modulus and the median of all: beyond it, the body would be of another kind."""
 
 
 def calibrated(fine: BodyDescription, coarser: Sequence[BodyDescription]) -> list[Material]:
-    """The materials of coarser bodies that give each the mass and the lowest frequencies of `fine`.
+    """Return the materials that give coarser bodies the mass and the lowest frequencies of `fine`.
 
     Args: bodies of one material with a number for each constant.
-    Returns: each with a Young's modulus for each tetrahedron.
+    Returns: materials with a Young's modulus for each tetrahedron.
     """
-    wanted, _ = lowest_modes(fine, MODES, EXACT)
-    return [_fitted(wanted, fine.masses.sum(), each) for each in coarser]
+    target, _ = lowest_modes(fine, MODES, MODE_TOLERANCE)
+    return [_fitted(target, fine.masses.sum(), each) for each in coarser]
 
 
-def _fitted(wanted: Floats, mass: float, coarse: BodyDescription) -> Material:
-    """The material of `coarse` with which it has these angular frequencies [rad/s] and this mass [kg]."""
+def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
+    """Material with which `coarse` has these angular frequencies [rad/s] and this mass [kg]."""
     material = coarse.material
     assert isinstance(material, Material)
     density = material.density * mass / coarse.masses.sum()
     factors = np.zeros(len(coarse.mesh.tets))  # logarithms
-    best, least = coarse.material, np.inf
-    for _ in range(MOST_UPDATES):
+    best, smallest_error = coarse.material, np.inf
+    for _ in range(MAX_UPDATES):
         young = material.young * np.exp(factors)
         body = replace(coarse, material=replace(material, young=young, density=density))
-        found, shapes = lowest_modes(body, MODES, EXACT)
-        count = min(len(wanted), len(found))
-        gaps = 2.0 * np.log(wanted[:count] / found[:count])
-        miss = float(np.abs(gaps).max(initial=0.0)) / 2.0
-        if miss < least:
-            best, least = body.material, miss
-        if miss < CLOSE:
+        found, shapes = lowest_modes(body, MODES, MODE_TOLERANCE)
+        count = min(len(target), len(found))
+        gaps = 2.0 * np.log(target[:count] / found[:count])
+        error = float(np.abs(gaps).max(initial=0.0)) / 2.0
+        if error < smallest_error:
+            best, smallest_error = body.material, error
+        if error < TOLERANCE:
             break
-        shares = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
-        # A factor for all first: it costs nothing, where the sum of squares would spread it unevenly.
-        whole = gaps.mean()
-        factors += whole + np.linalg.pinv(shares, rcond=ALIKE) @ (gaps - whole)
-        middle = np.median(factors)
-        factors = middle + np.clip(factors - middle, -np.log(MOST_CHANGE), np.log(MOST_CHANGE))
-    if least > PROMISED:
+        sensitivities = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
+        # A common factor first, because the least-squares solution would distribute it unevenly.
+        common = gaps.mean()
+        factors += common + np.linalg.pinv(sensitivities, rcond=RCOND) @ (gaps - common)
+        median = np.median(factors)
+        factors = median + np.clip(factors - median, -np.log(MAX_CHANGE), np.log(MAX_CHANGE))
+    if smallest_error > WARNING_ERROR:
         _log.warning(
-            "%r has lowest frequencies up to %.0f %% from those of the finest level: it is too coarse for "
-            "more",
+            "the lowest frequencies of %r differ by up to %.0f %% from those of the finest level: it is too "
+            "coarse for less",
             coarse.mesh,
-            100.0 * least,
+            100.0 * smallest_error,
         )
     assert isinstance(best, Material)
     return best

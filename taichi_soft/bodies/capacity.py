@@ -1,4 +1,4 @@
-"""How much room the fields of a world have."""
+"""Capacity of the fields of a world."""
 
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -7,18 +7,18 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.constants import LANES
 
 ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
-"""The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
+"""Numbers of a `Capacity` that can be larger than needed without any effect."""
 
 
 LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
-"""Room that the smallest world has; the last two where there is contact."""
+"""Smallest capacity of a world; the last two in worlds with contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 
 
 @dataclass(frozen=True)
 class BodyCapacity:
-    """Room in a state. Rounded up to powers of two, so that similar worlds share compiled kernels."""
+    """Capacity of a state, rounded up to powers of two so that similar worlds share compiled kernels."""
 
     particles: int
     edges: int
@@ -26,12 +26,12 @@ class BodyCapacity:
     bodies: int
     triangles: int
     outer: int
-    parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
-    rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
+    parallel: bool  # room for the forces of all corners and edges at once, for the flat schedule
+    rings: int = 0  # rows of edge rings; 0 if no edges carry elastic forces
     implicit: bool = False  # room for the linear system of implicit integration
     anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
-    plastic: bool = False  # room for the first rest shapes of bodies that can be bent for good
-    double: bool = False  # float64 instead of float32: to evaluate forces, not to move
+    plastic: bool = False  # room for the original rest shapes of plastic bodies
+    double: bool = False  # float64 instead of float32: to evaluate forces without motion
 
     @classmethod
     def of(
@@ -44,9 +44,9 @@ class BodyCapacity:
         double: bool = False,
         **others: Any,
     ) -> Room:
-        """Room for `scene`. Lanes of its last body read on behind its particles and triangles.
+        """Capacity for `scene`. The lanes of its last body read beyond its particles and triangles.
 
-        Args: others: by name, of what a subclass adds.
+        Args: others: values that a subclass adds, by name.
         """
         return cls(
             room_for(scene.particle_count + LANES, "particles"),
@@ -66,15 +66,15 @@ class BodyCapacity:
 
     @property
     def rooms(self) -> list[int]:
-        """How much room there is, in the order of `ROOMS`."""
+        """Capacities in the order of `ROOMS`."""
         return [getattr(self, name) for name in ROOMS]
 
     def has_room_for(self, other: "BodyCapacity") -> bool:
-        """Whether a state of this capacity has the fields of one of `other`, and none of them shorter."""
+        """True if a state of this capacity has the fields of one of `other`, none of them shorter."""
         widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
         return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
 
 
 def room_for(count: int, name: str) -> int:
-    """A power of two."""
+    """Smallest power of two that is at least `count` and `LEAST`."""
     return max(LEAST[name], 1 << max(count - 1, 0).bit_length())

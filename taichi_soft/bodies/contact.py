@@ -1,4 +1,4 @@
-"""How a body touches other bodies and colliders."""
+"""Contact properties of a body."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from taichi_soft.core.checks import as_count, as_flag, as_friction, as_number
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.serialisation import serialised
 
-THIN = 0.02
-"""Thickness over the mean edge of the surface, where none is given: it is not seen, and it is found by the
-search for contacts well before."""
+DEFAULT_THICKNESS = 0.02
+"""Default thickness over the mean edge of the surface: too thin to be seen, and the search finds contacts
+well before."""
 
 
 @serialised("friction", "thickness", "itself", "group", "mask")
 @dataclass(frozen=True)
 class Contact:
-    """What a body's surface does where it touches another.
+    """Contact properties of a body's surface.
 
     Args:
-        friction: Coulomb coefficient, 0 or more. Between two bodies the geometric mean counts; against a
-            collider the collider's.
-        thickness: of a skin on the surface [m]: two bodies keep the mean of theirs between them. None takes
+        friction: Coulomb coefficient, 0 or more. Two bodies use the geometric mean of theirs; a body and a
+            collider use the collider's.
+        thickness: thickness of a layer on the surface [m]: two bodies keep apart by the mean of theirs. None:
             2 % of the mean edge of the surface.
-        itself: whether parts of the body touch each other that are more than 1.5 edges apart at rest.
-        group, mask: bits. Two bodies, or a body and a collider, touch where each one's mask has a bit of the
+        itself: True for self-contact, between parts of the body that are more than 1.5 edges apart at rest.
+        group, mask: bits. Two bodies, or a body and a collider, collide if each one's mask has a bit of the
             other's group.
     Raises: OptionError for a value out of range.
     """

@@ -1,4 +1,4 @@
-"""What a body is made of, in the order of its vertices: masses, constants, rest shape."""
+"""Physical description of a body in the order of its vertices: masses, constants, rest shape."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SHORTEST_EDGE = 1e-6
-"""[m]; volumes of smaller tetrahedra run out of float32's range."""
+"""Shortest edge [m]: volumes of smaller tetrahedra exceed float32's range."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription:
-    """One kind of body, wherever it is."""
+    """One kind of body, independent of position and motion."""
 
     mesh: BodyMesh
     material: AnyMaterial
@@ -41,7 +41,7 @@ class BodyDescription:
 
     @cached_property
     def bonds(self) -> Bonds | None:
-        """What a pairwise law knows of the edges; None for other laws."""
+        """Constants of the edges for a pairwise law; None for other laws."""
         law = self.model.law
         return law.bonds(self.mesh, self.material) if isinstance(law, BondLaw) else None
 
@@ -55,14 +55,14 @@ class BodyDescription:
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
 
     def per_tet(self, name: str) -> Floats:
-        """A constant of the material for each tetrahedron, as much of it as is solid, (m,)."""
+        """A constant of the material for each tetrahedron, times its solid fraction, (m,)."""
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
         assert isinstance(self.mesh, TetMesh)
         return self.material.per_tet(name, len(self.mesh.tets)) * self.mesh.fill
 
     def stiffness_matrices(self) -> Floats:
-        """C of Hooke's law of each tetrahedron, as much of it as is solid, (m, 6, 6) [Pa]."""
+        """Stiffness C of Hooke's law for each tetrahedron, times its solid fraction, (m, 6, 6) [Pa]."""
         assert isinstance(self.mesh, TetMesh)
         assert isinstance(self.material, Material | AnisotropicMaterial)
         return self.material.stiffness_matrices(len(self.mesh.tets)) * self.mesh.fill[:, None, None]
@@ -74,8 +74,11 @@ class BodyDescription:
 
     @cached_property
     def sound_speed(self) -> float:
-        """Of the fastest waves in it at rest [m/s]: sqrt((lambda + 2 mu) / density), the largest of its
-        tetrahedra; in given springs a sqrt(k / m), the largest of its edges."""
+        """Speed of the fastest waves at rest [m/s].
+
+        It is the largest sqrt((lambda + 2 mu) / density) of the tetrahedra, or the largest a sqrt(k / m) of
+        given springs, with their length a.
+        """
         mesh, material = self.mesh, self.material
         if isinstance(material, SpringMaterial):
             assert self.bonds is not None
@@ -91,7 +94,7 @@ class BodyDescription:
 
     @cached_property
     def inner_faces(self) -> InnerFaces:
-        """Where it can be cut."""
+        """Faces along which the body can be cut."""
         return inner_faces(self.mesh.tets)
 
     @property
@@ -112,7 +115,7 @@ class BodyDescription:
 
     @cached_property
     def edge_damping(self) -> Floats:
-        """Damping of each edge by the law, (k,) [N s/m]."""
+        """Damping constant of each edge, (k,) [N s/m]."""
         if isinstance(self.material, SpringMaterial):
             return self.material.per_edge("damping", len(self.mesh.edges))
         if self.model.damping_model is not DampingModel.EDGE:
@@ -122,7 +125,7 @@ class BodyDescription:
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
-    """Vertices of the surface; of a `ParticleMesh`, which has no inside, all."""
+    """Vertices of the surface; all vertices of a `ParticleMesh`, which has no inside."""
     if isinstance(mesh, TetMesh):
         return mesh.surface_vertices
     return np.arange(len(mesh.vertices), dtype=np.int32)
@@ -135,10 +138,12 @@ def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
 
 
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
-    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6); in a `CageMesh`
-    that of the solid which the vertex carries."""
+    """Masses of the vertices, (n,) [kg]: a quarter of each adjacent tetrahedron's (thesis chapter 6).
+
+    In a `CageMesh` they are those of the solid that the vertices carry.
+    """
     masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
-    if isinstance(mesh, CageMesh):  # by the mean density of the tetrahedra round it
+    if isinstance(mesh, CageMesh):  # with the mean density of the adjacent tetrahedra
         masses *= mesh.vertex_volumes / lumped(mesh.tets, mesh.volumes * mesh.fill, len(mesh.vertices))
     return masses.astype(np.float64)
 
@@ -149,7 +154,7 @@ def rest_inverses(mesh: BodyMesh) -> Floats:
 
 
 def require_size(mesh: BodyMesh) -> None:
-    """Raises: MeshError for edges below `SHORTEST_EDGE`."""
+    """Check the lengths of edges. Raises: MeshError below `SHORTEST_EDGE`."""
     shortest = float(mesh.edge_lengths.min())
     if shortest < SHORTEST_EDGE:
         raise MeshError(

@@ -1,4 +1,4 @@
-"""What made a body go non-finite, as its owner is told."""
+"""Failures of bodies that became non-finite."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a body was frozen."""
+    """Cause of the freezing of a body."""
 
     body: int  # its slot
-    tetrahedron: int | None  # that broke first, in the caller's order; None if it cannot be told
-    step: int  # of the world, counted from 0, which was undone for this body
-    substep: int | None  # within that step, or the finest attempt at it
-    time: float  # [s], of the last sound state, in which the body now rests
-    edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
+    tetrahedron: int | None  # the first that failed, in the caller's order; None if unknown
+    step: int  # step of the world, counted from 0, that was undone for this body
+    substep: int | None  # within that step, or its finest retry
+    time: float  # [s], of the last valid state, in which the body now rests
+    edge: tuple[int, int] | None = None  # instead of a tetrahedron, for forces along edges
 
 
 @dataclass(frozen=True)
 class FailedStep:
-    """The fixed step in which a body went non-finite."""
+    """The fixed step in which a body became non-finite."""
 
     step: int
-    time: float  # [s], before it
-    substeps: int  # of the last attempt at it
+    time: float  # [s], before the step
+    substeps: int  # of the last retry
     h: float  # [s]
-    is_braked: bool  # whether vibrations were braked in it
+    is_braked: bool  # True if vibrations were braked in it

@@ -1,8 +1,8 @@
-"""The Taichi fields that hold particles, edges and tetrahedra of bodies.
+"""Taichi fields of the particles, edges and tetrahedra of bodies.
 
-Fields live as long as the process: Taichi compiles kernels per set of fields, and destroying one while
-a game runs stalls it. A closed world therefore gives its fields back, and the next world that fits into
-them takes them over with its kernels compiled.
+Fields exist as long as the process: Taichi compiles kernels per set of fields, and destroying a field stalls
+a running game. A closed world therefore returns its fields, and the next world that fits into them reuses
+them with their compiled kernels.
 """
 
 import gc
@@ -24,7 +24,7 @@ from taichi_soft.core.threads import in_turn
 
 @holds_fields
 class BodyFields:
-    """Particles, edges, tetrahedra and bodies, each quantity one field.
+    """Particles, edges, tetrahedra and bodies, with one field for each quantity.
 
     Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
     with K entries is at (b K + k) LANES + l. The arrays are flat because Taichi 1.7 confuses stores at a
@@ -32,33 +32,37 @@ class BodyFields:
     """
 
     def __init__(self, capacity: BodyCapacity) -> None:
-        """Allocate `capacity`; contents are zero until `load`."""
+        """Allocate fields of `capacity`; contents are zero until `load`."""
         self.capacity = capacity
-        self.programs: set[Program] = set()  # that it has been used with
+        self.programs: set[Program] = set()  # programs that used these fields
         self.loader = Loader()
         n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
         real = self.real = ti.f64 if capacity.double else ti.f32
         self.particle_position = ti.Vector.field(3, real, n)  # [m]
         self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
-        # [N], zero between steps; with a fourth component, because four floats load and store in one piece.
+        # [N], zero between steps; with a fourth component, because four floats load and store at once.
         self.particle_force = ti.Vector.field(4, real, n)
         self.particle_mass = ti.field(real, n)  # [kg]
         self.particle_inv_mass = ti.field(real, n)  # [1/kg], 0 where pinned
         self.particle_body = ti.field(ti.i32, n)
-        self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
+        self.particle_of_vertex = ti.field(ti.i32, n)  # particle of each of the caller's vertices
         self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
         self.prev_velocity = ti.Vector.field(3, real, n)
         self.rest_position = ti.Vector.field(3, real, n)  # [m]
-        self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `control.kernels.pins`
-        self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
-        self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
-        self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
+        self.particle_aim = ti.field(ti.i32, n)  # target of a pinned particle: see `control.kernels.pins`
+        self.particle_target = ti.Vector.field(
+            3, real, n
+        )  # position of the target [m], in world or frame axes
+        self.particle_push = ti.Vector.field(3, real, n)  # external force [N], if the body is `PUSHED`
+        self.particle_reaction = ti.Vector.field(
+            3, real, n
+        )  # [N s], reaction on its constraint in the last step
         self.prev_reaction = ti.Vector.field(3, real, n)  # the same before the step
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
         if capacity.plastic:
-            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # the same before any plastic flow
+            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # [1/m], before any plastic flow
             self.body_plasticity = ti.Vector.field(4, real, bodies)  # see `Plasticity.row`
         self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
         if capacity.anisotropic:
@@ -66,7 +70,7 @@ class BodyFields:
         self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
-        self.edge_blocks = ti.Vector.field(2, ti.i32, k)  # first row and number of edges from one particle
+        self.edge_blocks = ti.Vector.field(2, ti.i32, k)  # first row and number of each block
         self.edge_damping = ti.field(real, k)  # [N s/m]
         if capacity.rings:
             self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
@@ -78,18 +82,19 @@ class BodyFields:
             self.tet_inverse_volume6 = ti.field(real, b * LANES)  # 1 / (6 V0) [1/m^3]
             self.tet_expansion_modulus = ti.field(real, b * LANES)  # E nu [Pa]
             self.tet_pressure = ti.field(real, b * LANES)  # E nu dV / V0 [Pa]
-            self.edge_pressure = ti.field(real, k)  # [Pa], of all tetrahedra round an edge
+            self.edge_pressure = ti.field(real, k)  # [Pa], of all tetrahedra around an edge
         if capacity.rings or capacity.implicit:
             self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
         if capacity.implicit:
-            self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
+            self.particle_block = ti.Matrix.field(3, 3, real, n)  # diagonal blocks of the system
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
-            self.particle_inertia = ti.field(real, n)  # [kg]: mass, and what grabs add
+            self.particle_inertia = ti.field(real, n)  # [kg]: mass, plus the inertia of grabs
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
-            if capacity.rings:  # as the last evaluation of forces found it
+            if capacity.rings:  # from the last evaluation of forces
                 self.edge_normal = ti.Vector.field(3, real, k)
                 self.edge_compared = ti.Vector.field(3, real, k)  # [m]
-            # What `rigid_rotation` prepares: K W by particle, W^T K W, the centre beside the first particle.
+            # Prepared by `rigid_rotation`: K W by particle, W^T K W, and the centre relative to the first
+            # particle.
             self.particle_turning = ti.Matrix.field(3, 3, real, n)
             self.body_turning = ti.Matrix.field(3, 3, real, bodies)
             self.body_inverse_inertia = ti.Matrix.field(3, 3, real, bodies)  # [1/(kg m^2)]
@@ -98,27 +103,27 @@ class BodyFields:
             self.residual = ti.Vector.field(3, real, n)
             self.direction = ti.Vector.field(3, real, n)
             self.image = ti.Vector.field(3, real, n)
-            # 1 where the floor holds it, or a collider's number plus 1.
+            # 1 if the floor holds it, or the number of a collider plus 1.
             self.particle_contact = ti.field(ti.i32, n)
-            self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
-            # Of particles that are held, see `held_particles`: the normal and whether they stick, velocity
-            # of the surface [m/s], friction on those that slide [N s].
+            self.prev_contact = ti.field(ti.i32, n)  # before part of a step that can be undone
+            # For constrained particles, see `held_particles`: the normal and 1 if they stick, velocity of the
+            # surface [m/s], friction on sliding particles [N s].
             self.particle_hold = ti.Vector.field(4, real, n)
             self.hold_velocity = ti.Vector.field(3, real, n)
             self.hold_friction = ti.Vector.field(3, real, n)
-            self.body_residual = ti.field(real, bodies)  # largest of the last step, over the load
-            self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
+            self.body_residual = ti.field(real, bodies)  # largest of the last step, relative to the load
+            self.solver = ti.Vector.field(2, real, ())  # tolerance, largest number of iterations
         if capacity.parallel:
             self.corner_force = ti.Vector.field(4, real, b * 4 * LANES)  # [N], corner by corner in each block
             self.edge_force = ti.Vector.field(3, real, k)
             self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
-            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner lies in corner_force
+            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # row of each corner in corner_force
             self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
             self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
             self.barrier = ti.field(ti.i32, 1)
 
         self.triangle_vertices = ti.Vector.field(3, ti.i32, capacity.triangles)  # outward
-        self.outer_particle = ti.field(ti.i32, capacity.outer)  # of the surface, body by body
+        self.outer_particle = ti.field(ti.i32, capacity.outer)  # particles of the surface, body by body
 
         self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
         self.body_triangles = ti.Vector.field(2, ti.i32, bodies)
@@ -129,25 +134,23 @@ class BodyFields:
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
-        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
+        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], bounding box at the last query that used it
         self.body_upper = ti.Vector.field(3, real, bodies)
-        self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
+        self.body_drives = ti.field(ti.i32, bodies)  # bits of control, see `bodies.status`
         self.body_gravity_scale = ti.field(real, bodies)
-        self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
-        self.body_fading = ti.field(real, bodies)  # of vibrations [1/s]
-        self.body_fading_interval = ti.field(
-            real, bodies
-        )  # after which they are damped again at the latest [s]
-        self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
-        self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
-        self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
-        self.body_refinement = ti.field(real, bodies)  # substeps that its shape asks for, over those at rest
+        self.body_damping = ti.field(real, bodies)  # rate for velocities relative to the world [1/s]
+        self.body_fading = ti.field(real, bodies)  # decay rate of vibrations [1/s]
+        self.body_fading_interval = ti.field(real, bodies)  # longest interval of damping vibrations [s]
+        self.body_is_braked = ti.field(ti.i32, bodies)  # 1 during the last retry of a step
+        self.body_patience = ti.field(ti.i32, bodies)  # steps with inverted tetrahedra; see `untangling`
+        self.body_jolted = ti.field(ti.i32, bodies)  # 1 if a step was too coarse
+        self.body_refinement = ti.field(real, bodies)  # substeps that its shape needs, over those at rest
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
-        self.body_stride = ti.field(real, bodies)  # way of sound in its longest stable substep at rest [m]
+        self.body_stride = ti.field(
+            real, bodies
+        )  # distance of sound in the longest stable substep at rest [m]
         self.body_sound_speed = ti.field(real, bodies)  # [m/s]
-        self.retries = ti.field(
-            ti.i32, ()
-        )  # how often a step that fails is made again, twice as fine each time
+        self.retries = ti.field(ti.i32, ())  # largest number of retries of a failed step, each twice as fine
         self.block_model = ti.field(ti.i32, b)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
@@ -155,12 +158,13 @@ class BodyFields:
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
-        """Fill every field from `scene`, and those that `loader` has rows for already.
+        """Fill every field from `scene`, except those for which `loader` already has rows.
 
         `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_stride`,
         `body_sound_speed`, `body_fading` and `body_fading_interval`.
 
-        All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
+        All bodies are absent, with particles at the positions of their meshes, until `spawn_body` places
+        them.
         """
         fill, ranges, bodies = self.loader.fill, scene.ranges, scene.bodies
         position = _laid_out(scene, "particles", lambda b: b.rest_position)
@@ -196,7 +200,7 @@ class BodyFields:
             self._load_bonds(scene)
         if self.capacity.rings or self.capacity.implicit:
             names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
-            # The lanes that pad a last block pull the body's first edge with no pressure.
+            # Padding lanes of a last block act on the body's first edge without pressure.
             rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
             fill(self.tet_edges, np.concatenate(rows))
         if self.capacity.implicit:
@@ -234,9 +238,9 @@ class BodyFields:
         self.loader.write()
 
     def tet_constants(self, body: BodyArrays) -> list[tuple[Any, NDArray[np.float64]]]:
-        """Fields with constants of tetrahedra, and what one body has in each, (m, k).
+        """Fields with constants of tetrahedra, and the rows of one body in each, (m, k).
 
-        Whatever a material is made of has its line here: to load a world, after `set_material`, after a cut.
+        All constants of materials are listed here: for loading, `set_material` and cuts.
         """
         found = [(self.tet_lame, body.lame), (self.tet_damping, body.tet_damping[:, None])]
         if self.capacity.anisotropic:
@@ -246,7 +250,7 @@ class BodyFields:
         return found
 
     def _load_bonds(self, scene: Scene) -> None:
-        """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
+        """Load the constants and rings of pairwise laws; zeros for the edges of other bodies."""
         fill, bodies = self.loader.fill, scene.bodies
         constants, rings, members, weights = [], [], [], []
         for body, place, rows in zip(bodies, scene.ranges, _spans(scene, "edges"), strict=True):
@@ -269,7 +273,7 @@ class BodyFields:
         fill(self.edge_pressure, np.zeros(0))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
-        """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
+        """List the corner and edge forces that act on each particle, in a fixed order."""
         fill, order = self.loader.fill, np.argsort(corners[:, 0], kind="stable")
         fill(self.corner_slot, corners[order, 1])
         fill(self.particle_corners, _row_ranges(corners[:, 0], count))
@@ -281,15 +285,15 @@ class BodyFields:
 
 
 def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """A body's edges and `LANES` rows of zeros behind them, which lead from its first particle to itself."""
+    """Append `LANES` rows of zeros to a body's edges, which lead from its first particle to itself."""
     return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
 
 
 def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
-    """Rows of all bodies, each at the start of its range, with zeros in the room that is left.
+    """Rows of all bodies, each at the start of its range and padded with zeros.
 
-    `counted_from`: the kind of rows that the numbers in them name, which become rows of the world; in the
-    first so many `columns` where they are given.
+    `counted_from`: kind of rows that the numbers in them refer to, which become rows of the world; `columns`:
+    how many leading columns hold such numbers, all if None.
     """
     parts = []
     for body, place, span in zip(scene.bodies, scene.ranges, _spans(scene, kind), strict=True):
@@ -302,13 +306,13 @@ def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=
 
 
 def _spans(scene: Scene, kind: str) -> NDArray[np.int64]:
-    """How many rows of a kind each body has for its own, used or not."""
+    """Number of rows of a kind reserved for each body, used or not."""
     starts = [getattr(place, kind)[0] for place in (*scene.ranges, scene.ends)]
     return np.diff(starts)
 
 
 def _used(scene: Scene, kind: str, rows_of) -> NDArray[np.int64]:  # type: ignore[no-untyped-def]
-    """Which rows of its range each body uses, (bodies, 2)."""
+    """Range of the rows that each body uses, (bodies, 2)."""
     starts = np.array([getattr(place, kind)[0] for place in scene.ranges])
     return np.stack([starts, starts + [len(rows_of(body)) for body in scene.bodies]], axis=1)
 
@@ -325,9 +329,9 @@ def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generi
 def _tet_blocks(
     bodies: list[BodyArrays], ranges: list[Ranges]
 ) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
-    """Vertices of all blocks; and for each corner with a force its particle and its place in corner_force.
+    """Vertices of all blocks; and for each corner with a force its particle and its row in corner_force.
 
-    The lanes that pad a last block name the body's first particle four times: no shape, no force.
+    Padding lanes of a last block name the body's first particle four times: no shape, no force.
     """
     blocks, corners = [], []
     for body, place in zip(bodies, ranges, strict=True):
@@ -351,14 +355,13 @@ Kind = TypeVar("Kind", bound=BodyFields)
 
 @in_turn
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
-    """Fields of a kind with room for that: of those that closed worlds gave back one for which the step of
-    `program` is compiled, and of these the smallest; or new ones.
+    """Return fields of a kind and capacity: the smallest free ones, if possible with `program` compiled.
 
-    To find some, what worlds that are gone have left behind may be collected.
+    Otherwise new fields are made. The garbage of closed worlds is collected first if that can free some.
     """
     fields = _best(kind, capacity, program)
     if (fields is None or program not in fields.programs) and len(_free) < len(_made):
-        gc.collect()  # of worlds that are gone, but for a cycle such as a traceback makes
+        gc.collect()  # closed worlds can be kept by a cycle, such as a traceback
         fields = _best(kind, capacity, program)
     if fields is None:
         fields = make_fields(partial(kind, capacity))
@@ -370,16 +373,16 @@ def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
 
 
 def _best(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind | None:
-    """Of the fields that are free."""
+    """Best of the free fields, or None."""
     fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
     return min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms), default=None)
 
 
 def made_fields() -> list[BodyFields]:
-    """All that this process has made, in use or not, in their order."""
+    """All fields that this process has made, used or free, in order."""
     return list(_made)
 
 
 def release(fields: BodyFields) -> None:
-    """Take back the fields of a world that is gone."""
+    """Return the fields of a closed world."""
     _free.append(fields)

@@ -1,4 +1,4 @@
-"""The slowest vibration of a free body, to which the damping ratio of its material belongs."""
+"""Slowest vibration of a free body, to which the damping ratio of its material refers."""
 
 from __future__ import annotations
 
@@ -14,47 +14,49 @@ from taichi_soft.core.residue import rounded
 
 Floats = NDArray[np.float64]
 
-_MORE = 3
-"""Modes that are looked for beside those that are asked for: round bodies have several of one frequency."""
+_EXTRA_MODES = 3
+"""Modes computed beyond those requested: round bodies have several of one frequency."""
 
-_AT_ONCE = 4
-"""Columns that a product with the stiffness matrix takes: more fall out of a processor's cache."""
+_CHUNK = 4
+"""Columns per product with the stiffness matrix: more do not fit into a processor's cache."""
 
-_MOST_ITERATIONS = 400
+_MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
-"""Iterations, and change of the frequency's square in all of these, at which it ends if nothing is said. Of
-long bodies and of letters a single one changes little long before the end."""
+"""Number of iterations, and relative change of the squared frequency over them, at which the search ends by
+default. In long bodies and letters, a single iteration changes little long before the end."""
 
 _ROUND_OFF = 1e-9
-"""Length of a direction, as a part of the longest, below which it is round-off: made longer it would be rigid
-motion as well. Bodies of few tetrahedra have no other directions left."""
+"""Length of a direction, relative to the longest, below which it is round-off: normalised, it would contain
+rigid motion. Bodies of few tetrahedra have no other directions left."""
 
-MOST_PARTS = 30
-"""Separate parts of a body whose rigid motions are set apart. With more it counts as undamped."""
+MAX_PARTS = 30
+"""Largest number of components whose rigid motions are removed. Bodies with more count as undamped."""
 
 
 def first_frequency(body: BodyDescription) -> float:
-    """Angular frequency of the slowest vibration of a body that nothing holds [rad/s], from above by less
-    than a fifth; 0 where it has none."""
+    """Angular frequency of the slowest vibration of a free body [rad/s], too high by less than a fifth.
+
+    It is 0 if there is none.
+    """
     return first_mode(body)[0]
 
 
 def guessed_frequency(body: BodyDescription) -> float:
-    """The same of a body of tetrahedra by Ritz's method with polynomials, from above and soon found."""
+    """Estimate of the same for tetrahedra by Ritz's method with polynomials: fast, and an upper bound."""
     if body.bonds is not None:
         return 0.0
-    _, bent = _polynomials(body)
-    if bent.shape[1] == 0:
+    _, deformed = _polynomials(body)
+    if deformed.shape[1] == 0:
         return 0.0
-    _, _, value = _ritz(bent, _applied(vibration_of(body), bent), 1)
+    _, _, value = _ritz(deformed, _applied(vibration_of(body), deformed), 1)
     return rounded(float(np.sqrt(max(value[0], 0.0))))
 
 
 def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:
-    """The slowest vibration of a body that nothing holds: angular frequency [rad/s], and shape (n, 3), the
-    largest entry being 1; 0 and zeros where it has none.
+    """Slowest vibration of a free body: angular frequency [rad/s], and shape (n, 3) with largest entry 1.
 
-    Args: change: of the frequency's square in 10 iterations, at which it ends. The value comes from above.
+    Both are 0 if there is none. The frequency is an upper bound.
+    Args: change: relative change of the squared frequency in 10 iterations at which the search ends.
     """
     frequencies, shapes = lowest_modes(body, 1, change)
     if len(frequencies) == 0:
@@ -63,26 +65,26 @@ def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, F
 
 
 def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floats, Floats]:
-    """The slowest vibrations of a body that nothing holds: angular frequencies [rad/s], ascending, and shapes
-    (k, n, 3), of which the squares weighted by mass sum to 1; fewer where it has no more.
+    """Slowest vibrations of a free body: angular frequencies [rad/s], ascending, and shapes (k, n, 3).
 
-    Ritz's method with polynomials of up to third order as a first guess, made better by locally optimal block
-    conjugate gradients (Knyazev 2001). The values come from above.
-    Args: change: of the sum of the frequencies' squares in 10 iterations, at which it ends.
+    The squares of a shape weighted by mass sum to 1. There are fewer than `count` if the body has no more.
+    Ritz's method with polynomials of up to third order gives a first guess, which locally optimal block
+    conjugate gradients refine (Knyazev 2001). The frequencies are upper bounds.
+    Args: change: relative change of the sum of squared frequencies in 10 iterations at which the search ends.
     """
     vibration = vibration_of(body)
-    rigid, bent = _polynomials(body)
-    if bent.shape[1] == 0:
+    rigid, deformed = _polynomials(body)
+    if deformed.shape[1] == 0:
         return np.zeros(0), np.zeros((0, *body.mesh.vertices.shape))
-    scale, block = vibration.diagonal()[:, None], count + _MORE
-    # Modes that no polynomial has any part of would be found by way of round-off, sooner or later.
-    anything = np.random.default_rng(0).normal(size=(len(bent), 1))
-    anything -= rigid @ (rigid.T @ anything)
-    bent = np.hstack([bent, anything / np.linalg.norm(anything)])
-    u, image, value = _ritz(bent, _applied(vibration, bent), block)
+    scale, block = vibration.diagonal()[:, None], count + _EXTRA_MODES
+    # Without a random direction, modes orthogonal to all polynomials would appear only through round-off.
+    random_direction = np.random.default_rng(0).normal(size=(len(deformed), 1))
+    random_direction -= rigid @ (rigid.T @ random_direction)
+    deformed = np.hstack([deformed, random_direction / np.linalg.norm(random_direction)])
+    u, image, value = _ritz(deformed, _applied(vibration, deformed), block)
     conjugate = conjugate_image = np.zeros((len(u), 0))
     sums = [value[:count].sum()]
-    while len(sums) <= _MOST_ITERATIONS:
+    while len(sums) <= _MAX_ITERATIONS:
         step = (image - u * value) / scale
         step -= rigid @ (rigid.T @ step)
         directions = np.hstack([u, step, conjugate])
@@ -99,27 +101,27 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
-    """K of the columns of u, (3n, k); a few at a time, which stay in a processor's cache."""
-    parts = [u[:, k : k + _AT_ONCE] for k in range(0, u.shape[1], _AT_ONCE)]
+    """K times the columns of u, (3n, k); a few at a time, which stay in a processor's cache."""
+    parts = [u[:, k : k + _CHUNK] for k in range(0, u.shape[1], _CHUNK)]
     return np.hstack(
         [vibration.apply(part.reshape(-1, 3, part.shape[1])).reshape(part.shape) for part in parts]
     )
 
 
 def _ritz(directions: Floats, images: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """The slowest `count` vibrations that can be made of directions (3n, k), of which images by K are given.
+    """Slowest `count` vibrations in the span of directions (3n, k), whose images by K are given.
 
-    Returns: these, their images and the squares of their frequencies.
+    Returns: the vibrations, their images and their squared frequencies.
     """
     lengths = np.linalg.norm(directions, axis=0)
-    real = lengths > _ROUND_OFF * lengths.max()
-    directions, images = directions[:, real] / lengths[real], images[:, real] / lengths[real]
-    sizes, mixed = np.linalg.eigh(directions.T @ directions)
-    mixed = mixed[:, sizes > 1e-10] / np.sqrt(sizes[sizes > 1e-10])
-    small = mixed.T @ (directions.T @ images) @ mixed
+    is_valid = lengths > _ROUND_OFF * lengths.max()
+    directions, images = directions[:, is_valid] / lengths[is_valid], images[:, is_valid] / lengths[is_valid]
+    sizes, basis = np.linalg.eigh(directions.T @ directions)
+    basis = basis[:, sizes > 1e-10] / np.sqrt(sizes[sizes > 1e-10])
+    small = basis.T @ (directions.T @ images) @ basis
     values, vectors = np.linalg.eigh((small + small.T) / 2)
-    mixed = mixed @ vectors[:, :count]
-    return directions @ mixed, images @ mixed, values[:count]
+    basis = basis @ vectors[:, :count]
+    return directions @ basis, images @ basis, values[:count]
 
 
 def _orthonormal(directions: Floats) -> Floats:
@@ -128,44 +130,52 @@ def _orthonormal(directions: Floats) -> Floats:
 
 
 def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
-    """Orthonormal rigid motions, and others of first to third order, times the root of masses."""
+    """Orthonormal rigid motions, and deformations of first to third order, times the root of the masses."""
     x, one, root = _centred(body.mesh.vertices, body.masses), np.ones(len(body.masses)), np.sqrt(body.masses)
     first = [one, *x.T]
     second = [x[:, a] * x[:, b] for a in range(3) for b in range(a, 3)]
     third = [x[:, a] * x[:, b] * x[:, c] for a in range(3) for b in range(a, 3) for c in range(b, 3)]
-    all_moves = _moves([(a, root * amount) for amount in (*first, *second, *third) for a in range(3)])
+    displacements = _displacements(
+        [(a, root * amount) for amount in (*first, *second, *third) for a in range(3)]
+    )
     rigid = _rigid_motions(body)
-    beside = all_moves - rigid @ (rigid.T @ all_moves)
-    return rigid, beside[:, np.linalg.norm(beside, axis=0) > 1e-6 * np.linalg.norm(all_moves, axis=0)]
+    deformations = displacements - rigid @ (rigid.T @ displacements)
+    return rigid, deformations[
+        :, np.linalg.norm(deformations, axis=0) > 1e-6 * np.linalg.norm(displacements, axis=0)
+    ]
 
 
 def _rigid_motions(body: BodyDescription) -> Floats:
-    """Orthonormal rigid motions (3n, k), times the root of masses: six for each of the parts that share no
-    vertex, as none of these strains anything; of the `MOST_PARTS` largest parts."""
+    """Orthonormal rigid motions (3n, k), times the root of the masses.
+
+    There are six for each of the `MAX_PARTS` largest components without shared vertices, as none strains
+    them.
+    """
     tets = body.mesh.tets
     part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))
     found = []
-    for number in np.argsort(-np.bincount(part), kind="stable")[:MOST_PARTS]:
+    for number in np.argsort(-np.bincount(part), kind="stable")[:MAX_PARTS]:
         rows = part == number
         mass = body.masses[rows]
         x, root = _centred(body.mesh.vertices[rows], mass), np.sqrt(mass)
-        shifts = [_moves([(a, root)]) for a in range(3)]
-        turns = [
-            _moves([(a, root * x[:, b])]) - _moves([(b, root * x[:, a])]) for a, b in ((0, 1), (1, 2), (2, 0))
+        translations = [_displacements([(a, root)]) for a in range(3)]
+        rotations = [
+            _displacements([(a, root * x[:, b])]) - _displacements([(b, root * x[:, a])])
+            for a, b in ((0, 1), (1, 2), (2, 0))
         ]
-        motions = _orthonormal(np.hstack([*shifts, *turns]))
+        motions = _orthonormal(np.hstack([*translations, *rotations]))
         found.append(np.zeros((body.mesh.vertices.size, motions.shape[1]), order="F"))
         found[-1][np.repeat(rows, 3)] = motions
     return np.hstack(found)
 
 
 def _centred(x: Floats, mass: Floats) -> Floats:
-    """Places (n, 3) relative to their centre of mass, in units of the largest coordinate."""
+    """Positions (n, 3) relative to their centre of mass, in units of the largest coordinate."""
     x = x - mass @ x / mass.sum()
     return np.asarray(x / (np.abs(x).max() + 1e-300))
 
 
-def _moves(amounts: Sequence[tuple[int, Floats]]) -> Floats:
+def _displacements(amounts: Sequence[tuple[int, Floats]]) -> Floats:
     """Displacements (3n, k), each by an amount (n,) along one axis."""
     columns = np.zeros((len(amounts[0][1]), 3, len(amounts)))
     for k, (axis, amount) in enumerate(amounts):

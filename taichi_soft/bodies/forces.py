@@ -46,18 +46,18 @@ def internal_forces(
     damping_model: DampingModelName = DampingModel.EDGE,
     dtype: DTypeLike = np.float64,
 ) -> NDArray[Any]:
-    """Elastic and damping forces on every vertex of a deformed mesh [N].
+    """Return the elastic and damping forces on every vertex of a deformed mesh [N].
 
-    The functions of a running world, in the precision asked for.
+    They come from the functions of a running world, in the requested precision.
     Args:
-        mesh: the body at rest.
+        mesh: mesh at rest.
         material: constants of the body.
         positions: deformed vertices, (n, 3) [m], in the mesh's order.
         velocities: (n, 3) [m/s]; None leaves damping out.
-        law, strain, flips, damping_model: as in `World.add_body`.
-        dtype: float64 or float32, the precision of the whole computation.
+        law, strain, flips, damping_model: as for `World.add_body`.
+        dtype: float64 or float32, the precision of the computation.
     Returns: (n, 3) of `dtype`.
-    Raises: OptionError for a name or dtype that is not known; MeshError for arrays that do not fit.
+    Raises: OptionError for an unknown name or dtype; MeshError for arrays of the wrong shape.
     """
     model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
     real = _real(dtype)
@@ -76,31 +76,31 @@ def force_gradient(
     flips: FlipsName | None = None,
     projected: bool = False,
 ) -> NDArray[np.float64]:
-    """How the elastic forces on a deformed mesh change as its vertices move, in float64.
+    """Return the derivative of the elastic forces on a deformed mesh by its vertices, in float64.
 
-    Exact, but for laws of chapter 4. These hold the normals of their planes (thesis 4.2), and are 0.1 to 0.6
-    off the true ones, by the sum of squares. "cmpm2" and "best_fitting_plane", which compare directions, take
-    for an edge the matrix that "cmpm" would have with the same normal.
+    It is exact, except for laws of chapter 4. For these, the normals of the planes stay fixed (thesis 4.2),
+    with an error of 0.1 to 0.6 by the sum of squares. "cmpm2" and "best_fitting_plane", which compare
+    directions, use the matrix that "cmpm" would have for an edge with the same normal.
     Args:
-        mesh, material, positions, law, strain, flips: as in `internal_forces`.
-        projected: as the system of implicit Euler has it, symmetric and negative semi-definite.
-    Returns: df/dx, (n, 3, n, 3) [N/m], all of it: for meshes of some hundred vertices.
-    Raises: as `internal_forces`.
+        mesh, material, positions, law, strain, flips: as for `internal_forces`.
+        projected: True for the matrix in implicit Euler's system, symmetric and negative semi-definite.
+    Returns: df/dx, (n, 3, n, 3) [N/m], as a dense array: for meshes of some hundred vertices.
+    Raises: as for `internal_forces`.
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")
-    still = StillBody(BodyDescription(mesh, material, model), double=True, implicit=True)
-    still.forces(x, np.zeros_like(x))
-    return -(still.system_stiffness() if projected else still.exact_stiffness())
+    static = StaticBody(BodyDescription(mesh, material, model), double=True, implicit=True)
+    static.forces(x, np.zeros_like(x))
+    return -(static.system_stiffness() if projected else static.exact_stiffness())
 
 
-class StillBody:
-    """One body in fields of its own: what a world computes with, without its motion."""
+class StaticBody:
+    """One body in its own fields: evaluates forces as a world does, without motion."""
 
     def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
-        """Put it into fields of float64 (`double`) or float32. Starts Taichi if nobody has."""
+        """Put the body into fields of float64 (`double`) or float32. Starts Taichi if necessary."""
         init()
         self.body = body
         self._rows = arrange(body)
@@ -114,14 +114,14 @@ class StillBody:
         self._state.load(scene, [0])
 
     def forces(self, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
-        """Internal forces there, (n, 3) [N], in the mesh's order."""
+        """Internal forces at these positions and velocities, (n, 3) [N], in the mesh's order."""
         write_motion(self._state, 0, positions, velocities)
         rows = np.empty_like(positions)
         compute_body_forces(self._state, self._program, 0, rows)
         return np.asarray(rows[self._rows.rank])
 
     def exact_stiffness(self) -> Floats:
-        """-df/dx where the forces were asked for last, (n, 3, n, 3) [N/m], in the mesh's order."""
+        """-df/dx at the last positions of `forces`, (n, 3, n, 3) [N/m], in the mesh's order."""
         n, body = len(self._rows.mass), self._rows
         total = np.zeros((n, n, 3, 3))
         if not self.body.model.has_bonds:
@@ -140,7 +140,7 @@ class StillBody:
         return self._in_mesh_order(total)
 
     def system_stiffness(self) -> Floats:
-        """The same as implicit Euler's system has it: projected, in blocks of particles and edges."""
+        """The same in implicit Euler's system: projected, in blocks of particles and edges."""
         n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
         compute_system_stiffness(self._state, self._program)
         total = np.zeros((n, n, 3, 3))
@@ -164,21 +164,21 @@ def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> N
             np.add.at(total, (owners[:, i], owners[:, j]), blocks[:, i, :, j])
 
 
-_last: dict[bool, StillBody] = {}
+_cached: dict[bool, StaticBody] = {}
 
 
 @in_turn
 def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
-    """By the still body of the last call in this precision if it is the same, for loops over deformations."""
+    """Evaluate forces with the static body of the last call if it is the same, for loops over positions."""
     double = positions.dtype == np.float64
-    last = _last.get(double)
-    if last is not None:
-        known = last.body  # its parts are equal to themselves only
-        if (known.mesh, known.material, known.model) != (body.mesh, body.material, body.model):
-            del _last[double], last  # their fields serve the next
-    if double not in _last:
-        _last[double] = StillBody(body, double=double)
-    return _last[double].forces(positions, velocities)
+    cached = _cached.get(double)
+    if cached is not None:
+        last_body = cached.body  # its parts compare by identity
+        if (last_body.mesh, last_body.material, last_body.model) != (body.mesh, body.material, body.model):
+            del _cached[double], cached  # frees its fields for the next body
+    if double not in _cached:
+        _cached[double] = StaticBody(body, double=double)
+    return _cached[double].forces(positions, velocities)
 
 
 def _real(dtype: DTypeLike) -> np.dtype[Any]:
@@ -193,8 +193,8 @@ def _real(dtype: DTypeLike) -> np.dtype[Any]:
 
 def _rows(values: ArrayLike, mesh: BodyMesh, name: str, real: np.dtype[Any]) -> NDArray[Any]:
     try:
-        given = np.asarray(values)
-        rows = np.array(given, dtype=real if given.dtype.kind in "iuf" else None, order="C")
+        array = np.asarray(values)
+        rows = np.array(array, dtype=real if array.dtype.kind in "iuf" else None, order="C")
         if rows.dtype != real:
             raise TypeError
     except (TypeError, ValueError):

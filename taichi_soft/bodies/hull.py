@@ -1,10 +1,10 @@
-"""A hull bound to the tetrahedra of a cage: points of the artist's surface that touch others for it.
+"""Hull of a body, bound to the tetrahedra of its cage: points of the artist's surface that make its contacts.
 
-A point lies at weights w of the four vertices of a tetrahedron, x = sum_i w_i x_i, and moves with the same
-weights. An impulse P at it is w_i P at each vertex: its inverse mass is sum_i w_i^2 / m_i, and as w_i P acts
-at x_i in place of P at x, momentum and angular momentum are what they would be.
+A point has weights w in the four vertices of a tetrahedron, x = sum_i w_i x_i, and moves with them. An
+impulse P at the point is w_i P at each vertex, so its inverse mass is sum_i w_i^2 / m_i. Momentum and angular
+momentum are conserved, because the impulses w_i P at x_i are equivalent to P at x.
 
-A point outside of the cage goes on with the nearest tetrahedron, as if that were larger.
+A point outside of the cage follows the nearest tetrahedron, extrapolated beyond its faces.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from taichi_soft.meshing.locating import Locator
 Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
 
-FARTHEST = -2.0
-"""Least weight: a point lies in a tetrahedron drawn out ninefold from its centre, or is moved there. Farther
-out what strikes it would move the nearest vertices by many times its own way."""
+MIN_WEIGHT = -2.0
+"""Smallest weight: a point lies in a tetrahedron enlarged ninefold about its centre, or is moved there. An
+impact on a point farther out would move the nearest vertices by many times the displacement of the point."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoundHull:
-    """What all bodies of an asset share."""
+    """Binding of a hull to a mesh, shared by all bodies of an asset."""
 
-    vertices: Ints32  # (h, 4), of the mesh
-    weights: Floats  # (h, 4), of these; they add up to 1
-    points: Floats  # (h, 3) where they are at rest [m]
-    triangles: Ints32  # (t, 3), of the points
+    vertices: Ints32  # (h, 4), vertices of the mesh that carry each point
+    weights: Floats  # (h, 4), of these vertices; they sum to 1
+    points: Floats  # (h, 3), positions at rest [m]
+    triangles: Ints32  # (t, 3), indices of points
 
     @property
     def mean_edge(self) -> float:
@@ -46,24 +46,24 @@ class BoundHull:
 
 
 def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
-    """A hull bound to a mesh at rest.
+    """Bind a hull to a mesh at rest.
 
-    Raises: MeshError where most points are too far from the mesh to be of the same thing.
+    Raises: MeshError if most points are too far from the mesh to be of the same body.
     """
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
-    way = barycentric(hull.points, corners) - nearest
-    # As far along the way from the nearest point of the mesh as weights allow; float32 adds up to 1 later.
+    offset = barycentric(hull.points, corners) - nearest
+    # As far from the nearest point of the mesh as weights allow; float32 rounds their sum to 1 later.
     with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = np.where(way < 0.0, (FARTHEST - nearest) / way, np.inf).min(axis=1)
-    moved = int((allowed < 1.0).sum())
-    if 2 * moved > len(allowed):
+        allowed = np.where(offset < 0.0, (MIN_WEIGHT - nearest) / offset, np.inf).min(axis=1)
+    clamped_count = int((allowed < 1.0).sum())
+    if 2 * clamped_count > len(allowed):
         low, high = hull.points.min(axis=0), hull.points.max(axis=0)
         raise MeshError(
-            f"{moved} of {len(allowed)} points of the hull, which lies from {low.round(4).tolist()} to "
-            f"{high.round(4).tolist()} m, are far from {mesh!r}: give one of the same thing"
+            f"{clamped_count} of {len(allowed)} points of the hull, which lies from {low.round(4).tolist()} "
+            f"to {high.round(4).tolist()} m, are far from {mesh!r}: pass a hull of the same body"
         )
-    weights = nearest + np.minimum(allowed, 1.0)[:, None] * way
+    weights = nearest + np.minimum(allowed, 1.0)[:, None] * offset
     vertices = mesh.tets[tets].astype(np.int32)
     points = (weights[:, :, None] * corners).sum(axis=1)
     return BoundHull(read_only(vertices), read_only(weights), read_only(points), hull.triangles)

@@ -1,4 +1,4 @@
-"""What kernels that look at one body are compiled for."""
+"""Parameters that kernels for one body are compiled for."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from taichi_soft.elements.laws import ElementModel
 
 @dataclass(frozen=True)
 class Program:
-    """Which laws there are: what shapes the code, and no number."""
+    """The laws of a world: everything that shapes the code, and no numbers."""
 
-    models: tuple[ElementModel, ...]  # a body names one by its index
+    models: tuple[ElementModel, ...]  # each body refers to one by its index
 
     @property
     def reads_expansion(self) -> bool:
-        """Whether edges of any body look at how their tetrahedra have grown."""
+        """True if edges of any body read the expansion of their tetrahedra."""
         return any(model.reads_expansion for model in self.models)

@@ -1,4 +1,4 @@
-"""Bodies of a world as flat arrays with offsets: everything the Taichi fields will hold, in numpy."""
+"""Bodies of a world as flat NumPy arrays with offsets: the contents of the Taichi fields."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class BondArrays:
     ring: Ints  # (k, 2) rows of each edge in the arrays below
     members: Ints  # (r, 4) particles or tetrahedra of this body
     weights: Floats  # (r, 4)
-    expansion_modulus: Floats | None  # (m,) [Pa], where the members are tetrahedra
+    expansion_modulus: Floats | None  # (m,) [Pa], if the members are tetrahedra
 
 
 @dataclass(frozen=True)
 class HullArrays:
-    """What a body touches others by in place of its surface: see `bodies.hull`."""
+    """Contact surface of a body in place of its own: see `bodies.hull`."""
 
     vertices: Ints  # (h, 4) particles of this body that carry each point
     weights: Floats  # (h, 4)
@@ -46,7 +46,7 @@ class HullArrays:
 
 @dataclass(frozen=True)
 class BodyArrays:
-    """One body in the order in which the kernels walk it."""
+    """One body in kernel order."""
 
     order: Ints  # (n,) caller's index of each particle
     rank: Ints  # (n,) particle of each of the caller's vertices
@@ -55,23 +55,23 @@ class BodyArrays:
     tet_vertices: Ints  # (m, 4) into the particles of this body
     tet_order: Ints  # (m,) caller's index of each tetrahedron
     rest_inverse: Floats  # (m, 3, 3) [1/m]
-    lame: Floats  # (m, 2) lambda, mu [Pa]; zero where the stiffness tells all
-    stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic one; zero of others
+    lame: Floats  # (m, 2) lambda, mu [Pa]; zero if the stiffness is anisotropic
+    stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic stiffness; else zero
     tet_damping: Floats  # (m,) [N s/m]
     tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
     edge_order: Ints  # (k,) caller's index of each edge
-    edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges; a half has one first end
+    edge_blocks: Ints  # (c, 2) first row and number of edges, up to `LANES`; a half shares its first end
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # of a pairwise law
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) of the surface, in the caller's order
-    outer: Ints  # particles that can touch something: those of the surface, or all where there is no inside
-    hull: HullArrays | None = None  # what touches in their place
+    outer: Ints  # particles that can make contact: those of the surface, or all if there is no inside
+    hull: HullArrays | None = None  # makes contact in their place
 
     @property
     def expansion_modulus(self) -> Floats:
-        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero for laws without one."""
+        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero for laws without."""
         if self.bonds is None or self.bonds.expansion_modulus is None:
             return np.zeros(len(self.tet_vertices))
         return self.bonds.expansion_modulus
@@ -79,7 +79,7 @@ class BodyArrays:
 
 @dataclass
 class Ranges:
-    """Where the body's rows lie in the world's flat arrays, with the room for those that cuts will add."""
+    """Rows of a body in the world's flat arrays, with the room for those that cuts will add."""
 
     particles: tuple[int, int] = (0, 0)
     edges: tuple[int, int] = (0, 0)
@@ -92,10 +92,10 @@ class Ranges:
 
 @dataclass
 class Scene:
-    """All bodies, one behind the other.
+    """All bodies in sequence.
 
-    Behind the edges of each come `LANES` spare rows: the last block of edges is read in full, and must not
-    reach into another body, which another thread may be moving.
+    `LANES` spare rows follow the edges of each body: the last block of edges is read in full, and must not
+    reach into another body, which another thread can be moving.
     """
 
     bodies: list[BodyArrays] = field(default_factory=list)
@@ -110,12 +110,12 @@ class Scene:
 
     @property
     def has_bonds(self) -> bool:
-        """Whether any body has a pairwise law."""
+        """True if any body has a pairwise law."""
         return any(body.bonds is not None for body in self.bodies)
 
     @property
     def ends(self) -> Ranges:
-        """Where the next body would lie, without any rows."""
+        """Empty ranges where the next body would start."""
         return Ranges(
             (self.particle_count,) * 2,
             (self.edge_count,) * 2,
@@ -127,7 +127,7 @@ class Scene:
         )
 
     def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
-        """Give `body` the next free rows, and room for copies of its vertices."""
+        """Give `body` the next free rows, with room for copies of its vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
@@ -155,11 +155,11 @@ class Scene:
 def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
     """Rows of particles, edges, blocks of edges, triangles and outer particles for a body and its copies.
 
-    The points of a hull come behind its particles. Its triangles and points have rows of their own elsewhere,
-    with the numbers of those of the surface.
+    The points of a hull follow its particles. Its triangles and points have separate rows elsewhere, with the
+    numbers of those of the surface.
 
-    A cut has some three edges, and on either side two triangles, for each vertex that it goes through, and up
-    to twice as many where it is small and ends inside (Euler's formula).
+    A cut has about three edges, and two triangles on either side, for each vertex on it, and up to twice as
+    many if it is small and ends inside (Euler's formula).
     """
     if spare_vertices == 0:
         exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
@@ -171,7 +171,7 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices
-    # Every block is full, but for those with the last edges of a particle.
+    # Every block is full, except those with the last edges of a particle.
     blocks = (edges + (LANES - 1) * particles) // LANES
     return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
@@ -182,8 +182,8 @@ def arrange(description: BodyDescription) -> BodyArrays:
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
     edges = renumbered(order)[mesh.edges]
-    if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
-        edges = _led_by_owners(np.sort(edges, axis=1), len(order))
+    if description.model.has_simple_edges:  # edges without direction; others point from i to j
+        edges = _directed_edges(np.sort(edges, axis=1), len(order))
     return _in_order(description, order, tets, edges)
 
 
@@ -194,29 +194,29 @@ def arrange_part(
     tets: NDArray[np.int64],
     order: Ints | None = None,
 ) -> BodyArrays:
-    """Put what a cut has left of a body into the order that the body had: copies come behind their originals.
+    """Arrange what a cut leaves of a body in the order that the body had; copies follow their originals.
 
     Args:
-        vertices, tets: which of the body before each one is, or is a copy of.
-        order: of the vertices; None for copies in the order of their numbers.
+        vertices, tets: vertex or tetrahedron of the body before that each one is or copies.
+        order: order of the vertices; None: copies in the order of their numbers.
     """
     mesh, rank = description.mesh, before.rank[vertices]
     if order is None:
         order = np.argsort(rank, kind="stable").astype(np.int32)
     ends = rank[mesh.edges].astype(np.int64)
-    # An edge is led by the same end as before.
+    # An edge keeps its first end.
     count = len(before.rank)
-    old = np.sort(before.edge_vertices, axis=1).astype(np.int64) @ [count, 1]
-    by_key = np.argsort(old)
-    place = by_key[np.searchsorted(old[by_key], np.sort(ends, axis=1) @ [count, 1])]
-    is_led = ends[:, 0] == before.edge_vertices[place, 0]
-    edges = renumbered(order)[np.where(is_led[:, None], mesh.edges, mesh.edges[:, ::-1])]
+    old_keys = np.sort(before.edge_vertices, axis=1).astype(np.int64) @ [count, 1]
+    by_key = np.argsort(old_keys)
+    old_row = by_key[np.searchsorted(old_keys[by_key], np.sort(ends, axis=1) @ [count, 1])]
+    keeps_direction = ends[:, 0] == before.edge_vertices[old_row, 0]
+    edges = renumbered(order)[np.where(keeps_direction[:, None], mesh.edges, mesh.edges[:, ::-1])]
     tet_order = np.argsort(renumbered(before.tet_order)[tets]).astype(np.int32)
     return _in_order(description, order, tet_order, edges)
 
 
 def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints) -> BodyArrays:
-    """A body whose particles and tetrahedra come in these orders, and whose edges are turned as given."""
+    """Arrange a body with given orders of particles and tetrahedra, and given directions of edges."""
     mesh, new_index = description.mesh, renumbered(order)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
     return BodyArrays(
@@ -243,7 +243,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
 
 
 def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
-    """The same body of another material, in the order that it has."""
+    """The same body with another material, in the same order."""
     tets, bonds = arrays.tet_order, description.bonds
     return replace(
         arrays,
@@ -256,19 +256,20 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
     )
 
 
-def _led_by_owners(edges: Ints, particle_count: int) -> Ints:
-    """The same edges, turned so that most particles come first in a multiple of `HALF` of them."""
+def _directed_edges(edges: Ints, particle_count: int) -> Ints:
+    """Direct the edges so that most particles are the first end of a multiple of `HALF` edges."""
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
     owner = edge_owners(in_order, particle_count, HALF)
-    own = owner[np.searchsorted(keys, edges[:, 0].astype(np.int64) * particle_count + edges[:, 1])]
-    return np.asarray(np.where(edges[:, :1] == own[:, None], edges, edges[:, ::-1]))
+    first_end = owner[np.searchsorted(keys, edges[:, 0].astype(np.int64) * particle_count + edges[:, 1])]
+    return np.asarray(np.where(edges[:, :1] == first_end[:, None], edges, edges[:, ::-1]))
 
 
 def _edge_blocks(first_ends: Ints) -> Ints:
-    """First row and number of edges, at most `LANES`, of which each half shares its first end.
+    """Blocks of edges: first row and number, at most `LANES`; all edges of a half share their first end.
 
-    Rows come ordered by it. A half that is not full ends its block, so that rows lie side by side.
+    Rows are ordered by first end. A half that is not full ends its block, so that the rows of a block are
+    contiguous.
     """
     starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
     counts = np.diff(np.r_[starts, len(first_ends)])
@@ -297,27 +298,29 @@ def _arrange_bonds(
 ) -> BondArrays | None:
     if bonds is None:
         return None
-    names_tets = isinstance(model.law, BondLaw) and model.law.ring is Ring.EXPANSION
+    members_are_tets = isinstance(model.law, BondLaw) and model.law.ring is Ring.EXPANSION
     count = np.bincount(bonds.ring_edge, minlength=len(edge_order))
     start = np.cumsum(count) - count
     ends = np.cumsum(count[edge_order])
     ring = np.stack([ends - count[edge_order], ends], axis=1)
-    # Row i of the new order is row i of its edge's rows in the old one.
+    # Row i of the new order comes from row i of the same edge in the old order.
     rows = np.repeat(start[edge_order] - ring[:, 0], count[edge_order]) + np.arange(len(bonds.ring_edge))
     members = bonds.ring_members[rows]
-    renamed = (new_tet if names_tets else new_vertex)[np.maximum(members, 0)] if len(members) else members
+    renumbered_members = (
+        (new_tet if members_are_tets else new_vertex)[np.maximum(members, 0)] if len(members) else members
+    )
     modulus = bonds.expansion_modulus
     return BondArrays(
         bonds.constants[edge_order],
         ring.astype(np.int32),
-        np.where(members >= 0, renamed, 0).astype(np.int32),
+        np.where(members >= 0, renumbered_members, 0).astype(np.int32),
         bonds.ring_weights[rows],
         None if modulus is None else modulus[np.argsort(new_tet)],
     )
 
 
 def blocks_of(rows: NDArray[np.generic], width: int, fill: float) -> NDArray[np.generic]:
-    """Rows (m, width) as (blocks, width, LANES), flattened: lane beside lane, padded with `fill`."""
+    """Rows (m, width) as (blocks, width, LANES), flattened and padded with `fill`."""
     block_count = -(-len(rows) // LANES)
     padded = np.full((block_count * LANES, width), fill, dtype=rows.dtype)
     padded[: len(rows)] = rows.reshape(len(rows), width)

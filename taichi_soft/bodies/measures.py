@@ -1,4 +1,4 @@
-"""What follows from where a body is and how it moves, in float64 from its float32 state."""
+"""Quantities derived from the state of a body, in float64 from its float32 fields."""
 
 from __future__ import annotations
 
@@ -21,69 +21,69 @@ Floats = NDArray[np.float64]
 
 
 def require_tets(body: SoftBody) -> None:
-    """Raises: MeshError for a body without tetrahedra."""
+    """Check that a body has tetrahedra. Raises: MeshError."""
     if len(body.tets) == 0:
-        raise MeshError(f"body {body.index} has no tetrahedra: it is made of particles and edges only")
+        raise MeshError(f"body {body.index} has no tetrahedra: it consists of particles and edges only")
 
 
 def positions_of(body: SoftBody) -> Floats:
-    """Of its vertices, (n, 3) [m]."""
+    """Positions of its vertices, (n, 3) [m]."""
     return body.positions().astype(np.float64)
 
 
 def velocities_of(body: SoftBody) -> Floats:
-    """Of its vertices, (n, 3) [m/s]."""
+    """Velocities of its vertices, (n, 3) [m/s]."""
     return body.velocities().astype(np.float64)
 
 
 def tet_volumes(body: SoftBody) -> Floats:
-    """As `Body.volumes`."""
+    """See `Body.volumes`."""
     return np.asarray(np.linalg.det(_edge_vectors(body)) / 6.0)
 
 
 def _edge_vectors(body: SoftBody) -> Floats:
-    """From the first vertex of each tetrahedron to the others, as rows, (m, 3, 3) [m]."""
+    """Vectors from the first vertex of each tetrahedron to the others, as rows, (m, 3, 3) [m]."""
     corners = positions_of(body)[body.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
 
 def pose(body: SoftBody) -> Pose:
-    """As `Body.pose`."""
+    """See `Body.pose`."""
     return best_fitting_pose(body.mesh.vertices, positions_of(body), body.masses)
 
 
 def angular_momentum(body: SoftBody) -> Floats:
-    """As `Body.angular_momentum`."""
+    """See `Body.angular_momentum`."""
     impulses = body.masses[:, None] * velocities_of(body)
     return np.asarray(np.cross(positions_of(body), impulses).sum(axis=0))
 
 
 def kinetic_energy(body: SoftBody) -> float:
-    """As `Body.kinetic_energy`."""
+    """See `Body.kinetic_energy`."""
     return float(0.5 * body.masses @ (velocities_of(body) ** 2).sum(axis=1))
 
 
 def gravitational_energy(body: SoftBody) -> float:
-    """As `Body.gravitational_energy`."""
+    """See `Body.gravitational_energy`."""
     gravity = context_of(body).settings.gravity * body.gravity_scale
     return float(-(body.masses @ positions_of(body)) @ gravity)
 
 
 def tet_mesh(body: SoftBody) -> TetMesh:
     """The mesh of a body with tetrahedra."""
-    assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused before"
+    assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused earlier"
     return body.mesh
 
 
 def elastic_energy(body: SoftBody) -> float:
-    """As `Body.elastic_energy`."""
+    """See `Body.elastic_energy`."""
     model, bonds = record_of(body).description.model, record_of(body).description.bonds
     law = model.law
     if bonds is not None and law.name == "springs":
         ends = positions_of(body)[body.mesh.edges]
         constants = edge_constants_of(body)
-        growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - constants[:, 0]
-        return float(0.5 * constants[:, 1] @ growth**2)
+        elongation = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - constants[:, 0]
+        return float(0.5 * constants[:, 1] @ elongation**2)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
         return float(law.energy_density(deformations(body), *lame_of(body).T) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
@@ -91,9 +91,9 @@ def elastic_energy(body: SoftBody) -> float:
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
-    """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each.
+    """Green strain 1/2 (F^T F - I), and its Hookean stress [Pa], in the rest axes, (m, 3, 3) each.
 
-    Whatever the law: see `Body.elastic_energy`.
+    It is the same for every law: see `Body.elastic_energy`.
     """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
@@ -101,7 +101,7 @@ def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
 
 
 def tet_stresses(body: SoftBody) -> Floats:
-    """As `Body.stresses`."""
+    """See `Body.stresses`."""
     F = deformations(body)
     stress = np.empty_like(F)
     compute_stress(record_of(body).description.model, F, stiffness_of(body), stress)
@@ -109,56 +109,56 @@ def tet_stresses(body: SoftBody) -> Floats:
 
 
 def force_across(body: SoftBody, point: ArrayLike, normal: ArrayLike) -> Floats:
-    """As `Body.force_across`."""
-    place, across = as_vector(point, "point", "m"), as_vector(normal, "normal", "(any length)")
-    length = float(np.linalg.norm(across))
+    """See `Body.force_across`."""
+    origin, direction = as_vector(point, "point", "m"), as_vector(normal, "normal", "(any length)")
+    length = float(np.linalg.norm(direction))
     if not length > 0.0:
         raise OptionError("normal is zero: pass a direction across the plane")
-    across = across / length
+    direction = direction / length
     stress = tet_stresses(body)
-    heights = (positions_of(body)[body.tets] - place) @ across
+    heights = (positions_of(body)[body.tets] - origin) @ direction
     areas = section_areas(heights, np.abs(tet_volumes(body)))
-    return np.asarray(np.einsum("mab,b,m->a", stress, across, areas))
+    return np.asarray(np.einsum("mab,b,m->a", stress, direction, areas))
 
 
 def deformations(body: SoftBody) -> Floats:
-    """As `Body.deformations`."""
+    """See `Body.deformations`."""
     require_tets(body)
     return np.asarray(np.swapaxes(_edge_vectors(body), 1, 2) @ rest_inverses_of(body))
 
 
 def strains(body: SoftBody) -> Floats:
-    """As `Body.strains`."""
+    """See `Body.strains`."""
     F = deformations(body)
     return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
 
 
 def plastic_strains(body: SoftBody) -> Floats:
-    """As `Body.plastic_strains`."""
+    """See `Body.plastic_strains`."""
     require_alive(body)
     require_tets(body)
-    flowed = np.linalg.inv(rest_inverses_of(body)) @ record_of(body).description.rest_inverses  # Fp
-    stretches = np.linalg.svd(flowed, compute_uv=False)
+    plastic = np.linalg.inv(rest_inverses_of(body)) @ record_of(body).description.rest_inverses  # Fp
+    stretches = np.linalg.svd(plastic, compute_uv=False)
     return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
 
 
 def tet_stress(body: SoftBody) -> Floats:
-    """As `Body.tet_stress`."""
+    """See `Body.tet_stress`."""
     return np.asarray(np.sqrt(1.5) * _deviator_norms(tet_stresses(body)))
 
 
 def tet_strain(body: SoftBody) -> Floats:
-    """As `Body.tet_strain`."""
+    """See `Body.tet_strain`."""
     return np.asarray(np.sqrt(2.0 / 3.0) * _deviator_norms(strains(body)))
 
 
 def _deviator_norms(tensors: Floats) -> Floats:
-    """sqrt(e:e) of the part e of each tensor (m, 3, 3) that changes shape."""
+    """sqrt(e:e) of the deviator e of each tensor (m, 3, 3)."""
     deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
     return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
 
 
 def vertex_means(body: SoftBody, values: Floats) -> Floats:
-    """Values (m,) averaged by volume over the tetrahedra round each vertex, (n,)."""
+    """Means of values (m,), weighted by volume, over the tetrahedra around each vertex, (n,)."""
     mesh, n = tet_mesh(body), body.vertex_count
     return np.asarray(lumped(mesh.tets, values * mesh.volumes, n) / lumped(mesh.tets, mesh.volumes, n))

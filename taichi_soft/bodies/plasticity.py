@@ -1,4 +1,4 @@
-"""How a body is bent for good."""
+"""Permanent deformation of a body."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from taichi_soft.core.checks import as_number, as_positive
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 
-_ENDLESS = 1e30
-"""Stands for no limit: kernels need not know infinity."""
+_UNLIMITED = 1e30
+"""Finite stand-in for no limit, so that kernels need no infinity."""
 
 
 @serialised("yield_stress", "yield_strain", "creep", "maximum")
@@ -18,21 +18,22 @@ _ENDLESS = 1e30
 class Plasticity:
     """Permanent change of the rest shape where a body is strained beyond its yield point.
 
-    The deformation of a tetrahedron is an elastic one after a plastic one, F = Fe Fp, and Fp keeps the volume
-    (Irving, Teran and Fedkiw 2004). Yield point, creep and maximum are those of O'Brien, Bargteil and Hodgins
-    2002 and of Mueller and Gross 2004: what the strain has beyond the yield point flows into Fp, at the rate
-    `creep`, until Fp has reached `maximum`. It flows at the end of each fixed step, so a blow that is over
-    within one leaves no dent.
+    The deformation of a tetrahedron is a plastic one followed by an elastic one, F = Fe Fp, and Fp preserves
+    the volume (Irving, Teran and Fedkiw 2004). Yield point, creep and maximum are those of O'Brien, Bargteil
+    and Hodgins 2002 and of Mueller and Gross 2004: strain beyond the yield point flows into Fp at the rate
+    `creep`, until Fp reaches `maximum`. It flows at the end of each fixed step, so an impact that is over
+    within one step leaves no dent.
 
     Args:
-        yield_stress: von Mises stress [Pa] by Hooke's law and linear strain, whatever the law, below which
-            all is elastic.
-        yield_strain: the same as a strain, as `Body.tet_strain` tells it; give one of the two. They belong
-            together by yield_stress = 3 G yield_strain, with the shear modulus G.
+        yield_stress: von Mises stress [Pa] by Hooke's law and linear strain, for every law, below which the
+            deformation is elastic.
+        yield_strain: the same as a strain, as in `Body.tet_strain`; pass one of the two. They are related by
+            yield_stress = 3 G yield_strain, with the shear modulus G.
         creep: rate of flow [1/s]: within 1/creep the excess falls to 1/e. Infinity: within a step.
         maximum: largest plastic strain, logarithmic and equivalent: a tetrahedron can become e^maximum times
-            as long for good. Long ones need shorter substeps, which `World.stable_substeps` does not know.
-    Raises: OptionError for a value out of range, and for none or both of the yield points.
+            as long permanently. Long ones need shorter substeps, which `World.stable_substeps` does not
+            consider.
+    Raises: OptionError for a value out of range, or for none or both of the yield points.
     """
 
     _: KW_ONLY
@@ -44,7 +45,7 @@ class Plasticity:
     def __post_init__(self) -> None:
         if (self.yield_stress is None) == (self.yield_strain is None):
             raise OptionError(
-                f"give yield_stress [Pa] or yield_strain, one of the two: got {self.yield_stress!r} and "
+                f"pass either yield_stress [Pa] or yield_strain: got {self.yield_stress!r} and "
                 f"{self.yield_strain!r}"
             )
         if self.yield_stress is not None:
@@ -58,8 +59,8 @@ class Plasticity:
     @property
     def row(self) -> tuple[float, float, float, float]:
         """Yield stress [Pa] and yield strain, of which one is zero, creep [1/s] and maximum."""
-        return self.yield_stress or 0.0, self.yield_strain or 0.0, min(self.creep, _ENDLESS), self.maximum
+        return self.yield_stress or 0.0, self.yield_strain or 0.0, min(self.creep, _UNLIMITED), self.maximum
 
 
-RIGID_ROW = (0.0, _ENDLESS, 0.0, 0.0)
+RIGID_ROW = (0.0, _UNLIMITED, 0.0, 0.0)
 """`Plasticity.row` of a body that never yields."""

@@ -1,4 +1,4 @@
-"""Constants of the law of a body as they are now: on their way, while another material is eased in."""
+"""Present constants of the law of a body, intermediate while another material is eased in."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def lame_of(body: SoftBody) -> Floats:
-    """Lame's lambda and mu of each tetrahedron, (m, 2) [Pa]; zero for an anisotropic material."""
+    """Present Lame constants lambda and mu of each tetrahedron, (m, 2) [Pa]; zero if anisotropic."""
     record = record_of(body)
     if record.present is None:
         return record.description.lame
@@ -20,7 +20,7 @@ def lame_of(body: SoftBody) -> Floats:
 
 
 def stiffness_of(body: SoftBody) -> Floats:
-    """C of Hooke's law of each tetrahedron, (m, 6, 6) [Pa]."""
+    """Present stiffness C of Hooke's law for each tetrahedron, (m, 6, 6) [Pa]."""
     record = record_of(body)
     if record.present is None:
         return record.description.stiffness_matrices()
@@ -34,7 +34,7 @@ def stiffness_of(body: SoftBody) -> Floats:
 
 
 def edge_constants_of(body: SoftBody) -> Floats:
-    """`Bonds.constants` of each edge, (k, 4), of a pairwise law."""
+    """Present `Bonds.constants` of each edge, (k, 4), for a pairwise law."""
     record = record_of(body)
     bonds, present = record.description.bonds, record.present
     if present is not None and present.bonds is not None:

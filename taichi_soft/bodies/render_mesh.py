@@ -1,4 +1,4 @@
-"""What a renderer draws of a body: triangles, and the vertices and normals of each frame."""
+"""Render mesh of a body: triangles, and the vertices and normals of each frame."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from taichi_soft.meshing.creases import split_at_creases
 Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
-FEWEST_SHARED = 4000
-"""Render vertices from which on threads share them: waking them costs as much as some thousand of them."""
+MIN_PARALLEL_VERTICES = 4000
+"""Render vertices from which threads share the work: waking them costs as much as some thousand vertices."""
 
 
 class RenderMesh:
-    """The surface of one body as a renderer takes it. Made by `Body.render_mesh`, and read-only.
+    """The surface of one body for a renderer. Made by `Body.render_mesh`, and read-only.
 
-    It has the vertices on the surface only, one copy for each side of a sharp edge. It stays as it is: a cut
-    body has other vertices, so its mesh is outdated, and is made anew.
+    It has only the vertices on the surface, one copy for each side of a sharp edge. It never changes: a cut
+    body has other vertices, so its mesh is outdated and must be rebuilt.
     Example:
         skin = body.render_mesh(crease=40)  # skin.triangles is the index buffer
         vertices = np.empty((skin.vertex_count, 3), np.float32)
@@ -41,8 +41,8 @@ class RenderMesh:
         """Made by `Body.render_mesh`.
 
         Args:
-            body: which it draws.
-            vertices: of the body, that each render vertex is or is a copy of, (k,).
+            body: body that it draws.
+            vertices: vertex of the body that each render vertex is or copies, (k,).
             triangles: render vertices, (m, 3).
         """
         self._describe(body, vertices, triangles)
@@ -55,12 +55,12 @@ class RenderMesh:
         self._topology_version = body.topology_version
 
     @property
-    def _way_out(self) -> str:
-        return "make it anew by body.render_mesh(), and buffers for its vertex_count"
+    def _suggested_fix(self) -> str:
+        return "make a new one by body.render_mesh(), and buffers for its vertex_count"
 
     def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
         """Fill two buffers, (k, 3) each, from the fields of a world."""
-        is_serial = self.vertex_count < FEWEST_SHARED
+        is_serial = self.vertex_count < MIN_PARALLEL_VERTICES
         _write(state, is_serial, self._body.index, alpha, self._table, positions, normals)
 
     def __repr__(self) -> str:
@@ -69,7 +69,7 @@ class RenderMesh:
 
     @property
     def body(self) -> SoftBody:
-        """Which it draws."""
+        """Body that it draws."""
         return self._body
 
     @property
@@ -84,40 +84,42 @@ class RenderMesh:
 
     @property
     def body_vertices(self) -> Ints32:
-        """The body's vertex that each render vertex is a copy of, int32 (k,): what is known of the body's
-        vertices becomes an attribute by it, as `body.vertex_stress()[mesh.body_vertices]`."""
+        """Vertex of the body that each render vertex copies, int32 (k,).
+
+        It turns values per vertex of the body into an attribute: `body.vertex_stress()[mesh.body_vertices]`.
+        """
         return self._body_vertices
 
     @property
     def topology_version(self) -> int:
-        """That of the body when this was made."""
+        """Topology version of the body when this mesh was made."""
         return self._topology_version
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the body was cut, torn, given another level or restored since: then make a new one."""
+        """True if the body was since cut, torn, restored or given another level: make a new mesh then."""
         return self._topology_version != self._body.topology_version
 
 
 def surface_render_mesh(body: SoftBody, crease: float | None) -> RenderMesh:
-    """As `Body.render_mesh`."""
+    """See `Body.render_mesh`."""
     require_alive(body)
     if crease is not None:
         crease = as_number(crease, "crease", 0.0, 180.0, "an angle from 0 to 180 degrees, or None")
     if len(body.surface) == 0:
-        raise MeshError(f"{body!r} has no triangles to draw: give its ParticleMesh some with surface=")
+        raise MeshError(f"{body!r} has no triangles to draw: pass surface= to its ParticleMesh")
     return RenderMesh(body, *split_at_creases(body.mesh.vertices, body.surface, crease))
 
 
 def require_current(mesh: RenderMesh) -> None:
-    """Raises: StateError for a mesh whose body was removed or has other vertices by now."""
+    """Check that a mesh is current. Raises: StateError if its body was removed or has other vertices."""
     body = mesh.body
     require_alive(body)
     if mesh.is_outdated:
         raise StateError(
             f"body {body.index} was cut, torn, given another level or restored since this render mesh was "
             "made (topology_version "
-            f"{mesh.topology_version}, now {body.topology_version}): {mesh._way_out}"
+            f"{mesh.topology_version}, now {body.topology_version}): {mesh._suggested_fix}"
         )
 
 
@@ -129,14 +131,12 @@ def read_render_mesh(
 
 
 def warm_up(state: Any, assets: Iterable[SoftBodyAsset]) -> None:
-    """Compile what `read_render_mesh` calls: for few vertices, and for many where one of `assets` may have so
-    many."""
-    table = render_table(
-        np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3)
-    )  # of a vertex of the first body
+    """Compile what `read_render_mesh` calls, for few vertices, and for many if `assets` need it."""
+    # A single vertex of the first body.
+    table = render_table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))
     positions, normals = np.empty((2, 3, 3), dtype=np.float32)
     _write(state, True, 0, 1.0, table, positions, normals)
-    if any(asset.spare_vertices or 3 * len(asset.mesh.surface) >= FEWEST_SHARED for asset in assets):
+    if any(asset.spare_vertices or 3 * len(asset.mesh.surface) >= MIN_PARALLEL_VERTICES for asset in assets):
         _write(state, False, 0, 1.0, table, positions, normals)
 
 
@@ -153,13 +153,16 @@ def _write(
 
 
 def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
-    """What the kernel walks, in one array, because each argument of a kernel costs as much as some hundred
-    vertices: blocks, the body's vertex of each render vertex, where the further triangles of each block begin
-    in the table and behind the last one end, how many blocks have small rings only, and these triangles.
+    """Table for the kernel: one array, because each argument of a kernel costs as much as 100 vertices.
 
-    A block has `LANES` render vertices, then `RING` rows with the rings round them: triangles (v, a, b) and
-    (v, b, c) make the ring a, b, c, and v itself fills it up. A further triangle is the lane of its vertex,
-    and its two others. The last block repeats its last vertex, with all that it has.
+    It contains blocks; the body's vertex of each render vertex; where the further triangles of each block
+    begin in the table, and where the last ones end; the number of blocks with small rings only; the further
+    triangles.
+
+    A block has `LANES` render vertices, followed by `RING` rows with the rings around them. Triangles (v, a,
+    b) and (v, b, c) make the ring a, b, c, which is padded with v itself. A further triangle is the lane of
+    its vertex and its two other vertices. The last block repeats its last vertex, with its ring and
+    triangles.
     """
     count = len(vertices)
     rings, further = _rings(count, triangles)
@@ -170,10 +173,10 @@ def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32
     further[:, 0] = np.argsort(order)[further[:, 0]]
     further = further[np.argsort(further[:, 0], kind="stable")]
     last = further[further[:, 0] == count - 1]
-    beyond = np.arange(count, len(lanes))
-    again = np.tile(last, (len(beyond), 1))
-    again[:, 0] = np.repeat(beyond, len(last))
-    further = np.concatenate([further, again])
+    padding = np.arange(count, len(lanes))
+    repeated = np.tile(last, (len(padding), 1))
+    repeated[:, 0] = np.repeat(padding, len(last))
+    further = np.concatenate([further, repeated])
     begins = 3 * np.r_[0, np.cumsum(np.bincount(further[:, 0] // LANES, minlength=len(blocks)))]
     further[:, 0] %= LANES
     begins += blocks.size + count + len(begins) + 1
@@ -183,27 +186,27 @@ def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32
 
 
 def _rings(count: int, triangles: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The ring round each render vertex, (k, RING), and triangles that none has, (f, 3), each beginning with
-    the vertex whose ring lacks it, in ascending order.
+    """Ring around each render vertex, (k, RING), and the triangles in no ring, (f, 3), in ascending order.
 
-    A ring begins at a border of the surface where there is one, and ends where it is full or nothing goes on.
+    Such a triangle begins with the vertex whose ring lacks it. A ring begins at a border of the surface if
+    there is one. It ends when it is full or no triangle continues it.
     """
-    turned = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
-    own, one, other = turned[np.argsort(triangles.ravel(), kind="stable")].T
+    rotations = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
+    own, one, other = rotations[np.argsort(triangles.ravel(), kind="stable")].T
     key = own * count + one
     order = np.argsort(key, kind="stable")
-    place = np.minimum(np.searchsorted(key[order], own * count + other), len(key) - 1)
-    following = np.where(key[order][place] == own * count + other, order[place], -1)
+    row = np.minimum(np.searchsorted(key[order], own * count + other), len(key) - 1)
+    next_row = np.where(key[order][row] == own * count + other, order[row], -1)
     is_inner = np.zeros(len(key), dtype=np.bool_)
-    is_inner[following[following >= 0]] = True
+    is_inner[next_row[next_row >= 0]] = True
     by_vertex = np.lexsort((is_inner, own))
-    at = by_vertex[np.searchsorted(own, np.arange(count))]
+    current = by_vertex[np.searchsorted(own, np.arange(count))]
     rings = np.tile(np.arange(count)[:, None], (1, RING))
-    rings[:, 0] = one[at]
-    is_left, goes_on = np.ones(len(key), dtype=np.bool_), np.ones(count, dtype=np.bool_)
+    rings[:, 0] = one[current]
+    is_unused, continues = np.ones(len(key), dtype=np.bool_), np.ones(count, dtype=np.bool_)
     for slot in range(1, RING):
-        rings[goes_on, slot] = other[at[goes_on]]
-        is_left[at[goes_on]] = False
-        at = np.where(goes_on, following[at], -1)
-        goes_on = (at >= 0) & is_left[at]
-    return rings, np.stack([own, one, other], axis=1)[is_left]
+        rings[continues, slot] = other[current[continues]]
+        is_unused[current[continues]] = False
+        current = np.where(continues, next_row[current], -1)
+        continues = (current >= 0) & is_unused[current]
+    return rings, np.stack([own, one, other], axis=1)[is_unused]

@@ -1,4 +1,4 @@
-"""Whether bodies bear their own weight."""
+"""Check whether bodies bear their own weight."""
 
 from __future__ import annotations
 
@@ -13,26 +13,25 @@ from taichi_soft.core.errors import TooSoftWarning
 from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh
 
-MOST_SAG = 0.2
-"""Weight of a column as high as a body over its Young's modulus: what is softer turns tetrahedra inside out
-where it stands or lands. Four shapes of a metre with three Poisson's ratios up to 0.45, dropped from 2 m: at
-0.15 none of the twelve does, at 0.2 two, at 0.5 five, at 0.8 seven."""
+MAX_SAG = 0.2
+"""Largest weight of a column as high as a body over its Young's modulus: softer bodies invert tetrahedra when
+they stand or land. Found by dropping four shapes of 1 m with three Poisson's ratios up to 0.45 from 2 m."""
 
 
 def sag(asset: SoftBodyAsset, gravity: float) -> float:
-    """density * g * height / E of a body, `gravity` in m/s^2; zero for materials that have no such E, and for
-    bodies that are pinned altogether.
+    """density * g * height / E of a body, `gravity` in m/s^2.
 
-    The height is the least extent of the mesh along its axes, so that it counts however the body lies.
+    It is zero for materials without such an E, and for bodies that are completely pinned. The height is the
+    smallest extent of the mesh along its axes, so that the orientation of the body does not matter.
     """
     mesh, material = asset.mesh, asset.description.material
-    is_held = len(asset.description.pinned) == len(mesh.vertices)
-    if is_held or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
+    is_pinned = len(asset.description.pinned) == len(mesh.vertices)
+    if is_pinned or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
         return 0.0
-    solid = mesh.volumes * mesh.fill  # whose constants are those of the material, however little it fills
-    shares = solid / solid.sum()
-    softness = shares @ (mesh.fill / asset.description.per_tet("young"))
-    density = shares @ (asset.description.per_tet("density") / mesh.fill)
+    solid = mesh.volumes * mesh.fill  # has the constants of the material, however little it fills
+    weights = solid / solid.sum()
+    softness = weights @ (mesh.fill / asset.description.per_tet("young"))
+    density = weights @ (asset.description.per_tet("density") / mesh.fill)
     return float(density * gravity * np.ptp(mesh.vertices, axis=0).min() * softness)
 
 
@@ -43,17 +42,17 @@ def _rounded_up(number: float) -> float:
 
 
 def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64]) -> None:
-    """Before a world is built: say which body is too soft for its weight, and what would bear it."""
-    pull = float(np.linalg.norm(gravity))
-    worst = max(assets, key=lambda asset: sag(asset, pull))
-    found = sag(worst, pull)
-    if found > MOST_SAG:
+    """Warn before a world is built if a body is too soft for its weight, and suggest a modulus."""
+    acceleration = float(np.linalg.norm(gravity))
+    worst = max(assets, key=lambda asset: sag(asset, acceleration))
+    found = sag(worst, acceleration)
+    if found > MAX_SAG:
         assert isinstance(worst.mesh, TetMesh)
         young = np.mean(worst.description.per_tet("young") / worst.mesh.fill)
         warnings.warn(
-            f"a body is too soft for its weight: {worst!r} weighs {found * young:.3g} Pa at its foot, and "
-            f"its Young's modulus is {young:.3g} Pa. It may end flat and partly inside out. Take a "
-            f"modulus of {_rounded_up(young * found / MOST_SAG):.2g} Pa, less gravity or a smaller body",
+            f"a body is too soft for its weight: {worst!r} puts {found * young:.3g} Pa on its base, and "
+            f"its Young's modulus is {young:.3g} Pa. It can end flat and partly inverted. Use a "
+            f"modulus of {_rounded_up(young * found / MAX_SAG):.2g} Pa, less gravity or a smaller body",
             TooSoftWarning,
-            stacklevel=5,  # who called World.build
+            stacklevel=5,  # the caller of World.build
         )

@@ -1,4 +1,4 @@
-"""Substeps that slivers and small tetrahedra make short, beside those of a lattice."""
+"""Warn of substeps that slivers and small tetrahedra shorten, compared with a lattice."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ from taichi_soft.meshing import TetMesh
 _log = logging.getLogger(__name__)
 
 LATTICE_STEP = 0.33
-"""Stable step of a lattice that fills space, over the time that sqrt(young / density) takes for a cell."""
+"""Stable step of a lattice that fills space, over the time cell / sqrt(young / density)."""
 
-MOST_SHORTER = 4.0
-"""Than that: where its outer vertices are moved onto a surface, a lattice's own is up to twice as short."""
+WARNING_RATIO = 4.0
+"""Ratio of the lattice's step to a mesh's above which a warning is logged. Moving a lattice's outer vertices
+onto a surface costs up to a factor of 2."""
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
-"""By which meshes are compared; which it is, is no matter."""
+"""Material for the comparison of meshes; the choice is arbitrary."""
 
 
 def warn_of_short_steps(mesh: TetMesh, cell_size: float, method: str) -> None:
-    """Log how much shorter the stable substeps of a mesh are than those of a lattice, where that is much.
+    """Log a warning if the stable substeps of a mesh are much shorter than those of a lattice.
 
     Args:
-        cell_size: of the lattice [m].
-        method: that made the mesh.
+        cell_size: edge of the lattice's cells [m].
+        method: method that made the mesh.
     """
     limit = stable_step(mesh, RUBBER, element_model("virial")).limit
     lattice = LATTICE_STEP * cell_size / float(np.sqrt(RUBBER.young / RUBBER.density))
-    if lattice > MOST_SHORTER * limit:
+    if lattice > WARNING_RATIO * limit:
         _log.warning(
             "method %r: stable substeps are %.0f times shorter than with a lattice of such cells (%d "
             "tetrahedra, %s): a coarser surface, larger cells or TetMesh.improved() help",

@@ -1,16 +1,17 @@
-"""An artist's mesh that a body carries: bound to its tetrahedra once, drawn where they are in every frame.
+"""An artist's mesh that is bound to the tetrahedra of a body once, and follows them in every frame.
 
-A vertex of the skin lies at shares s of the four vertices of a tetrahedron. Each of these, i, has a gradient
-F_i of the deformation, the mean over the tetrahedra round it, and tells where it would put the vertex:
+A vertex of the skin has weights s in the four vertices of a tetrahedron. Each of these, i, has a deformation
+gradient F_i, the mean over the tetrahedra around it, and predicts a position of the vertex of the skin:
 
     x = sum_i s_i (x_i + F_i (q - X_i) / 2)
 
-with q the vertex at rest. The sum of s_i x_i alone is linear in each tetrahedron and has creases at their
-faces. With half of what the gradients say it is right for every deformation of second order where the F_i
-are. Normals turn by the mean of the F_i, which is continuous, so that no face is seen in the shading.
+where q is the vertex at rest. The sum of s_i x_i alone is linear in each tetrahedron and has creases at the
+faces. With half of the gradients' term it is exact for every deformation of second order if the F_i are
+exact. Normals are transformed by the mean of the F_i, which is continuous, so that faces are not visible in
+the shading.
 
 A vertex outside of the cage is bound to the nearest point p of it, and carried along by the mean of the F_i:
-then q is 2 X - p, which puts it into the same sum.
+then q is 2 X - p, which gives the same sum.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.kernels.skin import in_lanes
+from taichi_soft.bodies.kernels.skin import interleaved
 from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
@@ -34,11 +35,11 @@ Ints32 = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """A surface bound to the tetrahedra of a mesh: what all bodies of an asset share."""
+    """A surface bound to the tetrahedra of a mesh, shared by all bodies of an asset."""
 
     surface: Surface
-    tets: Ints32  # (k,), of the mesh, that holds each vertex or is nearest
-    shares: Floats  # (k, 4), of that tetrahedron's vertices
+    tets: Ints32  # (k,), tetrahedron of the mesh that contains each vertex or is nearest
+    weights: Floats  # (k, 4), weights in that tetrahedron's vertices
     ints: Ints32  # see `write_skin`
     floats: Floats32
 
@@ -49,37 +50,40 @@ class Skin:
 
 
 def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
-    """Surfaces bound to a mesh at rest."""
+    """Bind surfaces to a mesh at rest."""
     locator = Locator(mesh)
-    neighbours, begins, slopes = slopes_of(mesh)
+    neighbours, begins, slope_rows = gradient_rows(mesh)
     skins = []
     for surface in surfaces:
-        tets, shares = locator(surface.vertices)
+        tets, weights = locator(surface.vertices)
         corners = mesh.tets[tets]
-        inside = (shares[:, :, None] * mesh.vertices[corners]).sum(axis=1)
-        aims = 2.0 * surface.vertices - inside
-        ints = np.concatenate([begins, neighbours, in_lanes(corners)]).astype(np.int32)
-        rows_of_each = np.concatenate([shares, aims, surface.normals], axis=1)
-        floats = [slopes, mesh.vertices, in_lanes(rows_of_each)]
+        inside = (weights[:, :, None] * mesh.vertices[corners]).sum(axis=1)
+        targets = 2.0 * surface.vertices - inside
+        ints = np.concatenate([begins, neighbours, interleaved(corners)]).astype(np.int32)
+        rows_of_each = np.concatenate([weights, targets, surface.normals], axis=1)
+        floats = [slope_rows, mesh.vertices, interleaved(rows_of_each)]
         rows = np.concatenate([part.ravel() for part in floats]).astype(np.float32)
-        skins.append(Skin(surface, tets.astype(np.int32), shares, read_only(ints), read_only(rows)))
+        skins.append(Skin(surface, tets.astype(np.int32), weights, read_only(ints), read_only(rows)))
     return tuple(skins)
 
 
-def slopes_of(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """F of vertex i is the sum over its neighbours j of (x_j - x_i) times their row: neighbours (e,), where
-    those of each vertex begin (n + 1,), and rows (e, 3) [1/m]."""
+def gradient_rows(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Rows that give the deformation gradient of each vertex.
+
+    F of vertex i is the sum over its neighbours j of (x_j - x_i) times their row.
+    Returns: neighbours (e,), where those of each vertex begin (n + 1,), and rows (e, 3) [1/m].
+    """
     inverses, n = edge_inverses(mesh.vertices[mesh.tets]), len(mesh.vertices)
     gradients = np.concatenate([-inverses.sum(axis=1, keepdims=True), inverses], axis=1)
-    weights = mesh.volumes
-    round_each = np.bincount(mesh.tets.ravel(), np.repeat(weights, 4), n)
+    volumes = mesh.volumes
+    volume_sums = np.bincount(mesh.tets.ravel(), np.repeat(volumes, 4), n)
     own = np.repeat(mesh.tets, 4, axis=1).ravel().astype(np.int64)
     other = np.tile(mesh.tets, (1, 4)).ravel()
-    rows = np.tile(gradients * weights[:, None, None], (1, 4, 1)).reshape(-1, 3)
+    rows = np.tile(gradients * volumes[:, None, None], (1, 4, 1)).reshape(-1, 3)
     keys, place = np.unique(own * n + other, return_inverse=True)
     sums = [np.bincount(place.reshape(-1), rows[:, k], len(keys)) for k in range(3)]
     first, second = keys // n, keys % n
-    slopes = np.stack(sums, axis=1) / round_each[first][:, None]
-    apart = first != second
-    begins = np.searchsorted(first[apart], np.arange(n + 1))
-    return second[apart], begins, slopes[apart]
+    slope_rows = np.stack(sums, axis=1) / volume_sums[first][:, None]
+    differ = first != second
+    begins = np.searchsorted(first[differ], np.arange(n + 1))
+    return second[differ], begins, slope_rows[differ]

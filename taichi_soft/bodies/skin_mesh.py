@@ -1,4 +1,4 @@
-"""An artist's mesh as a renderer takes it, with the vertices and normals of each frame."""
+"""Render mesh of an artist's mesh, with the vertices and normals of each frame."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from taichi_soft.meshing import TetMesh
 
 Floats32 = NDArray[np.float32]
 
-FEWEST_SHARED = 2000
-"""Vertices from which on threads share them: waking them costs as much as some thousand of them."""
+MIN_PARALLEL_VERTICES = 2000
+"""Vertices from which threads share the work: waking them costs as much as some thousand vertices."""
 
 
 class SkinMesh(RenderMesh):
-    """The skin of one body, in its artist's own order. Made by `Body.render_meshes`, and read-only.
+    """The skin of one body, in its artist's order. Made by `Body.render_meshes`, and read-only.
 
-    The body's vertices under `body_vertices` are the nearest ones. A skin cannot follow a cut: once its body
-    is cut or torn it is outdated, and there is no new one.
+    `body_vertices` are the nearest vertices of the body. A skin cannot follow a cut: once its body is cut or
+    torn, it is outdated, and there is no new one.
     """
 
     def __init__(self, body: SoftBody, number: int) -> None:
-        """Made by `Body.render_meshes`, of the surface of the asset's skin that has this number."""
+        """Made by `Body.render_meshes`, from the surface with this number in the asset's skin."""
         self._body, self._number = body, number
         self._bind()
 
     def _bind(self) -> None:
-        """To the tetrahedra that the body has now: levels of detail have others."""
+        """Bind to the body's present tetrahedra: levels of detail have different ones."""
         body = self._body
         asset, self._level = present_asset(body), record_of(body).level
         self._skin: Skin = asset.skins[self._number]
         assert isinstance(asset.mesh, TetMesh)
         corners = asset.mesh.tets[self._skin.tets]
-        nearest = corners[np.arange(len(corners)), self._skin.shares.argmax(axis=1)]
+        nearest = corners[np.arange(len(corners)), self._skin.weights.argmax(axis=1)]
         self._describe(body, nearest.astype(np.int64), self._skin.surface.triangles)
         self._frames = np.empty(FRAME * len(asset.mesh.vertices), dtype=np.float32)
 
@@ -51,7 +51,7 @@ class SkinMesh(RenderMesh):
 
     @property
     def body_vertices(self) -> NDArray[np.int32]:
-        """The body's vertex that is nearest to each render vertex at rest, int32 (k,)."""
+        """Vertex of the body that is nearest to each render vertex at rest, int32 (k,)."""
         _ = self._present_skin
         return super().body_vertices
 
@@ -62,32 +62,32 @@ class SkinMesh(RenderMesh):
 
     @property
     def name(self) -> str:
-        """What the mesh is called in its file."""
+        """Name of the mesh in its file."""
         return self._skin.surface.name
 
     @property
     def visual(self) -> Any:
-        """trimesh's texture coordinates, material and colours of it; None where there are none."""
+        """trimesh's texture coordinates, material and colours; None without any."""
         return self._skin.surface.visual
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the body is cut or torn: a skin cannot follow that."""
+        """True if the body is cut or torn, which a skin cannot follow."""
         return self._body.is_cut
 
     @property
-    def _way_out(self) -> str:
-        return "a skin cannot follow a cut: draw body.render_mesh() in its place"
+    def _suggested_fix(self) -> str:
+        return "a skin cannot follow a cut: draw body.render_mesh() instead"
 
     def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
         skin, n = self._present_skin, self._body.vertex_count
         rows = positions.reshape(-1), normals.reshape(-1)
-        is_serial = n + skin.vertex_count < FEWEST_SHARED
+        is_serial = n + skin.vertex_count < MIN_PARALLEL_VERTICES
         write_skin(state, is_serial, self._body.index, n, alpha, skin.ints, skin.floats, self._frames, *rows)
 
 
 def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
-    """Those of its asset; none where it was cut or torn."""
+    """Skin meshes of a body; none if it was cut or torn."""
     if body.is_cut:
         return ()
     record = record_of(body)
@@ -97,18 +97,18 @@ def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
 
 
 def first_skin_mesh(body: SoftBody) -> SkinMesh:
-    """Raises: OptionError for a body without skin, or cut; StateError for one that was removed."""
+    """First skin mesh. Raises: OptionError for a body without skin, or cut; StateError for a removed one."""
     require_alive(body)
     meshes = skin_meshes(body)
     if not meshes:
         raise OptionError(
-            f"mesh must be a RenderMesh, and {body!r} has no skin to stand for one: draw body.render_mesh()"
+            f"mesh must be a RenderMesh, and {body!r} has no skin to use instead: draw body.render_mesh()"
         )
     return meshes[0]
 
 
 def warm_up(state: Any) -> None:
-    """Compile what a skin's frame calls, for few vertices and for many: of a vertex without neighbours."""
+    """Compile the kernel of skins for few vertices and for many, with a vertex without neighbours."""
     ints, floats = np.zeros(2 + 4 * LANES, np.int32), np.zeros(3 + ROW * LANES, np.float32)
     frames, positions, normals = np.empty(FRAME, dtype=np.float32), *np.empty((2, 3), dtype=np.float32)
     for is_serial in (True, False):

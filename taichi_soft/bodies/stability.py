@@ -6,9 +6,9 @@ Leapfrog with a lagging damper, x'' = -K x - C x' in units where M = 1, is
 
 With x_n - x_(n-1) = (x_(n+1) - x_(n-1)) / 2 - (x_(n+1) - 2 x_n + x_(n-1)) / 2 the energy
 1/2 d^T (1 - h C / 2 - h^2 K / 4) d + 1/2 s^T h^2 K s, of differences d and means s of neighbouring positions,
-never grows. So it is stable exactly where the largest eigenvalue of h^2 K + 2 h C is below 4. Lazy leapfrog
-makes the same steps. Lanczos' method finds that eigenvalue from below; what it may lack is added, so that the
-limit given is never beyond the true one.
+never grows. It is therefore stable exactly if the largest eigenvalue of h^2 K + 2 h C is below 4. Lazy
+leapfrog makes the same steps. Lanczos' method finds that eigenvalue from below; its possible error is added,
+so that the limit is never above the true one.
 """
 
 from __future__ import annotations
@@ -31,92 +31,92 @@ from taichi_soft.meshing import BodyMesh, TetMesh
 Floats = NDArray[np.float64]
 
 MARGIN = 0.9
-"""Part of the linear limit that is recommended: compression stiffens an element beyond its rest value."""
+"""Recommended fraction of the linear limit: compression stiffens an element beyond its rest value."""
 
-_MOST_ITERATIONS = 120
-_LEAST_ITERATIONS = 30
-"""Regular meshes have many nearly equal eigenvalues: fewer may settle on one that is not the largest."""
+_MAX_ITERATIONS = 120
+_MIN_ITERATIONS = 30
+"""Regular meshes have many nearly equal eigenvalues: fewer can end at one that is not the largest."""
 
 _RESIDUAL = 0.02
-"""Of Lanczos' method, over the eigenvalue, at which it ends. As much is added to be safe: 1 % of a step."""
+"""Relative residual at which Lanczos' method ends. The same amount is added for safety: 1 % of a step."""
 
 _DAMPING_PASSES = 8
 
-FLATTEST_ANGLE = 15.0
-"""Dihedral angle [degrees] from which down a tetrahedron counts as a sliver; of a regular one it is 70.5."""
+SLIVER_ANGLE = 15.0
+"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; 70.5 if regular."""
 
 
 @dataclass(frozen=True)
 class StableStep:
-    """What limits the substep of one body."""
+    """Limit of the substep of one body."""
 
     limit: float  # [s], largest stable substep for small motion: at most 15 % below the true one, never above
-    stiffest_tet: int | None  # whose own frequency is highest, in the caller's order
+    stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s] of the fastest vibration
-    stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
-    undamped: float = 0.0  # [s], the limit if nothing were damped
-    slivers: int = 0  # flat tetrahedra whose own limit is below half of what 99 of 100 others have
-    without_slivers: float = 0.0  # [s], about the limit if there were none
-    tets: int = 0  # of the body
+    stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron, for forces along edges
+    undamped: float = 0.0  # [s], limit without damping
+    slivers: int = 0  # flat tetrahedra whose own limit is below half of that of 99 of 100 others
+    without_slivers: float = 0.0  # [s], approximate limit without slivers
+    tets: int = 0  # number of tetrahedra of the body
 
     @property
     def stiffest(self) -> str:
-        """What is to blame, in words."""
+        """Description of the stiffest element."""
         if self.stiffest_edge is not None:
             return f"stiffest edge from vertex {self.stiffest_edge[0]} to {self.stiffest_edge[1]}"
         return f"stiffest tetrahedron {self.stiffest_tet}"
 
     @property
     def reason(self) -> str:
-        """Why it is as short as it is, and the way out, in words."""
+        """Explanation of the limit, with a suggested fix."""
         if self.limit < 0.5 * self.undamped:
             return (
-                f"damping asks for {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material "
-                "a damping_ratio instead of damping, which takes none"
+                f"damping causes {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material "
+                "a damping_ratio instead of damping, which needs none"
             )
         if self.slivers:
             share = 100 * (1 - self.limit / self.without_slivers)
             return (
-                f"{self.slivers:,} of {self.tets:,} tetrahedra are slivers, which ask for {share:.3g} % of "
-                "them: mesh.improved() does away with those"
+                f"{self.slivers:,} of {self.tets:,} tetrahedra are slivers, which cause {share:.3g} % of "
+                "them: remove them by mesh.improved()"
             )
-        return f"it has small or stiff elements ({self.stiffest}): take a coarser mesh or a softer material"
+        return f"it has small or stiff elements ({self.stiffest}): use a coarser mesh or a softer material"
 
     @property
     def recommended(self) -> float:
-        """Substep with a margin for large deformation [s]."""
+        """Substep with a margin for large deformations [s]."""
         return MARGIN * self.limit
 
 
 def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> StableStep:
-    """The largest stable substep of a body under leapfrog and its lazy variant; explicit Euler has none.
+    """Estimate the largest stable substep for leapfrog and its lazy variant; explicit Euler has none.
 
-    It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
-    tetrahedron has no bound at all, which is why `recommended` leaves a margin. Pins are not counted: they
-    make it longer, if anything.
+    It holds for motion about the rest shape. A strongly compressed body is stiffer, and a flattened
+    tetrahedron has no bound at all, so `recommended` leaves a margin. Pins are ignored: they can only make it
+    longer.
     Args:
         mesh: rest shape.
         material: constants that fit the mesh.
         model: made by `element_model`.
-    Raises: MeshError, MaterialError or OptionError for what does not fit together.
+    Raises: MeshError, MaterialError or OptionError for arguments that do not fit together.
     """
     if not isinstance(model, ElementModel):
         raise OptionError(f"model must come from element_model(...), got {model!r}")
     body = BodyDescription(mesh, material, fit_model(model, mesh, material))
     vibration = vibration_of(body)
-    most, stiffest_tet, stiffest_edge, slivers, usual = np.inf, None, None, 0, np.inf
+    bound, stiffest_tet, stiffest_edge, slivers, typical = np.inf, None, None, 0, np.inf
     start = np.random.default_rng(0).normal(size=(*mesh.vertices.shape, 1))
     if isinstance(vibration, TetVibration):
         bounds = vibration.element_bounds()
-        most, stiffest_tet = float(bounds.max()), int(bounds.argmax())
-        usual = float(np.quantile(bounds, 0.99, method="lower"))
+        bound, stiffest_tet = float(bounds.max()), int(bounds.argmax())
+        typical = float(np.quantile(bounds, 0.99, method="lower"))
         assert isinstance(mesh, TetMesh)
-        is_flat = mesh.quality.min_dihedral < FLATTEST_ANGLE
-        slivers = int(((bounds > 4.0 * usual) & is_flat).sum())
+        is_flat = mesh.quality.min_dihedral < SLIVER_ANGLE
+        slivers = int(((bounds > 4.0 * typical) & is_flat).sum())
     elif body.bonds is not None:
         stiffest_edge = _stiffest_edge(body, body.bonds)
     frequency2, u = largest_eigenvalue(vibration.apply, start)
-    frequency2 = rounded(min(frequency2, most))
+    frequency2 = rounded(min(frequency2, bound))
     undamped = 2.0 / np.sqrt(frequency2)
     limit = undamped
     if vibration.is_damped:
@@ -128,32 +128,32 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
         stiffest_edge,
         float(undamped),
         slivers,
-        float(limit * max(1.0, np.sqrt(frequency2 / usual))),
+        float(limit * max(1.0, np.sqrt(frequency2 / typical))),
         len(mesh.tets),
     )
 
 
 def _damped_limit(vibration: Vibration, undamped: float, u: Floats, start: Floats) -> float:
-    """The h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
+    """Step h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
 
-    Of a direction u, h^2 u'Ku + 2 h u'Cu = 4 gives an h that is never below the one looked for, where K is
+    For a direction u, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is never below the one sought if K is
     symmetric. The form at t h is at most t times that at h for t < 1, and at most t^2 times for t > 1.
     """
     h, value = undamped, np.inf
     for _ in range(_DAMPING_PASSES):
         h = min(h, _touching_step(vibration, u, h)) if value > 4.0 else h * np.sqrt(4.0 / value)
-        value, u = largest_eigenvalue(lambda w, h=h: vibration.apply(w, h), u + 0.1 * _sized(start, u))  # type: ignore[misc]
+        value, u = largest_eigenvalue(lambda w, h=h: vibration.apply(w, h), u + 0.1 * _scaled(start, u))  # type: ignore[misc]
         if abs(value - 4.0) < 8 * _RESIDUAL:
             break
     return float(h * (4.0 / value) ** (1.0 if value > 4.0 else 0.5))
 
 
-def _sized(start: Floats, u: Floats) -> Floats:
+def _scaled(start: Floats, u: Floats) -> Floats:
     return np.asarray(start * (np.linalg.norm(u) / np.linalg.norm(start)))
 
 
 def _touching_step(vibration: Vibration, u: Floats, h: float) -> float:
-    """The h at which h^2 k + 2 h c is 4 in the direction u."""
+    """Step h at which h^2 k + 2 h c is 4 in the direction u."""
     u = u / np.linalg.norm(u)
     stiffness = float(np.vdot(u, vibration.apply(u)))
     damping = (float(np.vdot(u, vibration.apply(u, h))) - h * h * stiffness) / (2 * h)
@@ -161,29 +161,30 @@ def _touching_step(vibration: Vibration, u: Floats, h: float) -> float:
 
 
 def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tuple[float, Floats]:
-    """Arnoldi's method, which is Lanczos' where the operator is symmetric: a bound and its direction.
+    """Bound of the largest eigenvalue, and its direction, by Arnoldi's method.
 
-    Laws along edges need not be symmetric, and then it is the eigenvalue of largest size.
+    It is Lanczos' method for symmetric operators. Laws along edges need not be symmetric; the result is then
+    the eigenvalue of largest magnitude.
     """
-    shape, basis = start.shape, np.zeros((_MOST_ITERATIONS + 1, start.size))
-    small = np.zeros((_MOST_ITERATIONS + 1, _MOST_ITERATIONS))
+    shape, basis = start.shape, np.zeros((_MAX_ITERATIONS + 1, start.size))
+    small = np.zeros((_MAX_ITERATIONS + 1, _MAX_ITERATIONS))
     basis[0] = (start / np.linalg.norm(start)).ravel()
-    for k in range(1, _MOST_ITERATIONS + 1):
+    for k in range(1, _MAX_ITERATIONS + 1):
         image = apply(basis[k - 1].reshape(shape)).ravel()
-        for _ in range(2):  # once more for round-off
+        for _ in range(2):  # twice, because of round-off
             part = basis[:k] @ image
             image = image - part @ basis[:k]
             small[:k, k - 1] += part
-        left = np.linalg.norm(image)
-        small[k, k - 1] = left
-        is_last = k == _MOST_ITERATIONS or left <= 1e-12 * np.abs(small[:k, :k]).max()
-        if is_last or (k >= _LEAST_ITERATIONS and k % 10 == 0):
+        norm = np.linalg.norm(image)
+        small[k, k - 1] = norm
+        is_last = k == _MAX_ITERATIONS or norm <= 1e-12 * np.abs(small[:k, :k]).max()
+        if is_last or (k >= _MIN_ITERATIONS and k % 10 == 0):
             values, vectors = np.linalg.eig(small[:k, :k])
             top = int(np.abs(values).argmax())
-            value, residual = float(np.abs(values[top])), float(left * np.abs(vectors[-1, top]))
+            value, residual = float(np.abs(values[top])), float(norm * np.abs(vectors[-1, top]))
             if is_last or residual <= _RESIDUAL * value:
                 break
-        basis[k] = image / left
+        basis[k] = image / norm
     direction = vectors[:, top].real @ basis[:k]
     return value + max(residual, _RESIDUAL * value), direction.reshape(shape)
 

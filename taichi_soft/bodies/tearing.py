@@ -1,4 +1,4 @@
-"""How bodies of an asset tear."""
+"""Tearing of bodies."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from taichi_soft.core.serialisation import serialised
 @serialised("stress", "most")
 @dataclass(frozen=True)
 class Tearing:
-    """Tear vertices in two where the material is pulled beyond its strength (O'Brien and Hodgins 1999).
+    """Tearing where the material is pulled beyond its strength (O'Brien and Hodgins 1999).
 
-    Looked for after each step. The face between two tetrahedra tears where the largest principal stress of
-    their mean is above the strength: its vertices are split across the pull, along the faces of the
-    tetrahedra round them. It is the Cauchy stress of the body's own law: see `Body.tet_stress`. A body tears
-    as long as its `spare_vertices` last; what falls off becomes a body while slots are free, the largest
-    first; the rest, and crumbs of less than 2 % of the whole, stay loose in the body. What a frame holds it
-    goes on holding, copies of it as well; while a body is grabbed, joined to another one or driven by a
-    motor, it does not tear.
+    After each step, the face between two tetrahedra tears if the largest principal stress of their mean
+    exceeds the strength: its vertices are split perpendicular to the pull, along the faces of the tetrahedra
+    around them. The stress is the Cauchy stress of the body's own law: see `Body.tet_stress`. A body tears as
+    long as its `spare_vertices` last. Pieces that fall off become bodies while slots are free, the largest
+    first. The others, and fragments of less than 2 % of the body, remain in it as separate parts. Frames keep
+    holding their vertices and copies of these. A body that is grabbed, joined to another one or driven by a
+    motor does not tear.
 
     Args:
         stress: tensile strength [Pa].
-        most: faces that one step may tear in one body: how fast a tear runs.
+        most: largest number of faces that one step tears in one body: the speed of a tear.
     Raises: OptionError for a value out of range.
     """
 

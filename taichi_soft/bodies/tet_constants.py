@@ -1,4 +1,4 @@
-"""Constants of the tetrahedra of one body, written anew where it has got another material or was cut."""
+"""Rewrite the constants of one body's tetrahedra after a change of material or a cut."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from taichi_soft.core.constants import LANES
 
 
 def write_tet_constants(fields: BodyFields, first_block: int, body: BodyArrays) -> None:
-    """Write what `BodyFields.tet_constants` names."""
+    """Write the fields of `BodyFields.tet_constants`."""
     if len(body.tet_vertices):
         for field, rows in fields.tet_constants(body):
             write_numbers(field, first_block * LANES * rows.shape[1], constant_blocks(rows))
 
 
 def constant_blocks(rows: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Constants of tetrahedra, (m, k), as their field has them: see `BodyFields`."""
+    """Constants of tetrahedra, (m, k), in the layout of their field: see `BodyFields`."""
     return blocks_of(rows, rows.shape[1], 0).astype(np.float32)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import BodyDescription
-from taichi_soft.bodies.forces import StillBody
+from taichi_soft.bodies.forces import StaticBody
 from taichi_soft.core.types import DampingModel
 from taichi_soft.meshing import BodyMesh, TetMesh
 from taichi_soft.meshing.cage_mesh import lumped
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 class Vibration(ABC):
-    """K and C of a body at rest, which nothing holds, each scaled as M^-1/2 K M^-1/2.
+    """K and C of a free body at rest, each scaled as M^-1/2 K M^-1/2.
 
     Displacements are (n, 3, k): k of them at once, each times the root of the masses.
     """
@@ -29,24 +29,24 @@ class Vibration(ABC):
     @property
     @abstractmethod
     def is_damped(self) -> bool:
-        """Whether C is not zero."""
+        """True if C is not zero."""
 
     def diagonal(self) -> Floats:
-        """About the diagonal of K, (3 n,) [1/s^2], up to a factor: to precondition with."""
+        """Approximate diagonal of K, (3 n,) [1/s^2], up to a factor: a preconditioner."""
         return np.ones(3 * len(self.root_mass))
 
     @abstractmethod
     def apply(self, u: Floats, h: float | None = None) -> Floats:
-        """K u [1/s^2]; with `h` [s] what decides a substep of that length, (h^2 K + 2 h C) u."""
+        """K u [1/s^2]; with `h` [s], (h^2 K + 2 h C) u, which decides the stability of a substep h."""
 
 
 def vibration_of(body: BodyDescription) -> Vibration:
-    """That of a body, by its law."""
+    """Vibrations of a body by its law."""
     return TetVibration(body) if body.bonds is None else BondVibration(body)
 
 
 class TetVibration(Vibration):
-    """Of a law on tetrahedra: K is that of linear finite elements, tetrahedron by tetrahedron."""
+    """Vibrations with a law on tetrahedra: K is that of linear finite elements."""
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
@@ -64,11 +64,11 @@ class TetVibration(Vibration):
 
     @property
     def is_damped(self) -> bool:
-        """Whether any tetrahedron damps."""
+        """True if any tetrahedron has damping."""
         return bool(self._damping.any())
 
     def apply(self, u: Floats, h: float | None = None) -> Floats:
-        """As `Vibration.apply`."""
+        """See `Vibration.apply`."""
         displaced = u / self.root_mass
         corners = displaced[self._tets.rows]
         forces = (self._matrices @ corners.reshape(len(corners), 12, -1)).reshape(corners.shape)
@@ -88,23 +88,24 @@ class TetVibration(Vibration):
         return np.asarray(np.einsum("kti,tij,ktj->kt", corners, self._matrices, corners, optimize=True))
 
     def diagonal(self) -> Floats:
-        """As `Vibration.diagonal`."""
-        own = np.diagonal(self._matrices, axis1=1, axis2=2).reshape(-1, 4, 3, 1)
-        return np.asarray(self._tets.sum(own) / self.root_mass**2).ravel()
+        """See `Vibration.diagonal`."""
+        diagonals = np.diagonal(self._matrices, axis1=1, axis2=2).reshape(-1, 4, 3, 1)
+        return np.asarray(self._tets.sum(diagonals) / self.root_mass**2).ravel()
 
     def element_bounds(self) -> Floats:
-        """Largest w^2 of every tetrahedron on its own share of the masses of its vertices, (m,) [1/s^2]: none
-        of the body is above the largest (Irons and Treharne 1971).
+        """Largest w^2 of every tetrahedron with its share of the masses of its vertices, (m,) [1/s^2].
 
-        K_e = V b^T C b, where b maps displacements to strain in Voigt's order, has on corner masses
-        r V density / 4 the spectrum of the 6x6 matrix 4 / density L^T (b r^-1 b^T) L with L L^T = C. The
-        ratios r are 1 but in cages, whose vertices carry more or less than a quarter of what is round them.
+        No w^2 of the body is above the largest of these (Irons and Treharne 1971). K_e = V b^T C b, where b
+        maps displacements to strain in Voigt's order, has for corner masses r V density / 4 the spectrum of
+        the 6x6 matrix 4 / density L^T (b r^-1 b^T) L with L L^T = C. The ratios r are 1 except in cages,
+        whose vertices carry more or less than a quarter of the adjacent tetrahedra.
         """
         mesh, density = self.body.mesh, self.body.per_tet("density")
         assert isinstance(mesh, TetMesh)
         quarters = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
         ratios = np.repeat((self.body.masses / quarters)[mesh.tets], 3, axis=1)[:, None, :]
-        # Nothing beside the largest entry, but it keeps ratios near -1 and 1/2 from failing by round-off.
+        # Negligible beside the largest entry, but prevents round-off errors for Poisson's ratios near -1 and
+        # 1/2.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
         gram = np.swapaxes(root, 1, 2) @ ((self.strains / ratios) @ np.swapaxes(self.strains, 1, 2)) @ root
@@ -112,43 +113,43 @@ class TetVibration(Vibration):
 
 
 class BondVibration(Vibration):
-    """Of a law along edges. What its planes do as a body deforms is in the forces only, so they are asked."""
+    """Vibrations with a law along edges, by differences of forces: only these include how its planes turn."""
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
         assert body.bonds is not None
-        self._still = StillBody(body, double=True)
-        self._nudge = 1e-6 * float(body.mesh.edge_lengths.min())
+        self._static = StaticBody(body, double=True)
+        self._offset = 1e-6 * float(body.mesh.edge_lengths.min())
         self._along, across = body.edge_damping, None
         if not body.model.has_simple_edges:
-            # The planes turn, so that either damping may act in any direction.
+            # The planes turn, so that each damping can act in any direction.
             self._along = across = np.maximum(self._along, body.bonds.constants[:, 3] * body.bonds.is_bond)
         self._dampers = _EdgeDampers(body.mesh, self._along, across)
 
     @property
     def is_damped(self) -> bool:
-        """Whether any edge damps."""
+        """True if any edge has damping."""
         return bool(self._along.any())
 
     def apply(self, u: Floats, h: float | None = None) -> Floats:
-        """As `Vibration.apply`."""
+        """See `Vibration.apply`."""
         displaced = u / self.root_mass
-        total = np.stack([self._pull(displaced[:, :, k]) for k in range(u.shape[2])], axis=2)
+        total = np.stack([self._force_differences(displaced[:, :, k]) for k in range(u.shape[2])], axis=2)
         if h is not None:
             total = h * h * total + 2 * h * self._dampers.apply(displaced)
         return np.asarray(total / self.root_mass)
 
-    def _pull(self, displaced: Floats) -> Floats:
+    def _force_differences(self, displaced: Floats) -> Floats:
         """Central differences of the forces at rest."""
         rest = self.body.mesh.vertices
-        nudge = self._nudge / (np.abs(displaced).max() + 1e-300)
-        still = np.zeros_like(rest)
-        ahead, behind = (self._still.forces(rest + s * nudge * displaced, still) for s in (1, -1))
-        return np.asarray((behind - ahead) / (2 * nudge))
+        offset = self._offset / (np.abs(displaced).max() + 1e-300)
+        zero_velocity = np.zeros_like(rest)
+        ahead, behind = (self._static.forces(rest + s * offset * displaced, zero_velocity) for s in (1, -1))
+        return np.asarray((behind - ahead) / (2 * offset))
 
 
 class _EdgeDampers:
-    """Dampers along edges, and across them where given [N s/m], of (k,) edges."""
+    """Dampers along edges, and across them if given [N s/m], (k,)."""
 
     def __init__(self, mesh: BodyMesh, along: Floats, across: Floats | None = None) -> None:
         ends = mesh.vertices[mesh.edges]
@@ -161,14 +162,14 @@ class _EdgeDampers:
         self._edges = _Owners(mesh.edges, len(mesh.vertices))
 
     def apply(self, velocities: Floats) -> Floats:
-        """What they brake with, (n, 3, k) [N], of velocities [m/s]."""
+        """Damping C times velocities [m/s], (n, 3, k) [N]."""
         ends = velocities[self._edges.rows]
         force = self._matrices @ (ends[:, 0] - ends[:, 1])
         return self._edges.sum(np.stack([force, -force], axis=1))
 
 
 class _Owners:
-    """Sums of rows, such as forces on the corners of tetrahedra, over those of the same vertex."""
+    """Sum rows, such as forces on the corners of tetrahedra, by vertex."""
 
     def __init__(self, rows: NDArray[np.int32], count: int) -> None:
         self.rows = rows
@@ -178,7 +179,7 @@ class _Owners:
         self._count = count
 
     def sum(self, forces: Floats) -> Floats:
-        """(m, c, 3, k) -> (n, 3, k)."""
+        """Sum (m, c, 3, k) to (n, 3, k)."""
         flat = forces.reshape(-1, *forces.shape[2:])[self._order]
         total = np.zeros((self._count, *forces.shape[2:]))
         total[self._present] = np.add.reduceat(flat, self._starts, axis=0)

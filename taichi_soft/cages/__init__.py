@@ -1,14 +1,14 @@
-"""From the surface of a solid to tetrahedra that carry it.
+"""Tetrahedra that carry the solid inside a surface.
 
-A lattice (`cage`) needs no other package:
+A lattice cage (`cage`) needs no other package:
 
-1. Which part of each voxel is inside (`solid`): lines through the surface, along three axes.
-2. Which tetrahedra of a body-centred lattice carry it (`marking`), part by part.
-3. Their outer vertices move onto the surface, as far as every tetrahedron stays good (`fitting`).
-4. What of the solid each tetrahedron carries, and masses of the vertices with its inertia (`cage`).
-5. Limbs and sheets that are left out (`thin`) get smaller cells (`refinement`, `graded`).
+1. Rays along three axes find the part of each voxel that is inside (`solid`).
+2. Tetrahedra of a body-centred lattice are selected to cover each component of the solid (`marking`).
+3. Their outer vertices move onto the surface, as far as all tetrahedra stay well shaped (`fitting`).
+4. Tetrahedra get the fraction of them that is solid, and vertices get masses with the solid's inertia
+(`cage`). 5. Limbs and sheets that the cage misses (`thin`) get smaller cells (`refinement`, `graded`).
 
-Programs of others (`mesher`) fill the surface with tetrahedra that are solid throughout.
+External programs (`mesher`) fill the surface with tetrahedra that are solid throughout.
 """
 
 from taichi_soft.cages.cage import Cage

@@ -1,4 +1,4 @@
-"""A cage: tetrahedra that carry a solid which only its surface is known of."""
+"""Build the cage of a solid: tetrahedra around it that carry its volume and mass."""
 
 from __future__ import annotations
 
@@ -24,57 +24,61 @@ from taichi_soft.meshing.locating import Locator
 Ints = NDArray[np.int64]
 
 SMALLEST_PART = 1e-3
-"""Of the volume: smaller parts are dust."""
+"""Volume relative to the solid's, below which a component is discarded."""
 
-LEAST_SHARE = 0.05
-"""Of a tetrahedron that is solid, below which it is taken as this much: what is lighter than all round it
-would be thrown about."""
+MIN_FILL = 0.05
+"""Smallest fill of a tetrahedron: one that is much lighter than its neighbours would be flung about."""
 
-MOST_SHARE = 1.5
-"""Above it what sticks out of the cage stiffens nothing more."""
+MAX_FILL = 1.5
+"""Largest fill of a tetrahedron: parts of the solid outside the cage add no further stiffness."""
 
-LEAST_QUARTER = 0.9
-"""Of a quarter of what is solid of the tetrahedra round a vertex, that it is to carry at least: they pull at
-it as hard as they are full, and a light vertex vibrates fast. Stable steps gain up to a half by it."""
+MIN_LUMPED_FRACTION = 0.9
+"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around it. Their
+stiffness grows with their fill, so a light vertex vibrates fast and shortens the stable step."""
 
-PEELS = 4
-"""Layers of flat tetrahedra that are taken off at most."""
+MAX_PEELS = 4
+"""Largest number of layers of flat tetrahedra that are removed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cage:
-    """Tetrahedra, and what of the solid each of them and each vertex carries."""
+    """Tetrahedra and the part of the solid that each of them and each vertex carries."""
 
     mesh: CageMesh
     solid: Solid
-    part: Ints  # (m,), of the solid that each tetrahedron belongs to
-    octave: Ints  # (m,), how often the cells were halved there
-    thin: Thin | None = None  # limbs and sheets that cells as large as asked for leave out
+    part: Ints  # (m,), component of the solid that each tetrahedron belongs to
+    octave: Ints  # (m,), number of halvings of the cells there
+    thin: Thin | None = None  # limbs and sheets that are too thin for cells of the requested size
 
 
 def cage_in(
-    lattice: Lattice | GradedLattice, solid: Solid, within: float, kept: NDArray[np.bool_] | None = None
+    lattice: Lattice | GradedLattice,
+    solid: Solid,
+    enclosed_volume: float,
+    kept: NDArray[np.bool_] | None = None,
 ) -> Cage:
-    """The cage of a solid in a lattice.
+    """Build the cage of a solid in a lattice.
 
     Args:
-        within: volume by the divergence theorem [m^3].
-        kept: voxels that are not to be lost, of the shape of the solid's.
-    Raises: OptionError where it falls into pieces.
+        enclosed_volume: volume of the solid by the divergence theorem [m^3].
+        kept: voxels that must be covered, of the shape of the solid's.
+    Raises: OptionError if the cage falls into pieces.
     """
     points, volumes = solid.quadrature()
     if solid.is_simple:
-        volumes *= within / volumes.sum()
+        volumes *= enclosed_volume / volumes.sum()
     is_full = solid.fill > 0.0
     part_of_point = parts_of(solid.fill)[is_full]
     is_kept = None if kept is None else kept[is_full]
-    places, corners, parts, octaves, offset = [], [], [], [], 0
+    positions, corners, parts, octaves, offset = [], [], [], [], 0
     tet_count = 0
     start = np.full(len(points), -1)
     large = np.flatnonzero(np.bincount(part_of_point, volumes) >= SMALLEST_PART * volumes.sum())
     for number, part in enumerate(large):
-        mine = part_of_point == part
-        numbers = mark(lattice, points[mine], volumes[mine], None if is_kept is None else is_kept[mine])
+        in_part = part_of_point == part
+        numbers = mark(
+            lattice, points[in_part], volumes[in_part], None if is_kept is None else is_kept[in_part]
+        )
         numbers = _peeled(lattice, numbers, solid)
         tets, lattice_vertices = split_hinges(lattice.corners_of(numbers))
         if part_count(tets) > 1:
@@ -84,23 +88,23 @@ def cage_in(
             )
         at = lattice.points_of(lattice_vertices)
         octave = lattice.octaves_of(numbers)
-        places.append(fit(at, tets, octave, solid, lattice.edge))
+        positions.append(fit(at, tets, octave, solid, lattice.edge))
         corners.append(tets + offset)
         parts.append(np.full(len(tets), number))
         octaves.append(octave)
-        at_points = lattice.tet_at(points[mine])
-        found = np.minimum(np.searchsorted(numbers, at_points), len(numbers) - 1)
-        start[mine] = np.where(numbers[found] == at_points, found + tet_count, -1)
+        at_points = lattice.tet_at(points[in_part])
+        row = np.minimum(np.searchsorted(numbers, at_points), len(numbers) - 1)
+        start[in_part] = np.where(numbers[row] == at_points, row + tet_count, -1)
         offset, tet_count = offset + len(at), tet_count + len(tets)
     in_large = np.isin(part_of_point, large)
-    mesh = TetMesh(np.concatenate(places), np.concatenate(corners))
-    filled = _filled(mesh, solid, points[in_large], volumes[in_large], start[in_large])
-    return Cage(filled, solid, np.concatenate(parts), np.concatenate(octaves))
+    mesh = TetMesh(np.concatenate(positions), np.concatenate(corners))
+    cage_mesh = _with_volumes(mesh, solid, points[in_large], volumes[in_large], start[in_large])
+    return Cage(cage_mesh, solid, np.concatenate(parts), np.concatenate(octaves))
 
 
 def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> Ints:
-    """Without tetrahedra that would lie flat in the surface, as long as what is left hangs together."""
-    for _ in range(PEELS):
+    """Remove tetrahedra that would lie flat in the surface, as long as the rest stays connected."""
+    for _ in range(MAX_PEELS):
         corners = lattice.corners_of(numbers)
         used, tets = np.unique(corners, return_inverse=True)
         tets = tets.reshape(-1, 4)
@@ -111,16 +115,25 @@ def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> In
     return numbers
 
 
-def _filled(mesh: TetMesh, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints) -> CageMesh:
-    tet, shares = Locator(mesh)(points, start)
+def _with_volumes(
+    mesh: TetMesh, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints
+) -> CageMesh:
+    """Add the fill of each tetrahedron and the volume of each vertex."""
+    tet, weights = Locator(mesh)(points, start)
     carried = np.bincount(tet, volumes, len(mesh.tets))
-    fill = np.clip(carried / mesh.volumes, LEAST_SHARE, MOST_SHARE)
-    held = np.bincount(mesh.tets[tet].ravel(), (volumes[:, None] * shares).ravel(), len(mesh.vertices))
+    fill = np.clip(carried / mesh.volumes, MIN_FILL, MAX_FILL)
+    lumped_volumes = np.bincount(
+        mesh.tets[tet].ravel(), (volumes[:, None] * weights).ravel(), len(mesh.vertices)
+    )
     quarters = lumped(mesh.tets, fill * mesh.volumes, len(mesh.vertices))
-    held = np.maximum(held, LEAST_QUARTER * quarters)
-    cell = solid.spacing**2 / 12.0  # a full voxel's own second moment over its volume
-    second = np.einsum("k,ki,kj->ij", volumes, points, points) + volumes.sum() * cell * np.eye(3)
+    lumped_volumes = np.maximum(lumped_volumes, MIN_LUMPED_FRACTION * quarters)
+    cell = solid.spacing**2 / 12.0  # second moment of a full voxel over its volume
+    second_moment = np.einsum("k,ki,kj->ij", volumes, points, points) + volumes.sum() * cell * np.eye(3)
     vertex_volumes = fitted(
-        mesh.vertices, np.asarray(held, dtype=np.float64), float(volumes.sum()), volumes @ points, second
+        mesh.vertices,
+        np.asarray(lumped_volumes, dtype=np.float64),
+        float(volumes.sum()),
+        volumes @ points,
+        second_moment,
     )
     return CageMesh(mesh.vertices, mesh.tets, fill, vertex_volumes)

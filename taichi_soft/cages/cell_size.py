@@ -1,4 +1,4 @@
-"""How large the cells of a cage are."""
+"""Choose the cell size of a cage."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
 DEFAULT_CELLS = 10
-"""Along the longest side: some thousand tetrahedra, of which a game has many."""
+"""Default number of cells along the longest side. It gives some thousand tetrahedra, which suits games."""
 
-MOST_CELLS = 150_000
-"""In the box round the surface."""
+MAX_CELLS = 150_000
+"""Largest number of cells in the bounding box of the surface."""
 
 BYTES_PER_CELL = 27 * 250
-"""Of the voxels of a lattice in it, while the cage is made."""
+"""Memory of the lattice's voxels in one cell while the cage is built."""
 
 
 def cell_size_of(size: FloatArray, cells: int | None, cell_size: float | None) -> float:
-    """Edge of a cell [m].
+    """Return the edge of a cell [m].
 
     Args:
-        size: of the box round the surface, (3,) [m].
-        cells, cell_size: as of `SoftBodyAsset.from_surface`.
-    Raises: OptionError for none, or too many of them; MeshError for a box without size.
+        size: lengths of the bounding box of the surface, (3,) [m].
+        cells, cell_size: as for `SoftBodyAsset.from_surface`.
+    Raises: OptionError for an invalid size or too many cells; MeshError for a surface without extent.
     """
     longest = float(size.max())
     if not longest > 0.0:
         raise MeshError("the surface is a point: it encloses nothing")
     if cells is not None and cell_size is not None:
-        raise OptionError(f"cells={cells!r} and cell_size={cell_size!r}: give one of them")
+        raise OptionError(f"cells={cells!r} and cell_size={cell_size!r}: pass only one of them")
     if cell_size is None:
         edge = longest / as_count(DEFAULT_CELLS if cells is None else cells, "cells", 1, 1_000_000)
     else:
         edge = as_positive(cell_size, "cell_size", "m")
         if edge > 2.0 * longest:
-            raise OptionError(f"cell_size is {edge:g} m, and the surface is {longest:g} m long: take less")
+            raise OptionError(f"cell_size={edge:g} m, but the surface is only {longest:g} m long: reduce it")
     count = float(np.prod(np.ceil(size / edge) + 2.0))
-    if count > MOST_CELLS:
+    if count > MAX_CELLS:
         raise OptionError(
-            f"of cells of {edge:.4g} m {count:.3g} fill the box round the surface, which takes about "
-            f"{count * BYTES_PER_CELL / 2**30:,.1f} GiB: stay below {MOST_CELLS:,}"
+            f"{count:.3g} cells of {edge:.4g} m fill the bounding box of the surface and need about "
+            f"{count * BYTES_PER_CELL / 2**30:,.1f} GiB: use at most {MAX_CELLS:,}, that is, larger cells"
         )
     return edge

@@ -1,4 +1,4 @@
-"""Which of many things hang together."""
+"""Connected components."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ Ints = NDArray[np.int64]
 
 
 def components(count: int, pairs: Ints) -> Ints:
-    """A number from 0 on for each of `count` things, alike where `pairs` (k, 2) lead from one to the other.
+    """Component of each of `count` elements, numbered from 0; `pairs` (k, 2) connect elements.
 
-    Numbers follow the first thing of each component.
+    Components are numbered in the order of their first elements.
     """
     root = np.arange(count)
     while True:
         a, b = root[pairs[:, 0]], root[pairs[:, 1]]
-        apart = a != b
-        if not apart.any():
+        differs = a != b
+        if not differs.any():
             return np.unique(root, return_inverse=True)[1].reshape(-1)
-        pairs = pairs[apart]
-        np.minimum.at(root, np.maximum(a, b)[apart], np.minimum(a, b)[apart])
+        pairs = pairs[differs]
+        np.minimum.at(root, np.maximum(a, b)[differs], np.minimum(a, b)[differs])
         while (root != root[root]).any():
             root = root[root]
 
 
 def parts_of(fill: NDArray[np.float64]) -> Ints:
-    """The part that each voxel belongs to, -1 where it is empty: voxels that touch, if at a corner only."""
+    """Component of each voxel, -1 if it is empty. Voxels that touch at a corner are connected."""
     is_full = fill > 0.0
-    # Voxels in a row along the last axis hang together: there are far fewer rows than voxels.
+    # Runs of voxels along the last axis are connected, and there are far fewer runs than voxels.
     begins = is_full.copy()
     begins[..., 1:] &= ~is_full[..., :-1]
     row = np.cumsum(begins.ravel()).reshape(fill.shape) - 1
     pairs = []
     steps = np.argwhere(np.ones((3, 3, 3))) - 1
-    for step in steps[15:]:  # half of the neighbours: the others look back, and one is in the same row
+    for step in steps[15:]:  # half of the neighbours, by symmetry; one more is in the same run
         here = tuple(slice(max(0, -s), fill.shape[k] - max(0, s)) for k, s in enumerate(step))
         there = tuple(slice(max(0, s), fill.shape[k] - max(0, -s)) for k, s in enumerate(step))
         both = is_full[here] & is_full[there]

@@ -1,10 +1,11 @@
-"""A body-centred lattice whose cubes are halved where the solid asks for it.
+"""A body-centred lattice with cubes halved where the solid needs it.
 
 Cubes that share a face or an edge are equal, or one is twice as long as the other. As in the lattice of equal
-cubes the vertices are corners and centres of cubes, and a tetrahedron has the centres of two equal neighbours
-and an edge of the face between them. Where the edge has a vertex in its middle, there are two tetrahedra. A
-face between a cube and four small ones is eight triangles, each with the centres on both sides. (Labelle and
-Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45 and 120 degrees.
+cubes, the vertices are corners and centres of cubes, and a tetrahedron has the centres of two equal
+neighbours and an edge of the face between them. Where the edge has a vertex in its middle, there are two
+tetrahedra. A face between a cube and four small ones consists of eight triangles, each joined to the centres
+on both sides. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45
+and 120 degrees.
 """
 
 from __future__ import annotations
@@ -22,20 +23,20 @@ Bools = NDArray[np.bool_]
 Kind = TypeVar("Kind", bound=np.generic)
 
 SECTORS = ((0, 1), (0, 0), (1, 1), (1, 0))
-"""Of a face, between its middle and one of its edges: which of the two other axes leads there, and whether
-forwards. The order is that of `Lattice.tet_at`."""
+"""Sectors of a face between its centre and one of its edges: which of the two other axes leads there, and
+True for forwards. The order is that of `Lattice.tet_at`."""
 
 
 class GradedLattice:
-    """Looks to those who mark and fit as a `Lattice` does. A tetrahedron's number says nothing."""
+    """A lattice with the interface of `Lattice`. A tetrahedron's number does not encode its position."""
 
     def __init__(self, coarse: Lattice, splits: list[Bools]) -> None:
         """Halve cubes of a lattice.
 
         Args:
-            coarse: of equal cubes.
-            splits: for each octave which cubes of the one before are halved, of the shape of all its cubes,
-                (nx, ny, nz), then (2 nx, 2 ny, 2 nz), ...; `balanced`.
+            coarse: lattice of equal cubes.
+            splits: for each octave, True for cubes of the one before that are halved, of the shape of all its
+                cubes, (nx, ny, nz), then (2 nx, 2 ny, 2 nz), ...; `balanced`.
         """
         self.origin, self.edge = coarse.origin, coarse.edge
         self.octaves = len(splits)
@@ -53,7 +54,7 @@ class GradedLattice:
             if split is not None:
                 exists = doubled(split)
         self._splits = [*splits, np.zeros(self._leaves[-1].shape, dtype=np.bool_)]
-        # Places in whole numbers: a cube of the last octave is two long.
+        # Integer coordinates: a cube of the last octave is two units long.
         self._shape = tuple(2 * n + 1 for n in self._leaves[-1].shape)
         self._unit = coarse.edge / 2 ** (self.octaves + 1)
         self._table = np.full((starts[-1], 3, 2, 4, 2), -1)
@@ -80,14 +81,14 @@ class GradedLattice:
         return np.arange(self._count)
 
     def tet_at(self, points: FloatArray) -> Ints:
-        """Number of the tetrahedron that holds each point within the inner cubes, (k,)."""
+        """Number of the tetrahedron that contains each point within the inner cubes, (k,)."""
         found = np.full(len(points), -1)
         for level in range(self.octaves + 1):
-            places = (points - self.origin) / (self.edge / 2**level)
-            cube = places.astype(np.int64)
+            coordinates = (points - self.origin) / (self.edge / 2**level)
+            cube = coordinates.astype(np.int64)
             leaf = self._numbers[level][tuple(cube.T)]
             rows = np.flatnonzero(leaf >= 0)
-            offset = (places - cube - 0.5)[rows]
+            offset = (coordinates - cube - 0.5)[rows]
             axis = np.argmax(np.abs(offset), axis=1)
             every = np.arange(len(rows))
             u, v = offset[every, (axis + 1) % 3], offset[every, (axis + 2) % 3]
@@ -99,27 +100,27 @@ class GradedLattice:
         return found
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), of positive volume."""
+        """Lattice vertices of tetrahedra, (k, 4), in the order of positive volume."""
         return np.asarray(self._all[numbers])
 
     def points_of(self, vertices: Ints) -> FloatArray:
-        """Where lattice vertices are, (k, 3) [m]."""
-        places = np.stack(np.unravel_index(vertices, self._shape), axis=1)
-        return np.asarray(self.origin + self._unit * places)
+        """Positions of lattice vertices, (k, 3) [m]."""
+        coordinates = np.stack(np.unravel_index(vertices, self._shape), axis=1)
+        return np.asarray(self.origin + self._unit * coordinates)
 
     def volumes_of(self, numbers: Ints) -> FloatArray:
-        """[m^3], (k,)."""
+        """Volumes of tetrahedra, (k,) [m^3]."""
         return np.asarray(self._volumes[numbers])
 
     def octaves_of(self, numbers: Ints) -> Ints:
-        """How often the cubes were halved whose edges are as long as those of tetrahedra, (k,)."""
+        """Number of halvings of the cubes whose edges are as long as those of the tetrahedra, (k,)."""
         return np.asarray(self._level[numbers])
 
-    def _vertex(self, places: Ints) -> Ints:
-        return np.asarray(np.ravel_multi_index(tuple(places.T), self._shape))
+    def _vertex(self, coordinates: Ints) -> Ints:
+        return np.asarray(np.ravel_multi_index(tuple(coordinates.T), self._shape))
 
     def _add(self, corners: list[Ints], level: int) -> Ints:
-        """Tetrahedra of four lists of places. Returns: their numbers."""
+        """Add tetrahedra whose corners are given by four lists of coordinates. Returns their numbers."""
         numbers = np.arange(len(corners[0])) + self._count
         self._corners.append(np.stack([self._vertex(each) for each in corners], axis=1))
         self._levels.append(np.full(len(numbers), level))
@@ -127,32 +128,32 @@ class GradedLattice:
         return numbers
 
     def _fill_between_equals(self, level: int, axis: int) -> None:
-        """Round the edges of faces between two cubes of one octave."""
+        """Add the tetrahedra around faces between two cubes of one octave."""
         leaf, size = self._leaves[level], 2 ** (self.octaves - level)
         here, there = _pairs(leaf, leaf, axis)
         low, high = self._numbers[level][tuple(here.T)], self._numbers[level][tuple(there.T)]
         others = ((axis + 1) % 3, (axis + 2) % 3)
         for sector, (which, forwards) in enumerate(SECTORS):
             across, along = others[which], others[1 - which]
-            start = there.copy()  # of the edge, in cubes
+            start = there.copy()  # start of the edge, in cubes
             start[:, across] += forwards
             step = np.eye(3, dtype=np.int64)[along] * size
             has_middle = self._has_middle(level, start, along)
             centers = [size * (2 * here + 1), size * (2 * there + 1)]
             begin = 2 * size * start
-            whole, parted = ~has_middle, has_middle
+            undivided, divided = ~has_middle, has_middle
             for rows, ends, halves, octave in (
-                (whole, (begin, begin + 2 * step), (0, 1), level),
-                (parted, (begin, begin + step), (0,), level + 1),
-                (parted, (begin + step, begin + 2 * step), (1,), level + 1),
+                (undivided, (begin, begin + 2 * step), (0, 1), level),
+                (divided, (begin, begin + step), (0,), level + 1),
+                (divided, (begin + step, begin + 2 * step), (1,), level + 1),
             ):
-                made = self._add([each[rows] for each in (*centers, *ends)], octave)
+                added = self._add([each[rows] for each in (*centers, *ends)], octave)
                 for half in halves:
-                    self._table[low[rows], axis, 1, sector, half] = made
-                    self._table[high[rows], axis, 0, sector, half] = made
+                    self._table[low[rows], axis, 1, sector, half] = added
+                    self._table[high[rows], axis, 0, sector, half] = added
 
     def _has_middle(self, level: int, start: Ints, along: int) -> Bools:
-        """Whether one of the four cubes round each edge, from its lowest corner on, is halved."""
+        """True for edges, starting at their lowest corner, if one of the four cubes around them is halved."""
         split = self._splits[level]
         others = [k for k in range(3) if k != along]
         found = np.zeros(len(start), dtype=np.bool_)
@@ -166,39 +167,41 @@ class GradedLattice:
         return found
 
     def _fill_between_unequals(self, level: int, axis: int, side: int) -> None:
-        """On both sides of faces between a cube and four of half its length, which lie ahead where `side`
-        is 1."""
+        """Add the tetrahedra on both sides of faces between a cube and four of half its length.
+
+        The small cubes lie ahead if `side` is 1.
+        """
         size = 2 ** (self.octaves - level)
         pairs = _pairs(self._leaves[level], self._splits[level], axis)
         large, parent = pairs if side else _pairs(self._splits[level], self._leaves[level], axis)[::-1]
         others = ((axis + 1) % 3, (axis + 2) % 3)
         large_number = self._numbers[level][tuple(large.T)]
         middle = size * (2 * large + 1)
-        middle[:, axis] += size if side else -size  # of the face
-        for ways in ((0, 0), (0, 1), (1, 0), (1, 1)):  # each small cube, from the face's middle
+        middle[:, axis] += size if side else -size  # centre of the face
+        for directions in ((0, 0), (0, 1), (1, 0), (1, 1)):  # each small cube, from the centre of the face
             small = 2 * parent
             small[:, axis] += 1 - side
             opposite = middle.copy()
-            for other, way in zip(others, ways, strict=True):
-                small[:, other] += way
-                opposite[:, other] += size if way else -size
+            for other, direction in zip(others, directions, strict=True):
+                small[:, other] += direction
+                opposite[:, other] += size if direction else -size
             number = self._numbers[level + 1][tuple(small.T)]
-            for which in (0, 1):  # over which axis the triangle leads from the middle to the corner
+            for which in (0, 1):  # axis from the centre to the triangle's corner
                 corner = middle.copy()
                 corner[:, others[which]] = opposite[:, others[which]]
                 triangle = [middle, corner, opposite]
-                outer = SECTORS.index((which, ways[which]))
-                inner = SECTORS.index((1 - which, 1 - ways[1 - which]))
-                made = self._add([size * (2 * large + 1), *triangle], level + 1)
-                self._table[large_number, axis, side, outer, ways[1 - which]] = made
-                made = self._add([(size // 2) * (2 * small + 1), *triangle], level + 1)
+                outer = SECTORS.index((which, directions[which]))
+                inner = SECTORS.index((1 - which, 1 - directions[1 - which]))
+                added = self._add([size * (2 * large + 1), *triangle], level + 1)
+                self._table[large_number, axis, side, outer, directions[1 - which]] = added
+                added = self._add([(size // 2) * (2 * small + 1), *triangle], level + 1)
                 for sector in (outer, inner):
                     for half in (0, 1):
-                        self._table[number, axis, 1 - side, sector, half] = made
+                        self._table[number, axis, 1 - side, sector, half] = added
 
 
 def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
-    """Neighbours along an axis of which the lower is in one set and the upper in another, (k, 3) each."""
+    """Neighbours along an axis, the lower one in `low` and the upper one in `high`, (k, 3) each."""
     ahead = np.moveaxis(high, axis, 0)[1:]
     both = np.moveaxis(np.moveaxis(low, axis, 0)[:-1] & ahead, 0, axis)
     here = np.argwhere(both)
@@ -208,20 +211,20 @@ def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
 
 
 def doubled(cubes: NDArray[Kind], octaves: int = 1) -> NDArray[Kind]:
-    """What holds for cubes, for the eight halves of each, or the halves of these, ..."""
+    """Copy the value of each cube to its eight halves, and on to the halves of these for more octaves."""
     for axis in range(3):
         cubes = cubes.repeat(2**octaves, axis=axis)
     return cubes
 
 
 def halved(cubes: Bools) -> Bools:
-    """Which cubes have one of some cubes of half the length."""
+    """True for cubes of twice the length that contain one of `cubes`."""
     nx, ny, nz = (n // 2 for n in cubes.shape)
     return np.asarray(cubes.reshape(nx, 2, ny, 2, nz, 2).any(axis=(1, 3, 5)))
 
 
 def around(cubes: Bools) -> Bools:
-    """With all cubes that touch them."""
+    """Add all cubes that touch `cubes`."""
     for axis in range(3):
         moved = np.moveaxis(cubes.copy(), axis, 0)
         still = np.moveaxis(cubes, axis, 0)
@@ -232,7 +235,7 @@ def around(cubes: Bools) -> Bools:
 
 
 def balanced(splits: list[Bools]) -> list[Bools]:
-    """With more cubes halved, so that cubes that touch differ by one octave at most."""
+    """Halve more cubes, so that cubes that touch differ by one octave at most."""
     found = list(splits)
     for octave in range(len(found) - 1, 0, -1):
         found[octave - 1] = found[octave - 1] | halved(around(found[octave]))

@@ -1,8 +1,9 @@
-"""The hull of an artist's mesh: some points on it, and triangles between them, that stand for it in contact.
+"""The hull of an artist's mesh: points on it with triangles between them, which represent it in contact.
 
-The surface is cut into patches, the vertices of one cell of a grid that face the same way, and each patch has
-one point: the vertex that stands out most. So tips and the two sides of a sheet stay, all points lie on the
-surface, and what passes between them passes a small part of their distance under it.
+The surface is divided into patches: the vertices of one cell of a grid that face the same direction. Each
+patch has one point, its most prominent vertex. Tips and the two sides of a sheet are therefore kept, and all
+points lie on the surface. Objects that pass between the points penetrate by a small fraction of the points'
+distance.
 """
 
 from __future__ import annotations
@@ -23,29 +24,29 @@ from taichi_soft.meshing.surfaces import read_surfaces
 
 Ints = NDArray[np.int64]
 
-FEWEST, MOST = 12, 20_000
-"""Points of a hull."""
+MIN_POINTS, MAX_POINTS = 12, 20_000
+"""Range of the number of points of a hull."""
 
-ENOUGH = 2.0
-"""Points over the outer vertices of the tetrahedra. With as many as these, what is round sinks in by 2 % of
-its size."""
+POINTS_PER_VERTEX = 2.0
+"""Default number of points over the outer vertices of the tetrahedra. Round shapes then penetrate by 2 % of
+their size."""
 
 VOXELS = 64
-"""Along the longest side, by which it is told where the inside is."""
+"""Voxels along the longest side, by which the inside is found."""
 
 STEPS = 1.0, 2.0, 3.0
-"""Voxels before and behind a triangle of which the mean tells: where some triangles face the wrong way, not
-every voxel is right."""
+"""Distances before and behind a triangle, in voxels, over which the fill is averaged: where some triangles
+face the wrong way, single voxels can be wrong."""
 
-INNER, CLEARLY = 0.95, 0.25
-"""Mean from which all there counts as inside; and by how much more of what is before a triangle than of what
-is behind it must be inside for the triangle to be turned round."""
+INNER, FLIP_MARGIN = 0.95, 0.25
+"""Mean fill above which both sides of a triangle count as inside; excess of the fill before a triangle over
+that behind it above which the triangle is flipped."""
 
 DIRECTIONS = 0.5
-"""Directions in which the farthest vertex is a point of the hull, over the number of points."""
+"""Number of directions in which the farthest vertex becomes a point, relative to the number of points."""
 
 HALVINGS = 14
-"""Of the interval in which the edge of a cell is looked for."""
+"""Bisection steps of the search for the cell size."""
 
 
 @serialised("points", "triangles")
@@ -55,8 +56,8 @@ class Hull:
 
     Args:
         points: (h, 3) [m].
-        triangles: (t, 3), of the points. A point may belong to none.
-    Raises: MeshError for arrays that are none of this.
+        triangles: (t, 3), indices of points. A point need not belong to a triangle.
+    Raises: MeshError for invalid arrays.
     """
 
     points: FloatArray
@@ -66,108 +67,108 @@ class Hull:
         points = as_points(self.points)
         corners = as_indices(self.triangles, "triangles", 3, len(points), "triangle", may_repeat=False)
         if not np.ptp(points[corners].reshape(-1, 3), axis=0).max() > 0.0:
-            raise MeshError("hull has no extent: the corners of its triangles all lie in one place")
+            raise MeshError("hull has no extent: the corners of its triangles all coincide")
         object.__setattr__(self, "points", read_only(points))
         object.__setattr__(self, "triangles", read_only(corners.astype(np.int32)))
 
 
-def as_hull(wanted: Any, surfaces: tuple[Surface, ...], outer: int) -> Hull | None:
-    """The hull that `SoftBodyAsset` is asked for, of the surfaces that it carries.
+def as_hull(request: Any, surfaces: tuple[Surface, ...], outer: int) -> Hull | None:
+    """Return the hull for the argument `hull` of `SoftBodyAsset`.
 
     Args:
-        wanted: None, True, a number of points, a surface as `read_surfaces` takes it, or a hull.
-        outer: vertices on the surface of its tetrahedra, by which True chooses the number.
+        request: None, True, a number of points, a surface as for `read_surfaces`, or a hull.
+        surfaces: skin of the asset.
+        outer: number of vertices on the surface of the tetrahedra, from which True derives the number of
+            points.
     Raises: OptionError for a number out of range, or without surfaces; MeshError for a bad surface.
     """
-    if wanted is None or isinstance(wanted, Hull):
-        return wanted
-    if wanted is True:
-        wanted = min(max(round(ENOUGH * outer), FEWEST), MOST)
-    if isinstance(wanted, (bool, int, float, np.number)):
+    if request is None or isinstance(request, Hull):
+        return request
+    if request is True:
+        request = min(max(round(POINTS_PER_VERTEX * outer), MIN_POINTS), MAX_POINTS)
+    if isinstance(request, (bool, int, float, np.number)):
         if not surfaces:
             raise OptionError(
-                f"hull is {wanted}, and there is no skin to take the points from: give a skin, or a surface "
-                "as hull"
+                f"hull={request!r} takes its points from the skin, but there is no skin: pass one, or a "
+                "surface as hull"
             )
-        return hull_of(surfaces, wanted)
-    points, triangles = joined(read_surfaces(wanted))
-    if len(points) > MOST:
-        raise OptionError(f"hull has {len(points):,} vertices: at most {MOST:,}, or give a number")
+        return hull_of(surfaces, request)
+    points, triangles = joined(read_surfaces(request))
+    if len(points) > MAX_POINTS:
+        raise OptionError(f"hull has {len(points):,} vertices: pass at most {MAX_POINTS:,}, or a number")
     return Hull(points, triangles.astype(np.int32))
 
 
 def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
-    """A hull of at most `count` points.
+    """Make a hull of at most `count` points.
 
     Raises: OptionError for a number out of range; MeshError for a surface without extent.
     """
-    most = as_count(count, "hull", FEWEST, MOST)
+    max_points = as_count(count, "hull", MIN_POINTS, MAX_POINTS)
     vertices, triangles = _outward(*joined(surfaces))
     edges = vertices[triangles[:, 1:]] - vertices[triangles[:, :1]]
     area = 0.5 * float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum())
     if not area > 0.0:
         raise MeshError("the surface has no area to make a hull of")
-    cell = np.sqrt(area / most)  # of about as many patches, were it flat
-    vertices, triangles = _divided(vertices, triangles, 0.5 * cell)
-    normals, tips = _normals(vertices, triangles), _tips(vertices, round(DIRECTIONS * most))
+    cell = np.sqrt(area / max_points)  # a flat surface would have about as many patches
+    vertices, triangles = _subdivided(vertices, triangles, 0.5 * cell)
+    normals, tips = _normals(vertices, triangles), _tips(vertices, round(DIRECTIONS * max_points))
     low, high = 0.5 * cell, max(8.0 * cell, 1.1 * float(np.ptp(vertices, axis=0).max()))
     for _ in range(HALVINGS):
         middle = np.sqrt(low * high)
-        if len(_chosen(vertices, normals, tips, middle)[0]) <= most:
+        if len(_chosen(vertices, normals, tips, middle)[0]) <= max_points:
             high = middle
         else:
             low = middle
     chosen, patch = _chosen(vertices, normals, tips, high)
     corners = _nearest(vertices, triangles, chosen, patch)[triangles]
-    return Hull(vertices[chosen], _without_fins(_between(corners)).astype(np.int32))
+    return Hull(vertices[chosen], _without_fins(_distinct_triangles(corners)).astype(np.int32))
 
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
-    """Which of the chosen vertices is nearest to each, along edges, (n,); or that of its patch, where no
-    edges lead to one.
+    """Index of the chosen vertex nearest to each vertex along edges, (n,); without a path, that of its patch.
 
-    Triangles between these lie round their corners. Those between patches fold over where a patch has its
-    point at the rim.
+    Triangles between these nearest vertices surround their corners. Triangles between patches would fold over
+    where a patch has its point at the rim.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
     owner, distance = patch.copy(), np.full(len(vertices), np.inf)
     owner[chosen], distance[chosen] = np.arange(len(chosen)), 0.0
-    is_open = True
-    while is_open:  # rounds of Bellman and Ford
-        way = distance[edges[:, 0]] + lengths
-        order = np.lexsort((owner[edges[:, 0]], way, edges[:, 1]))
+    is_changing = True
+    while is_changing:  # Bellman-Ford iterations
+        path_length = distance[edges[:, 0]] + lengths
+        order = np.lexsort((owner[edges[:, 0]], path_length, edges[:, 1]))
         ends = edges[order, 1]
         first = order[np.r_[True, ends[1:] != ends[:-1]]]
-        first = first[way[first] < distance[edges[first, 1]]]
-        is_open = len(first) > 0
-        distance[edges[first, 1]] = way[first]
+        first = first[path_length[first] < distance[edges[first, 1]]]
+        is_changing = len(first) > 0
+        distance[edges[first, 1]] = path_length[first]
         owner[edges[first, 1]] = owner[edges[first, 0]]
     return np.asarray(owner, dtype=np.int64)
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
-    """Vertices that stand for patches of a size [m], and behind them the other tips; patch of each vertex."""
+    """Representatives of patches of a size [m], then the other tips, and the patch of each vertex."""
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)
-    leaders = _leaders(vertices, normals, tips, patch, len(patches))
-    others = np.setdiff1d(np.flatnonzero(tips), leaders)
-    return np.concatenate([leaders, others]), patch
+    representatives = _representatives(vertices, normals, tips, patch, len(patches))
+    others = np.setdiff1d(np.flatnonzero(tips), representatives)
+    return np.concatenate([representatives, others]), patch
 
 
 def _outward(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
-    """Vertices that are one where they lie in one place, and triangles turned so that they face outward,
-    without those that have the inside on both sides."""
-    places, numbers = np.unique(vertices, axis=0, return_inverse=True)
+    """Merge coincident vertices, turn triangles outwards, and drop those with the inside on both sides."""
+    positions, numbers = np.unique(vertices, axis=0, return_inverse=True)
     corners = numbers.reshape(-1)[triangles]
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     corners = corners[~is_flat]
     if not len(corners):
         raise MeshError("the surface has no area to make a hull of")
-    spacing = float(np.ptp(places[corners].reshape(-1, 3), axis=0).max()) / VOXELS
-    solid = solid_of(places, corners, spacing)
-    x = places[corners]
+    spacing = float(np.ptp(positions[corners].reshape(-1, 3), axis=0).max()) / VOXELS
+    solid = solid_of(positions, corners, spacing)
+    x = positions[corners]
     normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
@@ -183,15 +184,15 @@ def _outward(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
         np.mean([inside(middles + sign * step * spacing * normals) for step in STEPS], axis=0)
         for sign in (1.0, -1.0)
     )
-    turned = np.where((before > behind + CLEARLY)[:, None], corners[:, ::-1], corners)
+    oriented = np.where((before > behind + FLIP_MARGIN)[:, None], corners[:, ::-1], corners)
     is_outer = np.minimum(before, behind) < INNER
-    used, numbers = np.unique(turned[is_outer] if is_outer.any() else turned, return_inverse=True)
-    return places[used], numbers.reshape(-1, 3)
+    used, numbers = np.unique(oriented[is_outer] if is_outer.any() else oriented, return_inverse=True)
+    return positions[used], numbers.reshape(-1, 3)
 
 
-def _divided(vertices: FloatArray, triangles: Ints, longest: float) -> tuple[FloatArray, Ints]:
-    """The same surface with no edge over `longest` [m]."""
-    from trimesh.remesh import subdivide_to_size  # half a second that a game need not wait for
+def _subdivided(vertices: FloatArray, triangles: Ints, longest: float) -> tuple[FloatArray, Ints]:
+    """Subdivide the surface until no edge is longer than `longest` [m]."""
+    from trimesh.remesh import subdivide_to_size  # slow to import, and games do not need it
 
     x = vertices[triangles]
     most = float(np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max())
@@ -204,7 +205,7 @@ def _divided(vertices: FloatArray, triangles: Ints, longest: float) -> tuple[Flo
 
 
 def _normals(vertices: FloatArray, triangles: Ints) -> FloatArray:
-    """Means of those of the triangles round each vertex, by area, (n, 3); 0 where there are none."""
+    """Area-weighted vertex normals, (n, 3); 0 for vertices without triangles."""
     x = vertices[triangles]
     areas = np.repeat(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), 3, axis=0)
     sums = [np.bincount(triangles.ravel(), areas[:, k], len(vertices)) for k in range(3)]
@@ -214,27 +215,26 @@ def _normals(vertices: FloatArray, triangles: Ints) -> FloatArray:
 
 
 def _patches(vertices: FloatArray, normals: FloatArray, cell: float) -> Ints:
-    """A number of the patch of each vertex: its cell, and which of six ways it faces."""
-    places = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
+    """Patch of each vertex: its cell, and which of six directions it faces."""
+    cells = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
     axis = np.abs(normals).argmax(axis=1)
-    way = 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
-    size = places.max(axis=0) + 1
-    return np.asarray(np.ravel_multi_index((*places.T, way), (*size, 6)), dtype=np.int64)
+    direction = 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
+    size = cells.max(axis=0) + 1
+    return np.asarray(np.ravel_multi_index((*cells.T, direction), (*size, 6)), dtype=np.int64)
 
 
 def _tips(vertices: FloatArray, count: int) -> Ints:
-    """In how many of so many even directions each vertex is the farthest, (n,)."""
+    """Number of directions, of `count` even ones, in which each vertex is the farthest, (n,)."""
     number = np.arange(count) + 0.5
-    height, turn = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
+    height, angle = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
     radius = np.sqrt(1.0 - height**2)
-    directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+    directions = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
     farthest = [int((vertices @ direction).argmax()) for direction in directions]
     return np.bincount(farthest, minlength=len(vertices))
 
 
-def _leaders(vertices: FloatArray, normals: FloatArray, tips: Ints, patch: Ints, count: int) -> Ints:
-    """The vertex of each patch that is a tip in most directions; or, where none is, the farthest along the
-    mean of the normals there."""
+def _representatives(vertices: FloatArray, normals: FloatArray, tips: Ints, patch: Ints, count: int) -> Ints:
+    """Vertex of each patch that is the farthest in most directions, else along the patch's mean normal."""
     means = np.stack([np.bincount(patch, normals[:, k], count) for k in range(3)], axis=1)
     height = np.einsum("nk,nk->n", vertices, means[patch])
     order = np.lexsort((np.arange(len(patch)), -height, -tips, patch))
@@ -242,8 +242,8 @@ def _leaders(vertices: FloatArray, normals: FloatArray, tips: Ints, patch: Ints,
     return order[first]
 
 
-def _between(corners: Ints) -> Ints:
-    """Triangles with three different corners, each once."""
+def _distinct_triangles(corners: Ints) -> Ints:
+    """Remove degenerate triangles and duplicates."""
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     corners = corners[~is_flat]
     lead = corners.argmin(axis=1)
@@ -252,7 +252,7 @@ def _between(corners: Ints) -> Ints:
 
 
 def _without_fins(triangles: Ints) -> Ints:
-    """Without pairs of the same corners that face opposite ways: they enclose nothing."""
+    """Remove pairs of triangles with the same corners that face opposite directions: they enclose nothing."""
     corners = np.sort(triangles, axis=1)
     _, number, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
     is_single = count[number.reshape(-1)] == 1

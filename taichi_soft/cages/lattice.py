@@ -19,26 +19,26 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Cubes round a solid, with one more on each side. A tetrahedron's number says where it is."""
+    """Cubes around a solid, with one more layer on each side. A tetrahedron's number encodes its position."""
 
     origin: FloatArray  # (3,), corner of the first cube [m]
-    edge: float  # of a cube [m]
+    edge: float  # edge of a cube [m]
     cubes: tuple[int, int, int]
 
     @classmethod
-    def round(cls, low: FloatArray, high: FloatArray, edge: float) -> Lattice:
-        """About the middle of a box."""
+    def around_box(cls, low: FloatArray, high: FloatArray, edge: float) -> Lattice:
+        """Make a lattice that is centred on a box."""
         inner = np.maximum(np.ceil((high - low) / edge - 1e-9).astype(np.int64), 1)
         origin = 0.5 * (low + high) - 0.5 * edge * inner - edge
         nx, ny, nz = (int(n) + 2 for n in inner)
         return cls(origin, edge, (nx, ny, nz))
 
     def volumes_of(self, numbers: Ints) -> FloatArray:
-        """[m^3], (k,), alike for all."""
+        """Volumes of tetrahedra, all equal, (k,) [m^3]."""
         return np.full(len(numbers), self.edge**3 / 12.0)
 
     def octaves_of(self, numbers: Ints) -> Ints:
-        """How often cubes were halved for each tetrahedron, (k,): never."""
+        """Number of halvings of the cubes for each tetrahedron, (k,): 0."""
         return np.zeros(len(numbers), dtype=np.int64)
 
     @property
@@ -50,20 +50,20 @@ class Lattice:
         return np.concatenate([numbers[axis][has_next[axis]].ravel() for axis in range(3)])
 
     def tet_at(self, points: FloatArray) -> Ints:
-        """Number of the tetrahedron that holds each point within the inner cubes, (k,)."""
-        places = (points - self.origin) / self.edge
-        cube = places.astype(np.int64)
-        offset = places - cube - 0.5
+        """Number of the tetrahedron that contains each point within the inner cubes, (k,)."""
+        coordinates = (points - self.origin) / self.edge
+        cube = coordinates.astype(np.int64)
+        offset = coordinates - cube - 0.5
         axis = np.argmax(np.abs(offset), axis=1)
         rows = np.arange(len(points))
-        cube[rows, axis] -= offset[rows, axis] < 0  # the lower of the two that share the face
+        cube[rows, axis] -= offset[rows, axis] < 0  # the lower of the two cubes that share the face
         u, v = offset[rows, (axis + 1) % 3], offset[rows, (axis + 2) % 3]
         side = np.where(np.abs(u) >= np.abs(v), (u < 0).astype(np.int64), 2 + (v < 0))
         face = axis * int(np.prod(self.cubes)) + np.ravel_multi_index(tuple(cube.T), self.cubes)
         return np.asarray(face * 4 + side)
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), of positive volume."""
+        """Lattice vertices of tetrahedra, (k, 4), in the order of positive volume."""
         total = int(np.prod(self.cubes))
         side, rest = numbers % 4, numbers // 4
         axis, flat = rest // total, rest % total
@@ -78,14 +78,19 @@ class Lattice:
         low[rows, along] += (side % 2) == 0
         high = low.copy()
         high[rows, other] += 1
-        # The edge runs the other way round on the other side of the face, and on its other pair of sides.
-        turn = ((side % 2) == 1) ^ (side >= 2)
+        # The edge is reversed on the other side of the face, and on its other pair of sides.
+        is_reversed = ((side % 2) == 1) ^ (side >= 2)
         a, b = self._corner(low), self._corner(high)
-        corners = [self._center(cube), self._center(across), np.where(turn, b, a), np.where(turn, a, b)]
+        corners = [
+            self._center(cube),
+            self._center(across),
+            np.where(is_reversed, b, a),
+            np.where(is_reversed, a, b),
+        ]
         return np.stack(corners, axis=1)
 
     def points_of(self, vertices: Ints) -> FloatArray:
-        """Where lattice vertices are, (k, 3) [m]."""
+        """Positions of lattice vertices, (k, 3) [m]."""
         shape = tuple(n + 1 for n in self.cubes)
         is_center = vertices >= np.prod(shape)
         corner = np.stack(np.unravel_index(np.where(is_center, 0, vertices), shape), axis=1)
@@ -94,8 +99,8 @@ class Lattice:
         )
         return self.origin + self.edge * np.where(is_center[:, None], center + 0.5, corner)
 
-    def _corner(self, places: Ints) -> Ints:
-        return np.asarray(np.ravel_multi_index(tuple(places.T), tuple(n + 1 for n in self.cubes)))
+    def _corner(self, coordinates: Ints) -> Ints:
+        return np.asarray(np.ravel_multi_index(tuple(coordinates.T), tuple(n + 1 for n in self.cubes)))
 
     def _center(self, cubes: Ints) -> Ints:
         corners = int(np.prod([n + 1 for n in self.cubes]))

@@ -1,4 +1,4 @@
-"""Which tetrahedra of the lattice carry a solid."""
+"""Select the tetrahedra of a lattice that cover a solid."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from taichi_soft.meshing.topology import shared_faces
 
 Ints = NDArray[np.int64]
 
-HALF = 0.4
-"""Part of a tetrahedron within the solid from which on it is taken: a little more is taken than is left out,
-as a vertex is more easily moved inwards."""
+MIN_FILL = 0.4
+"""Fraction of a tetrahedron inside the solid above which it is selected. It is below one half because
+vertices move inwards more easily."""
 
 TRACE = 0.02
-"""The same, where the solid would be lost otherwise: limbs and sheets thinner than a cube."""
+"""The same where the solid would otherwise be missed: limbs and sheets thinner than a cube."""
 
 LAYER = 2
-"""Tetrahedra, face by face, that a flat layer has at most."""
+"""Largest thickness of a flat layer, in tetrahedra from face to face."""
 
-CRUMB = 2
-"""Tetrahedra that may fall off."""
+MAX_FRAGMENT = 2
+"""Largest number of tetrahedra in a fragment that can be dropped."""
 
 ROUNDS = 3
-"""In which tetrahedra are added where others hang together at an edge or a vertex only."""
+"""Rounds that add tetrahedra where others are connected only by an edge or a vertex."""
 
 
 def mark(
@@ -36,43 +36,45 @@ def mark(
     volumes: FloatArray,
     kept: NDArray[np.bool_] | None = None,
 ) -> Ints:
-    """Numbers of the tetrahedra to take, ascending.
+    """Return the numbers of the selected tetrahedra, ascending.
 
     Args:
-        points: that stand for one connected solid, (k, 3) [m].
-        volumes: of each, (k,) [m^3].
-        kept: those that are not to be lost, however thin the solid is there, (k,).
+        points: points that represent one connected solid, (k, 3) [m].
+        volumes: volume of each, (k,) [m^3].
+        kept: True for points that must be covered, however thin the solid is there, (k,).
     """
     at = lattice.tet_at(points)
     numbers, place = np.unique(at, return_inverse=True)
-    share = np.bincount(place.reshape(-1), volumes) / lattice.volumes_of(numbers)
-    trace = min(TRACE, 0.5 * float(share.max()))
+    fill = np.bincount(place.reshape(-1), volumes) / lattice.volumes_of(numbers)
+    trace = min(TRACE, 0.5 * float(fill.max()))
     if kept is not None:
-        share[place.reshape(-1)[kept]] = np.maximum(share[place.reshape(-1)[kept]], trace)
+        fill[place.reshape(-1)[kept]] = np.maximum(fill[place.reshape(-1)[kept]], trace)
     corners = lattice.corners_of(numbers)
-    taken = share >= HALF
+    selected = fill >= MIN_FILL
     while True:
-        lost = ~taken & (share >= trace) & ~np.isin(corners, corners[taken]).any(axis=1)
-        if not lost.any():
+        missed = ~selected & (fill >= trace) & ~np.isin(corners, corners[selected]).any(axis=1)
+        if not missed.any():
             break
-        # The fullest of those that touch come first; what they cover is lost no longer.
-        taken |= lost & (share >= 0.5 * _most_around(corners, np.where(lost, share, 0.0)))
-    if part_count(corners[taken]) > 1:
-        taken |= share >= trace
+        # First the fullest of those that touch: tetrahedra that they cover are no longer missed.
+        selected |= missed & (fill >= 0.5 * _max_around(corners, np.where(missed, fill, 0.0)))
+    if part_count(corners[selected]) > 1:
+        selected |= fill >= trace
     for _ in range(ROUNDS):
-        loose = _hinges(corners[taken])
-        added = ~taken & (share >= trace) & np.isin(corners, loose).any(axis=1)
+        hinges = _hinges(corners[selected])
+        added = ~selected & (fill >= trace) & np.isin(corners, hinges).any(axis=1)
         if not added.any():
             break
-        taken |= added
-    if part_count(corners[taken]) > 1:
-        taken |= share > 0.0
-    return _bridged(lattice, numbers[taken])
+        selected |= added
+    if part_count(corners[selected]) > 1:
+        selected |= fill > 0.0
+    return _bridged(lattice, numbers[selected])
 
 
 def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
-    """With tetrahedra that hold nothing, where parts meet at edges or vertices only: all in one part then,
-    unless parts do not meet at all."""
+    """Add empty tetrahedra where parts touch only at edges or vertices.
+
+    All parts are then connected, unless they do not touch at all.
+    """
     others, every = np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
     while True:
         tets = lattice.corners_of(numbers)
@@ -84,7 +86,7 @@ def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
         if len(every) == 0:
             others = np.setdiff1d(lattice.tets, numbers)
             every = lattice.corners_of(others)
-        # Those that touch most of the places where parts meet close the most gaps.
+        # Tetrahedra that touch most of the places where parts meet close the most gaps.
         meets = np.isin(every, vertices[counts > 1]).sum(axis=1)
         meets[np.isin(others, numbers)] = 0
         if not meets.any():
@@ -93,27 +95,29 @@ def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
 
 
 def part_count(tets: Ints) -> int:
-    """How many parts hang together by faces."""
+    """Number of parts that are connected by faces."""
     return int(components(len(tets), face_pairs(tets)).max(initial=-1)) + 1
 
 
-def _most_around(corners: Ints, share: FloatArray) -> FloatArray:
-    """The largest share of all tetrahedra that have a corner of each, (m,)."""
+def _max_around(corners: Ints, fill: FloatArray) -> FloatArray:
+    """Largest fill of the tetrahedra that share a vertex with each, (m,)."""
     used, local = np.unique(corners, return_inverse=True)
-    most = np.zeros(len(used))
+    largest = np.zeros(len(used))
     local = local.reshape(-1, 4)
-    np.maximum.at(most, local.ravel(), np.repeat(share, 4))
-    return np.asarray(most[local].max(axis=1))
+    np.maximum.at(largest, local.ravel(), np.repeat(fill, 4))
+    return np.asarray(largest[local].max(axis=1))
 
 
 def face_pairs(tets: Ints) -> Ints:
-    """Tetrahedra that share a face, (k, 2)."""
+    """Pairs of tetrahedra that share a face, (k, 2)."""
     return shared_faces(tets) // 4
 
 
 def _fans(tets: Ints) -> Ints:
-    """A number for each corner, (m, 4), alike for corners at the same vertex whose tetrahedra hang together
-    by faces at that vertex."""
+    """Fan of each corner, (m, 4).
+
+    Corners at one vertex belong to the same fan if faces at that vertex connect their tetrahedra.
+    """
     one, other = (shared_faces(tets) // 4).T
     pairs = []
     for k in range(4):
@@ -124,44 +128,45 @@ def _fans(tets: Ints) -> Ints:
 
 
 def _hinges(tets: Ints) -> Ints:
-    """Vertices about which tetrahedra hang together at an edge or at the vertex only."""
+    """Vertices at which tetrahedra are connected only by an edge or by the vertex."""
     fans = np.unique(np.stack([tets.ravel(), _fans(tets).ravel()], axis=1), axis=0)
     vertices, counts = np.unique(fans[:, 0], return_counts=True)
     return vertices[counts > 1]
 
 
 def split_hinges(tets: Ints) -> tuple[Ints, Ints]:
-    """One vertex for each fan: tetrahedra (m, 4) in new numbers, and the old number of each, (n,)."""
+    """Give each fan its own vertex. Returns tetrahedra (m, 4) and the old number of each vertex, (n,)."""
     fans = _fans(tets)
     numbers, first = np.unique(fans, return_index=True)
     return np.searchsorted(numbers, fans), tets.ravel()[first]
 
 
 def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What is left of tetrahedra when flat ones are taken off in a thin layer, (m,), all in one part.
+    """Remove flat tetrahedra in thin layers, keeping the rest connected. Returns True for those kept, (m,).
 
-    A crumb that falls off goes with them; where more would, those round it stay.
+    Small fragments that would fall off are removed too. Where larger ones would, the tetrahedra around them
+    stay.
     """
-    taken_off = _in_a_layer(tets, flat)
+    removed = _in_a_layer(tets, flat)
     pairs = face_pairs(tets)
     for _ in range(ROUNDS):
-        kept = ~taken_off
+        kept = ~removed
         parts = components(len(tets), pairs[kept[pairs].all(axis=1)])
         sizes = np.bincount(parts[kept], minlength=len(tets))
         is_main = parts == sizes.argmax()
-        is_crumb = kept & ~is_main & (sizes[parts] <= CRUMB)
-        torn = kept & ~is_crumb & ~is_main
+        is_fragment = kept & ~is_main & (sizes[parts] <= MAX_FRAGMENT)
+        torn = kept & ~is_fragment & ~is_main
         if not torn.any():
-            return np.asarray(kept & ~is_crumb)
-        taken_off &= ~np.isin(tets, tets[torn]).any(axis=1)
+            return np.asarray(kept & ~is_fragment)
+        removed &= ~np.isin(tets, tets[torn]).any(axis=1)
     return np.ones(len(tets), dtype=np.bool_)
 
 
 def _in_a_layer(tets: Ints, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Those of the chosen tetrahedra that lie in a thin layer, (m,).
+    """True for the chosen tetrahedra that lie in a thin layer, (m,).
 
-    In each of their groups that hangs together by faces, every one is at most `LAYER` steps from one that was
-    not chosen. A thin limb is no such group.
+    In a group of chosen tetrahedra that faces connect, every one must be at most `LAYER` steps from one that
+    is not chosen. A thin limb is not such a group.
     """
     pairs = face_pairs(tets)
     groups = components(len(tets), pairs[chosen[pairs].all(axis=1)])

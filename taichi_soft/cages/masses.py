@@ -1,4 +1,4 @@
-"""Masses of a cage's vertices that together weigh and turn as the solid does."""
+"""Masses of a cage's vertices with the mass and inertia of the solid."""
 
 from __future__ import annotations
 
@@ -7,54 +7,54 @@ import numpy as np
 from taichi_soft.core.residue import kept
 from taichi_soft.meshing.arrays import FloatArray
 
-LEAST = 0.5
-"""Of a vertex's share of the mass: lighter ones vibrate fast, and make the stable step shorter."""
+MIN_FRACTION = 0.5
+"""Smallest mass of a vertex over its lumped mass: light vertices vibrate fast and shorten the stable step."""
 
 ROUNDS = 50
 
 HALVINGS = 12
-"""Of a step that leaves more lacking."""
+"""Largest number of halvings of a step that does not reduce the residual."""
 
-CLOSE = 1e-9
-"""Of the mass: what the sums may lack."""
+TOLERANCE = 1e-9
+"""Tolerance of the sums, relative to the mass."""
 
 
 def fitted(
-    points: FloatArray, shares: FloatArray, mass: float, first: FloatArray, second: FloatArray
+    points: FloatArray, lumped: FloatArray, mass: float, first_moment: FloatArray, second_moment: FloatArray
 ) -> FloatArray:
-    """Positive masses (n,) nearest to `shares` (n,) whose sum and moments are those wanted, if there are.
+    """Positive masses (n,) closest to `lumped` (n,) with the given sum and moments, if they exist.
 
-    Without a change, a solid's mass lumped at vertices turns too heavily: a vertex is farther out than what
-    it stands for. The sum of squared changes, each over its share, is made as small as it can be.
+    Masses lumped at vertices have too much inertia, because a vertex lies farther out than the volume that it
+    represents. The solution minimises the sum of squared changes, each over its lumped mass.
 
     Args:
-        points: of the vertices, (n, 3) [m].
-        mass: wanted sum.
-        first: wanted sum of mass times position, (3,).
-        second: wanted sum of mass times position times position, (3, 3).
+        points: positions of the vertices, (n, 3) [m].
+        mass: required sum.
+        first_moment: required sum of mass times position, (3,).
+        second_moment: required sum of mass times position times position, (3, 3).
     """
-    center = first / mass
+    center = first_moment / mass
     size = float(np.abs(points - center).max())
     r = (points - center) / size
     rows, columns = np.triu_indices(3)
     equations = np.concatenate([np.ones((1, len(r))), r.T, (r[:, rows] * r[:, columns]).T])
-    about = second - mass * np.outer(center, center)
-    wanted = np.concatenate([[mass], np.zeros(3), about[rows, columns] / size**2])
-    shares = shares * (mass / shares.sum())
-    least = LEAST * shares
-    multipliers, masses = np.zeros(len(equations)), shares
-    lacking = wanted - equations @ masses
-    for _ in range(ROUNDS):  # Newton's method on the dual problem, whose gradient is what the sums lack
-        if np.abs(lacking).max() <= CLOSE * mass:
+    about = second_moment - mass * np.outer(center, center)
+    required = np.concatenate([[mass], np.zeros(3), about[rows, columns] / size**2])
+    lumped = lumped * (mass / lumped.sum())
+    smallest = MIN_FRACTION * lumped
+    multipliers, masses = np.zeros(len(equations)), lumped
+    residual = required - equations @ masses
+    for _ in range(ROUNDS):  # Newton's method on the dual problem, whose gradient is the residual of the sums
+        if np.abs(residual).max() <= TOLERANCE * mass:
             break
-        weighted = equations * np.where(masses > least, shares, 0.0)
-        step = np.linalg.lstsq(weighted @ equations.T, lacking, rcond=1e-10)[0]
-        for part in 0.5 ** np.arange(HALVINGS):
-            tried = np.maximum(shares * (1.0 + (multipliers + part * step) @ equations), least)
-            left = wanted - equations @ tried
-            if np.linalg.norm(left) < np.linalg.norm(lacking):
+        weighted = equations * np.where(masses > smallest, lumped, 0.0)
+        step = np.linalg.lstsq(weighted @ equations.T, residual, rcond=1e-10)[0]
+        for factor in 0.5 ** np.arange(HALVINGS):
+            tried = np.maximum(lumped * (1.0 + (multipliers + factor * step) @ equations), smallest)
+            new_residual = required - equations @ tried
+            if np.linalg.norm(new_residual) < np.linalg.norm(residual):
                 break
         else:
-            break  # there are no such masses: these come near
-        multipliers, masses, lacking = multipliers + part * step, tried, left
+            break  # there are no such masses: these are close
+        multipliers, masses, residual = multipliers + factor * step, tried, new_residual
     return kept(masses * (mass / masses.sum()))

@@ -1,6 +1,6 @@
-"""Tetrahedra by programs that others wrote, each in a process of its own.
+"""Run external meshers, each in its own process.
 
-They may crash or never end. Then there is an error, and nothing of them is left.
+A mesher can crash or never end. It then raises an error and leaves nothing behind.
 """
 
 from __future__ import annotations
@@ -24,65 +24,67 @@ from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
 
 Ints = NDArray[np.int64]
-Made = dict[str, NDArray[np.generic]]
+Arrays = dict[str, NDArray[np.generic]]
 
-TAKES = {
+ACCEPTS = {
     "tetgen": "closed surfaces that do not cross themselves",
     "ftetwild": "surfaces that enclose something",
 }
-"""By method: what it makes tetrahedra of."""
+"""Surfaces that each method accepts."""
 
 TIME_LIMIT = 120.0
-"""[s]."""
+"""Default time limit [s]."""
 
 GRACE = 3.0
-"""Beyond the time limit, after which a process ends by itself that nobody ends [s]."""
+"""Time after the limit at which a process ends if nobody has ended it [s]."""
 
 INSIDE = 0.5
-"""Winding number from which on a region is solid."""
+"""Winding number above which a region is solid."""
 
 
 def mesher_mesh(
     method: str, vertices: FloatArray, triangles: Ints, cell_size: float, time_limit: float = TIME_LIMIT
 ) -> TetMesh:
-    """Tetrahedra whose outer faces follow a surface, every one solid.
+    """Make solid tetrahedra whose outer faces follow a surface.
 
     Args:
-        method: one of `TAKES`.
-        vertices: of the surface, (n, 3) [m].
+        method: one of `ACCEPTS`.
+        vertices: vertices of the surface, (n, 3) [m].
         triangles: (m, 3).
-        cell_size: length that edges should have [m].
-        time_limit: after which the process is ended [s].
-    Raises: MissingExtraError without the method's package; MeshError where it makes nothing of the surface,
-        crashes or takes too long, with the method's own words.
+        cell_size: target length of the edges [m].
+        time_limit: time after which the process is killed [s].
+    Raises: MissingExtraError without the method's package; MeshError, with the method's own message, if it
+        fails, crashes or takes too long.
     """
     require_extra(method, f"method {method!r} needs")
     points, corners = welded(vertices, triangles)
     if len(corners) == 0:
         raise MeshError("the surface has no area: it encloses nothing")
-    # About 1 long and near 0: lengths that the programs take for equal are no part of the task.
+    # Size 1 near the origin, so that the programs' absolute tolerances do not matter.
     low, longest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     points = (points - low) / longest
-    made = _made(method, points, corners, cell_size / longest, time_limit)
+    arrays = _run_mesher(method, points, corners, cell_size / longest, time_limit)
     try:
-        tets, regions = made["tets"], made["regions"].reshape(-1)
-        tets = tets[_is_solid(made["vertices"], tets, regions, points[corners])]
+        tets, regions = arrays["tets"], arrays["regions"].reshape(-1)
+        tets = tets[_is_solid(arrays["vertices"], tets, regions, points[corners])]
         if len(tets) == 0:
             raise MeshError("there is nothing within the surface")
         used, numbers = np.unique(tets, return_inverse=True)
-        at = made["vertices"][used]
-        return TetMesh(low + longest * at, numbers.reshape(-1, 4), fix_orientation=True)
+        positions = arrays["vertices"][used]
+        return TetMesh(low + longest * positions, numbers.reshape(-1, 4), fix_orientation=True)
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise _failure(method, f"it made no sound tetrahedra ({_line(str(error))})") from None
+        raise _failure(method, f"it made no valid tetrahedra ({_line(str(error))})") from None
 
 
-def _made(method: str, vertices: FloatArray, triangles: Ints, cell_size: float, time_limit: float) -> Made:
-    """What the method's process writes."""
+def _run_mesher(
+    method: str, vertices: FloatArray, triangles: Ints, cell_size: float, time_limit: float
+) -> Arrays:
+    """Run the process of a method and return the arrays that it writes."""
     if not sys.executable or getattr(sys, "frozen", False):
         raise _failure(
             method,
-            "it runs in a Python of its own, and a frozen program has none: make the mesh beforehand, "
-            "and ship it (save_mesh)",
+            "it runs in a separate Python process, which a frozen program cannot start: make the mesh "
+            "beforehand and ship it (save_mesh)",
         )
     code = inspect.getsource(mesher_process)
     arguments = [method, str(time_limit + GRACE), *sys.path]
@@ -95,25 +97,25 @@ def _made(method: str, vertices: FloatArray, triangles: Ints, cell_size: float, 
                 triangles=triangles.astype(np.int32),
                 cell_size=np.float64(cell_size),
             )
-            with open(folder / "said.txt", "wb") as said:
+            with open(folder / "stderr.txt", "wb") as log:
                 done = subprocess.run(
                     [sys.executable, "-c", code, *arguments],
                     cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
-                    stderr=said,
+                    stderr=log,
                     timeout=time_limit,
                     check=False,
                 )
             if done.returncode:
-                last = _line((folder / "said.txt").read_text(encoding="utf-8", errors="replace"))
-                raise _failure(method, _ending(done.returncode) + (f" and said {last!r}" if last else ""))
+                last = _line((folder / "stderr.txt").read_text(encoding="utf-8", errors="replace"))
+                raise _failure(method, _ending(done.returncode) + (f": {last!r}" if last else ""))
             with np.load(folder / "tetrahedra.npz") as file:
                 return {key: file[key] for key in file.files}
     except subprocess.TimeoutExpired:
         raise _failure(
             method,
-            f"it took more than {time_limit:g} s and was ended: take larger cells, a coarser surface or a "
+            f"it took more than {time_limit:g} s and was killed: use larger cells, a coarser surface or a "
             "longer time_limit",
         ) from None
     except MeshError:
@@ -122,15 +124,15 @@ def _made(method: str, vertices: FloatArray, triangles: Ints, cell_size: float, 
         raise _failure(method, f"its result cannot be read ({_line(str(error))})") from None
 
 
-def _failure(method: str, what: str) -> MeshError:
+def _failure(method: str, reason: str) -> MeshError:
     return MeshError(
-        f"method {method!r} made nothing of the surface: {what}. It takes {TAKES[method]}; "
-        "method='lattice' takes all that enclose something"
+        f"method {method!r} failed on the surface: {reason}. It accepts {ACCEPTS[method]}; method='lattice' "
+        "accepts every surface that encloses something"
     )
 
 
 def _ending(code: int) -> str:
-    """How a process ended, in words."""
+    """Describe how a process ended."""
     if code > 0:
         return f"its process ended with {code}"
     try:
@@ -140,7 +142,7 @@ def _ending(code: int) -> str:
 
 
 def _line(text: str) -> str:
-    """The last line of what was said, in a length that fits into a message."""
+    """Last line of some output, cut to the length of a message."""
     lines = [line for line in text.splitlines() if line.strip()]
     return lines[-1].strip()[:200] if lines else ""
 
@@ -151,7 +153,7 @@ def _is_solid(
     regions: NDArray[np.generic],
     corners: FloatArray,
 ) -> NDArray[np.bool_]:
-    """Which tetrahedra (m, 4) lie in regions (m,) that triangles (k, 3, 3) wind round; cavities do not."""
+    """True for tetrahedra (m, 4) in regions (m,) that triangles (k, 3, 3) enclose; cavities are not solid."""
     numbers, region = np.unique(regions, return_inverse=True)
     if len(numbers) < 2:
         return np.ones(len(tets), dtype=np.bool_)
@@ -159,14 +161,14 @@ def _is_solid(
     volumes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1]))
     solid = np.zeros(len(numbers), dtype=np.bool_)
     for number in range(len(numbers)):
-        mine = np.flatnonzero(region == number)
-        middle = x[mine[volumes[mine].argmax()]].mean(axis=0)
+        in_region = np.flatnonzero(region == number)
+        middle = x[in_region[volumes[in_region].argmax()]].mean(axis=0)
         solid[number] = abs(winding_number(middle, corners)) > INSIDE
     return solid[region]
 
 
 def winding_number(point: FloatArray, corners: FloatArray) -> float:
-    """How often triangles (m, 3, 3) wind round a point, as their solid angles tell.
+    """Winding number of triangles (m, 3, 3) around a point, from their solid angles.
 
     Van Oosterom and Strackee, "The solid angle of a plane triangle" (1983), eq. 8.
     """
@@ -176,6 +178,6 @@ def winding_number(point: FloatArray, corners: FloatArray) -> float:
     def dot(one: FloatArray, other: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("ij,ij->i", one, other))
 
-    down = lengths[0] * lengths[1] * lengths[2]
-    down = down + dot(a, b) * lengths[2] + dot(b, c) * lengths[0] + dot(c, a) * lengths[1]
-    return float(2.0 * np.arctan2(dot(a, np.cross(b, c)), down).sum() / (4.0 * np.pi))
+    denominator = lengths[0] * lengths[1] * lengths[2]
+    denominator = denominator + dot(a, b) * lengths[2] + dot(b, c) * lengths[0] + dot(c, a) * lengths[1]
+    return float(2.0 * np.arctan2(dot(a, np.cross(b, c)), denominator).sum() / (4.0 * np.pi))

@@ -1,7 +1,7 @@
-"""What runs in the process of a mesher, from surface.npz to tetrahedra.npz in the folder where it begins.
+"""Program of a mesher's process, from surface.npz to tetrahedra.npz in its working folder.
 
-It is handed to an interpreter as text, and imports nothing of this package: that would start Taichi.
-Arguments: the method, seconds after which the process ends by itself whatever it does, and `sys.path`.
+The interpreter receives it as text. It imports nothing of this package, which would start Taichi.
+Arguments: the method, the time after which the process ends in any case [s], and `sys.path`.
 """
 
 from __future__ import annotations
@@ -12,28 +12,28 @@ import sys
 from types import ModuleType
 from typing import Any
 
-RADIUS_TO_EDGE, LEAST_ANGLE = 1.4, 10
-"""What TetGen tries to keep: circumradius over shortest edge, dihedral angle [degrees]."""
+RADIUS_TO_EDGE, MIN_ANGLE = 1.4, 10
+"""Goals of TetGen: circumradius over shortest edge, and dihedral angle [degrees]."""
 
 ENVELOPE = 0.05
-"""Of a cell: how far fTetWild may leave the surface. What is finer makes steps short and nothing else."""
+"""Largest distance of fTetWild's result from the surface, in cells. Finer detail only shortens the steps."""
 
 
 def by_tetgen(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
-    """Vertices (n, 3), tetrahedra (m, 4), and a number for each that tells regions apart, (m, 1).
+    """Mesh by TetGen: vertices (n, 3), tetrahedra (m, 4), and the region of each, (m, 1).
 
     Tetrahedra are at most as large as a regular one with edges of a cell.
     """
     import tetgen
 
     largest = cell_size**3 / math.sqrt(72.0)
-    switches = f"pq{RADIUS_TO_EDGE}/{LEAST_ANGLE}a{largest:.15f}AQ"
+    switches = f"pq{RADIUS_TO_EDGE}/{MIN_ANGLE}a{largest:.15f}AQ"
     points, tets, regions, _ = tetgen.TetGen(vertices, triangles).tetrahedralize(switches=switches)
     return points, tets, regions
 
 
 def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
-    """The same; it tells by itself what is inside: there is one region."""
+    """Mesh by fTetWild, with results as for `by_tetgen`. There is one region, as it finds the inside."""
     import numpy as np
     import pytetwild
 
@@ -45,11 +45,11 @@ def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, A
 
 
 def main() -> None:
-    """Read a surface, and write its tetrahedra."""
+    """Read a surface and write its tetrahedra."""
     method, seconds, *sys.path[:] = sys.argv[1:]
-    # A thread of C, which works where the mesher holds the interpreter, and where the game is gone.
+    # A thread in C, which works even if the mesher holds the interpreter or the game has ended.
     faulthandler.dump_traceback_later(float(seconds), exit=True)
-    # Both packages import it and use it for pictures only. It need not be there, and takes seconds to load.
+    # Both packages import pyvista, but only to plot. It is optional here and slow to load.
     sys.modules["pyvista"] = ModuleType("pyvista")
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Limbs and sheets that a cage leaves out, being too thin for its cells."""
+"""Find the limbs and sheets that are too thin for the cells of a cage."""
 
 from __future__ import annotations
 
@@ -20,48 +20,48 @@ from taichi_soft.meshing.locating import Locator
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-ROD = 18.0
-"""Thicknesses along a cube, up to which a rod is kept."""
+MAX_ROD_RATIO = 18.0
+"""Largest edge of a cube over the thickness of a rod at which the rod can be kept."""
 
-KEEPING = 8.0
-"""Thicknesses along a cube, up to which every rod is kept without halving cubes."""
+SAFE_ROD_RATIO = 8.0
+"""Largest edge of a cube over the thickness of a rod at which every rod is kept without halving cubes."""
 
-MOST_REFINE = 3
-"""Octaves."""
+MAX_REFINE = 3
+"""Largest number of halvings."""
 
 PITCH = 0.25
-"""Between points that stand for the surface, in cells."""
+"""Distance between sample points of the surface, in cells."""
 
 FINE_PITCH = 1 / 24
-"""The same, where something is left out."""
+"""The same where parts are missed."""
 
-LOST = 1.25
-"""Cells from the cage, beyond which a point is left out: corners are rounded by less."""
+MISSED_DISTANCE = 1.25
+"""Distance from the cage, in cells, beyond which a point is missed; rounded corners are nearer."""
 
-MOST_CUBES = 64
-"""In which it is looked whether the surface encloses something."""
+MAX_CUBES = 64
+"""Largest number of cubes in which the surface is tested for enclosing anything."""
 
 INSIDE = 0.5
-"""Winding number from which on a point is in the solid."""
+"""Winding number above which a point is inside the solid."""
 
-OWN = 1e-6
-"""Of the size: a triangle that is nearer to a point is the one that it lies on, or a copy of it."""
+OWN_DISTANCE = 1e-6
+"""Distance over size below which a triangle is the one that a point lies on, or a copy of it."""
 
-ROOT = 0.2
-"""Cells from the cage, from which on a limb has left it."""
+ROOT_DISTANCE = 0.2
+"""Distance from the cage, in cells, beyond which a limb has left it."""
 
 RAYS = 256
-"""By which the thickness is told."""
+"""Number of rays that measure a thickness."""
 
-SLIGHT = 0.1
-"""Of what is measured near a limb is less than its thickness; what it grows from is thicker."""
+QUANTILE = 0.1
+"""Quantile of the lengths measured near a limb that is its thickness: next to it, the body is thicker."""
 
 CHUNK = 1 << 20
-"""Pairs of rays and triangles that are looked at together."""
+"""Pairs of rays and triangles that are processed at once."""
 
 
 def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
-    """Points on triangles (m, 3, 3), some in each and none farther from the next than about `pitch` [m].
+    """Sample points on triangles (m, 3, 3), at least one in each and about `pitch` apart at most [m].
 
     Returns: (k, 3) [m], and the triangle of each, (k,).
     """
@@ -83,9 +83,9 @@ def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
 
 
 def _distances(locator: Locator, mesh: TetMesh, points: FloatArray) -> FloatArray:
-    """Of points from a mesh, (k,) [m]."""
-    tet, shares = locator(points)
-    nearest = np.einsum("kc,kci->ki", shares, mesh.vertices[mesh.tets[tet]])
+    """Distances of points from a mesh, (k,) [m]."""
+    tet, weights = locator(points)
+    nearest = np.einsum("kc,kci->ki", weights, mesh.vertices[mesh.tets[tet]])
     return np.asarray(np.linalg.norm(nearest - points, axis=1))
 
 
@@ -94,71 +94,75 @@ def _are_in(lattice: Lattice, points: FloatArray, cubes: Bools) -> Bools:
 
 
 def _cube_at(lattice: Lattice, points: FloatArray) -> Ints:
-    places = ((points - lattice.origin) / lattice.edge).astype(np.int64)
-    return np.clip(places, 0, np.array(lattice.cubes) - 1)
+    coordinates = ((points - lattice.origin) / lattice.edge).astype(np.int64)
+    return np.clip(coordinates, 0, np.array(lattice.cubes) - 1)
 
 
 def cubes_of(lattice: Lattice, points: FloatArray) -> Bools:
-    """Which cubes hold one of some points, of the shape of the lattice."""
-    held = np.zeros(lattice.cubes, dtype=np.bool_)
-    held[tuple(_cube_at(lattice, points).T)] = True
-    return held
+    """True for each cube of the lattice that contains a point."""
+    occupied = np.zeros(lattice.cubes, dtype=np.bool_)
+    occupied[tuple(_cube_at(lattice, points).T)] = True
+    return occupied
 
 
 @dataclass(frozen=True)
 class Thin:
-    """Limbs and sheets that cells as large as asked for leave out: how thick the thinnest are, about [m];
-    infinity where there are none."""
+    """Approximate thickness of the thinnest limbs and sheets that are too thin for the requested cells [m].
+
+    Infinity if there are none.
+    """
 
     kept: float  # by smaller cells
-    lost: float
-    octaves: int  # how often cells were halved
+    lost: float  # left out by the cage
+    octaves: int  # number of halvings of cells
 
-    def words(self, cell_size: float) -> tuple[str, ...]:
-        """What to tell of it.
+    def notes(self, cell_size: float) -> tuple[str, ...]:
+        """Describe the limbs and sheets.
 
-        Args: cell_size: that was asked for [m].
+        Args: cell_size: requested size [m].
         """
-        told = []
+        notes = []
         if np.isfinite(self.kept):
-            told.append(
+            notes.append(
                 f"limbs or sheets of about {self.kept:.2g} m are too thin for cells of {cell_size:.3g} m: "
-                f"round them cells are {cell_size / 2**self.octaves:.3g} m, and substeps as much shorter. "
-                "refine=0 leaves them out"
+                f"cells around them are {cell_size / 2**self.octaves:.3g} m, and substeps shorter by the "
+                "same factor. refine=0 leaves them out"
             )
         if np.isfinite(self.lost):
-            octaves = max(1, int(np.ceil(np.log2(cell_size / (ROD * self.lost)))))
-            told.append(
+            octaves = max(1, int(np.ceil(np.log2(cell_size / (MAX_ROD_RATIO * self.lost)))))
+            notes.append(
                 f"limbs or sheets of about {self.lost:.2g} m are left out, too thin for cells of "
-                f"{cell_size:.3g} m: they are drawn, but neither bend nor touch anything. "
-                f"cell_size={KEEPING * self.lost:.2g} keeps them"
-                + (f", or refine={octaves}" if octaves <= MOST_REFINE else "")
+                f"{cell_size:.3g} m: they are drawn, but neither bend nor collide. "
+                f"cell_size={SAFE_ROD_RATIO * self.lost:.2g} keeps them"
+                + (f", or refine={octaves}" if octaves <= MAX_REFINE else "")
             )
-        return tuple(told)
+        return tuple(notes)
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
-    """Where a cage leaves out what it should carry."""
+class MissedParts:
+    """Parts that a cage should cover and does not."""
 
-    cubes: Bools  # of the lattice, in which the surface is and the cage is not, and where it leaves this
-    bare: Bools  # those of them without a vertex of the cage
-    thickness: FloatArray  # of the limb or sheet there, of the shape of the lattice; infinity elsewhere [m]
-    points: FloatArray  # (k, 3), on the surface in or beside these cubes [m]
+    cubes: (
+        Bools  # of the lattice, those with surface but without cage, and those where a part leaves the cage
+    )
+    bare: Bools  # cubes without a vertex of the cage
+    thickness: FloatArray  # of the limb or sheet, of the shape of the lattice; infinity elsewhere [m]
+    points: FloatArray  # (k, 3), on the surface in or next to these cubes [m]
 
     @property
     def thinnest(self) -> float:
-        """[m]."""
+        """Smallest thickness [m]."""
         return float(self.thickness.min())
 
-    def among(self, lattice: Lattice, cubes: Bools) -> LeftOut:
-        """What of it lies in or beside some of its cubes."""
+    def among(self, lattice: Lattice, cubes: Bools) -> MissedParts:
+        """Select what lies in or next to some of the cubes."""
         points = self.points[_are_in(lattice, self.points, around(cubes))]
-        return LeftOut(cubes, self.bare & cubes, np.where(cubes, self.thickness, np.inf), points)
+        return MissedParts(cubes, self.bare & cubes, np.where(cubes, self.thickness, np.inf), points)
 
-    def joined(self, other: LeftOut) -> LeftOut:
-        """What either leaves out."""
-        return LeftOut(
+    def joined(self, other: MissedParts) -> MissedParts:
+        """Union with other missed parts."""
+        return MissedParts(
             self.cubes | other.cubes,
             self.bare | other.bare,
             np.minimum(self.thickness, other.thickness),
@@ -167,27 +171,29 @@ class LeftOut:
 
 
 def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[FloatArray, Ints]:
-    """Points on the surface that are left out of a cage, (k, 3) [m], and the triangle of each, (k,).
+    """Points on the surface that a cage misses, (k, 3) [m], and the triangle of each, (k,).
 
     Args:
-        lattice: of the cubes that were asked for.
-        corners: of the surface's triangles, (m, 3, 3) [m].
+        lattice: lattice of the requested cubes.
+        corners: corners of the surface's triangles, (m, 3, 3) [m].
         mesh: the cage.
     """
     points, triangle = points_on(corners, PITCH * lattice.edge)
-    # Cubes first: for most surfaces no more is needed.
-    may_be = _are_in(lattice, points, ~cubes_of(lattice, mesh.vertices))
-    if may_be.any():
-        may_be[may_be] = _distances(Locator(mesh), mesh, points[may_be]) > LOST * lattice.edge
-    return points[may_be], triangle[may_be]
+    # Cubes first: they are enough for most surfaces.
+    is_missed = _are_in(lattice, points, ~cubes_of(lattice, mesh.vertices))
+    if is_missed.any():
+        is_missed[is_missed] = (
+            _distances(Locator(mesh), mesh, points[is_missed]) > MISSED_DISTANCE * lattice.edge
+        )
+    return points[is_missed], triangle[is_missed]
 
 
 def torn_points(solid: Solid, vertices: FloatArray, triangles: Ints) -> FloatArray:
-    """Points on the surface between parts of a solid that are one, as triangles lead from one to the other:
-    too thin a limb is lost between voxels. (k, 3) [m].
+    """Points on the surface between components of a solid that triangles connect, (k, 3) [m].
 
+    A limb that is too thin is lost between voxels.
     Args:
-        vertices: of the surface, (n, 3) [m].
+        vertices: vertices of the surface, (n, 3) [m].
         triangles: (m, 3).
     """
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
@@ -205,104 +211,111 @@ def torn_points(solid: Solid, vertices: FloatArray, triangles: Ints) -> FloatArr
 def solid_points(
     lattice: Lattice, points: FloatArray, triangle: Ints, corners: FloatArray, solid: Solid
 ) -> FloatArray:
-    """Those of some points that share a cube with a part of the solid: a wall without thickness is none.
+    """Select the points that share a cube with part of the solid; a wall without thickness is not solid.
 
     Args:
         points: on the surface, (k, 3) [m].
-        triangle: of each, (k,).
-        corners: of all triangles, (m, 3, 3) [m].
+        triangle: triangle of each, (k,).
+        corners: corners of all triangles, (m, 3, 3) [m].
     """
     is_solid = _are_in(lattice, points, cubes_of(lattice, solid.quadrature()[0]))
-    # A needle along an axis may lie between all lines by which the solid was told.
+    # A needle along an axis can lie between all rays that found the solid.
     doubtful = np.flatnonzero(~is_solid)
     cubes = np.ravel_multi_index(tuple(_cube_at(lattice, points[doubtful]).T), lattice.cubes)
     order = np.random.default_rng(0).permutation(len(doubtful))
-    few = doubtful[order[np.unique(cubes[order], return_index=True)[1]]][:MOST_CUBES]
+    sample = doubtful[order[np.unique(cubes[order], return_index=True)[1]]][:MAX_CUBES]
     near = corners[np.unique(triangle)]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[triangle[few]]
-    ways = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    for point, way in zip(points[few], ways, strict=True):
-        for away in chords(point[None], way[None], near):
-            if np.isfinite(away) and abs(winding_number(point + 0.5 * away * way, corners)) > INSIDE:
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[triangle[sample]]
+    directions = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    for point, direction in zip(points[sample], directions, strict=True):
+        for distance in chords(point[None], direction[None], near):
+            if (
+                np.isfinite(distance)
+                and abs(winding_number(point + 0.5 * distance * direction, corners)) > INSIDE
+            ):
                 here = cubes_of(lattice, point[None])
                 is_solid |= _are_in(lattice, points, here)
     return points[is_solid]
 
 
-def left_out(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: FloatArray) -> LeftOut:
-    """What is at some points far from a cage, and what leads there.
+def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: FloatArray) -> MissedParts:
+    """Find the missed parts at some points far from a cage, and what connects them to it.
 
-    Args: far: `far_points`, one at least; the others as there.
+    Args: far: result of `far_points`, at least one point; the other arguments as there.
     """
-    lost = around(around(cubes_of(lattice, far)))
+    region = around(around(cubes_of(lattice, far)))
     points, triangle = points_on(corners, PITCH * lattice.edge)
-    bare = cubes_of(lattice, points) & ~cubes_of(lattice, mesh.vertices) & lost
-    # Where a limb leaves the cage, cubes hold both.
+    bare = cubes_of(lattice, points) & ~cubes_of(lattice, mesh.vertices) & region
+    # Where a limb leaves the cage, cubes contain both.
     roots = points[_are_in(lattice, points, around(bare) & ~bare)]
-    cubes = bare | cubes_of(lattice, roots[_distances(Locator(mesh), mesh, roots) > ROOT * lattice.edge])
+    cubes = bare | cubes_of(
+        lattice, roots[_distances(Locator(mesh), mesh, roots) > ROOT_DISTANCE * lattice.edge]
+    )
     near = corners[np.unique(triangle[_are_in(lattice, points, around(cubes))])]
     points, triangle = points_on(near, FINE_PITCH * lattice.edge)
     normals = np.cross(near[:, 1] - near[:, 0], near[:, 2] - near[:, 0])
-    thick, limbs = np.full(lattice.cubes, np.inf), parts_of(cubes.astype(np.float64))
+    thicknesses, limbs = np.full(lattice.cubes, np.inf), parts_of(cubes.astype(np.float64))
     limb, in_bare = limbs[tuple(_cube_at(lattice, points).T)], _are_in(lattice, points, bare)
     for number in range(int(limbs.max()) + 1):
-        mine = (limb == number) & in_bare
-        thick[limbs == number] = thickness(points[mine], normals[triangle[mine]], near)
+        in_limb = (limb == number) & in_bare
+        thicknesses[limbs == number] = thickness(points[in_limb], normals[triangle[in_limb]], near)
     bins = np.floor(points / (FINE_PITCH * lattice.edge))
     points = points[np.unique(bins, axis=0, return_index=True)[1]]
-    return LeftOut(cubes, bare, thick, points[_are_in(lattice, points, around(cubes))])
+    return MissedParts(cubes, bare, thicknesses, points[_are_in(lattice, points, around(cubes))])
 
 
 def thickness(points: FloatArray, normals: FloatArray, corners: FloatArray) -> float:
-    """Of what triangles enclose, as lines through points along the normals there tell [m].
+    """Thickness of what triangles enclose, measured along the normals through some points [m].
 
     Args:
         points: on the triangles, (k, 3) [m].
         normals: (k, 3), of any length.
-        corners: of the triangles, (m, 3, 3) [m].
-    Returns: infinity where no line meets a triangle again.
+        corners: corners of the triangles, (m, 3, 3) [m].
+    Returns: infinity if no line meets another triangle.
     """
-    few = np.unique(np.linspace(0, len(points) - 1, min(RAYS, len(points))).astype(np.int64))
-    lengths = np.linalg.norm(normals[few], axis=1, keepdims=True)
-    found = np.abs(chords(points[few], normals[few] / np.where(lengths > 0.0, lengths, 1.0), corners))
-    found = found[np.isfinite(found)]
-    return float(np.quantile(found, SLIGHT)) if len(found) else np.inf
+    sample = np.unique(np.linspace(0, len(points) - 1, min(RAYS, len(points))).astype(np.int64))
+    lengths = np.linalg.norm(normals[sample], axis=1, keepdims=True)
+    lengths_found = np.abs(
+        chords(points[sample], normals[sample] / np.where(lengths > 0.0, lengths, 1.0), corners)
+    )
+    lengths_found = lengths_found[np.isfinite(lengths_found)]
+    return float(np.quantile(lengths_found, QUANTILE)) if len(lengths_found) else np.inf
 
 
-def chords(points: FloatArray, ways: FloatArray, corners: FloatArray) -> FloatArray:
-    """How far along lines through points on triangles the next triangle is, below 0 where it is behind, (k,)
-    [m]; infinity where there is none.
+def chords(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
+    """Signed distance along lines through points on triangles to the next triangle, (k,) [m].
 
+    It is negative if the triangle lies behind, and infinity if there is none.
     Args:
         points: (k, 3) [m].
-        ways: of the lines, (k, 3), of length 1.
-        corners: of the triangles, (m, 3, 3) [m].
+        directions: directions of the lines, (k, 3), of length 1.
+        corners: corners of the triangles, (m, 3, 3) [m].
     """
-    own = OWN * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    own = OWN_DISTANCE * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     nearest = np.full(len(points), np.inf)
     rows = max(1, CHUNK // len(corners))
     for start in range(0, len(points), rows):
-        some = slice(start, start + rows)
-        away = _meetings(points[some], ways[some], corners)
-        distance = np.where(np.abs(away) > own, np.abs(away), np.inf)
-        best = distance.argmin(axis=1)
+        batch = slice(start, start + rows)
+        distance = _intersections(points[batch], directions[batch], corners)
+        size = np.where(np.abs(distance) > own, np.abs(distance), np.inf)
+        best = size.argmin(axis=1)
         each = np.arange(len(best))
-        nearest[some] = np.where(np.isfinite(distance[each, best]), away[each, best], np.inf)
+        nearest[batch] = np.where(np.isfinite(size[each, best]), distance[each, best], np.inf)
     return nearest
 
 
-def _meetings(points: FloatArray, ways: FloatArray, corners: FloatArray) -> FloatArray:
-    """How far along each line each triangle is met, (k, m) [m], NaN where it is not.
+def _intersections(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
+    """Distance along each line to each triangle, (k, m) [m], NaN where they do not meet.
 
     Möller and Trumbore, "Fast, minimum storage ray/triangle intersection" (1997).
     """
     one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    p = np.cross(ways[:, None], other)
+    p = np.cross(directions[:, None], other)
     det = np.einsum("kmi,mi->km", p, one)
     from_corner = points[:, None] - corners[:, 0]
     q = np.cross(from_corner, one)
     with np.errstate(divide="ignore", invalid="ignore"):
         u = np.einsum("kmi,kmi->km", p, from_corner) / det
-        v = np.einsum("kmi,ki->km", q, ways) / det
-        away = np.einsum("kmi,mi->km", q, other) / det
-        return np.where((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0), away, np.nan)
+        v = np.einsum("kmi,ki->km", q, directions) / det
+        distance = np.einsum("kmi,mi->km", q, other) / det
+        return np.where((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0), distance, np.nan)

@@ -1,4 +1,4 @@
-"""How large the voxels are in which a solid is told, and whether it is one."""
+"""Choose the voxel size of a solid, and check the solid."""
 
 from __future__ import annotations
 
@@ -8,72 +8,75 @@ from taichi_soft.cages.solid import Solid
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
-FINENESS = 8
-"""Voxels along a cube."""
+VOXELS_PER_CUBE = 8
+"""Voxels along the edge of a cube."""
 
-LEAST_FINENESS, MOST_FINENESS = 3, 16
+MIN_VOXELS_PER_CUBE, MAX_VOXELS_PER_CUBE = 3, 16
 
-MOST_VOXELS = 1 << 22
-"""Above, voxels are coarser, but for `LEAST_FINENESS`."""
+MAX_VOXELS = 1 << 22
+"""Number of voxels above which they become coarser, down to `MIN_VOXELS_PER_CUBE`."""
 
-MOST_FINE_VOXELS = 1 << 21
-"""The same, where limbs were lost."""
+MAX_FINE_VOXELS = 1 << 21
+"""The same where limbs were missed."""
 
-OPEN = 0.5
-"""Of all lines that meet a surface: more that do not leave it again, and it is a sheet."""
+MAX_OPEN_FRACTION = 0.5
+"""Fraction of the rays into a surface that do not leave it again, above which it is a sheet."""
 
 FLATTEST = 1e-6
-"""Volume over that of the box round it, below which nothing is enclosed but rounding."""
+"""Volume over that of the bounding box below which only rounding is enclosed."""
 
 
 def volume_within(corners: FloatArray) -> float:
-    """Of a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
-    a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)  # far from the origin, only differences have digits
+    """Volume inside a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
+    a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)  # far from the origin, only differences are precise
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Of voxels in which the solid can be told [m].
+    """Edge of voxels that resolve the solid [m].
 
-    A sheet is as thick as twice its volume over its surface: it is to have two voxels across.
+    The thickness of a sheet is twice its volume over its surface, and should have two voxels across.
     """
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * float(np.linalg.norm(doubled, axis=1).sum())
+    area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * float(np.linalg.norm(area_vectors, axis=1).sum())
     if area == 0.0:
         raise MeshError("the surface has no area: it encloses nothing")
-    edge = min(cell_size / FINENESS, max(abs(volume_within(corners)) / area, cell_size / MOST_FINENESS))
-    return _affordable(edge, corners, cell_size, MOST_VOXELS)
+    edge = min(
+        cell_size / VOXELS_PER_CUBE, max(abs(volume_within(corners)) / area, cell_size / MAX_VOXELS_PER_CUBE)
+    )
+    return _affordable(edge, corners, cell_size, MAX_VOXELS)
 
 
 def fine_voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Of voxels for limbs that were lost between coarser ones [m]."""
-    edge = _affordable(cell_size / MOST_FINENESS, corners, cell_size, MOST_FINE_VOXELS)
+    """Edge of voxels for limbs that were missed between coarser ones [m]."""
+    edge = _affordable(cell_size / MAX_VOXELS_PER_CUBE, corners, cell_size, MAX_FINE_VOXELS)
     return min(edge, voxel_edge(corners, cell_size))
 
 
-def _affordable(edge: float, corners: FloatArray, cell_size: float, most: int) -> float:
-    """An edge that is longer where there would be too many voxels [m]."""
+def _affordable(edge: float, corners: FloatArray, cell_size: float, max_voxels: int) -> float:
+    """Enlarge an edge while there would be too many voxels [m]."""
     size = np.ptp(corners.reshape(-1, 3), axis=0)
-    while edge < cell_size / LEAST_FINENESS and np.prod(size / edge + 3.0) > most:
+    while edge < cell_size / MIN_VOXELS_PER_CUBE and np.prod(size / edge + 3.0) > max_voxels:
         edge *= 1.1
-    return min(edge, cell_size / LEAST_FINENESS)
+    return min(edge, cell_size / MIN_VOXELS_PER_CUBE)
 
 
-def require_solid(solid: Solid, size: FloatArray, within: float, cell_size: float) -> None:
-    """Raises: MeshError where there is nothing to carry, OptionError where it is lost between the voxels.
+def require_solid(solid: Solid, size: FloatArray, enclosed_volume: float, cell_size: float) -> None:
+    """Check that voxels contain a solid.
 
-    Args: within: volume by the divergence theorem [m^3].
+    Args: enclosed_volume: volume by the divergence theorem [m^3].
+    Raises: MeshError if there is no solid, OptionError if it is lost between the voxels.
     """
-    if solid.open_share > OPEN:
+    if solid.open_fraction > MAX_OPEN_FRACTION:
         raise MeshError(
-            f"the surface is open: {100 * solid.open_share:.3g} % of the lines through it do not come out "
+            f"the surface is open: {100 * solid.open_fraction:.3g} % of the rays into it do not come out "
             "again. Give a sheet a thickness (Blender: Solidify), or make a cloth of it by ParticleMesh"
         )
     least = FLATTEST * float(np.prod(size))
-    if solid.is_simple and within > least and solid.volume < 0.5 * within:
+    if solid.is_simple and enclosed_volume > least and solid.volume < 0.5 * enclosed_volume:
         raise OptionError(
-            f"cells of {cell_size:.4g} m are too large: the solid of {within:.3g} m^3 is too thin for them. "
-            f"Take cell_size={0.5 * cell_size:.3g} or less"
+            f"cells of {cell_size:.4g} m are too large: the solid of {enclosed_volume:.3g} m^3 is too thin "
+            f"for them. Take cell_size={0.5 * cell_size:.3g} or less"
         )
     if solid.volume <= FLATTEST * float(np.prod(np.maximum(size, solid.spacing))):
         raise MeshError(f"the surface encloses no volume ({solid.volume:.2g} m^3): give it a thickness")

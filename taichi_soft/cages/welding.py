@@ -1,4 +1,4 @@
-"""Corners of triangles at the same place as one vertex: files have copies where texture or normals jump."""
+"""Merge triangle corners at the same position: files have copies where textures or normals have seams."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 WELD = 1e-7
-"""Of the longest side: vertices that are nearer count as one. float32 files round by as much."""
+"""Distance over the longest side below which vertices are merged; float32 files round by as much."""
 
 
 def places_of(vertices: FloatArray, size: float) -> Ints:
-    """A number for each vertex, (n,), alike for those at the same place.
+    """Number of the position of each vertex, (n,), equal for vertices at the same position.
 
-    Args: size: longest side of the box round those in use [m].
+    Args: size: longest side of the bounding box of the vertices in use [m].
     """
-    places = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # -0.0 is 0.0
-    return np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+    positions = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # -0.0 is 0.0
+    return np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def welded(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
-    """Vertices in use (k, 3), one for each place, and triangles between three of them (j, 3), each once."""
+    """Vertices in use (k, 3), one per position, and triangles between three of them (j, 3), each once."""
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     corners = places_of(vertices, size)[triangles]
     corners, points = corners.reshape(-1), vertices[triangles.reshape(-1)]
@@ -34,6 +34,6 @@ def welded(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
     is_new[np.unique(in_order, axis=0, return_index=True)[1]] = True
     corners = corners[is_new & (np.diff(in_order, axis=1) > 0).all(axis=1)]
     kept = np.unique(corners)
-    number = np.full(len(used), -1)
-    number[kept] = np.arange(len(kept))
-    return points[first[kept]], number[corners].astype(np.int64)
+    new_index = np.full(len(used), -1)
+    new_index[kept] = np.arange(len(kept))
+    return points[first[kept]], new_index[corners].astype(np.int64)

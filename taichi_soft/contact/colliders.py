@@ -188,7 +188,7 @@ class Colliders(Slice):
         """Bring fields and settings up to date after row `index` was given another friction."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
-            self.context.become(replace(self.context.settings, friction=row.friction))
+            self.context.apply_settings(replace(self.context.settings, friction=row.friction))
         if self._contact is not None:
             self._write_constants()
             self.on_jump(*row.box)

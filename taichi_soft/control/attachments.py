@@ -94,8 +94,8 @@ class Attachments(Slice):
     """All attachments of one world; its `Frames` know them by body."""
 
     name = "attachments"
-    bars_cuts = False  # `share_attachments` lets pieces hang on
-    bars_levels = False  # see `levels.hanging`
+    prevents_cuts = False  # `share_attachments` lets pieces hang on
+    prevents_levels = False  # see `levels.reattaching`
 
     @property
     def _frames(self) -> Frames:
@@ -105,7 +105,7 @@ class Attachments(Slice):
         """Whether it is attached to a frame."""
         return bool(self._frames.holding(body))
 
-    def let_go(self, body: SoftBody) -> None:
+    def release_body(self, body: SoftBody) -> None:
         """Release all that hold a body."""
         for attachment in list(self._frames.holding(body)):
             attachment.release()

@@ -25,13 +25,13 @@ def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def attempt(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
+    """Call a kernel that can refuse. The body stays asleep until the caller calls `mark_modified`."""
     return context_of(body).built.attempt(kernel, *arguments)
 
 
-def rouse(body: SoftBody) -> None:
+def mark_modified(body: SoftBody) -> None:
     """An attempt has changed `body`."""
-    context_of(body).built.rouse(body.index)
+    context_of(body).built.mark_modified(body.index)
 
 
 def numbers(*values: Any) -> Rows32:

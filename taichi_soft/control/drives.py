@@ -49,9 +49,9 @@ def set_gravity(context: Context, gravity: ArrayLike) -> None:
     """As `World.set_gravity`."""
     acceleration = as_gravity(gravity)
     if (acceleration != context.settings.gravity).any():
-        context.become(replace(context.settings, gravity=acceleration))
+        context.apply_settings(replace(context.settings, gravity=acceleration))
         if context.fields is not None:
-            context.fields.rouse(-1)
+            context.fields.mark_modified(-1)
 
 
 def set_gravity_scale(body: SoftBody, scale: float) -> None:
@@ -79,7 +79,7 @@ def set_wind(context: Context, velocity: ArrayLike | None, density: float, drag:
     coefficient = as_number(drag, "drag", 0.0, 1e3)
     require_substeps(context, "wind")
     if context.built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
-        context.built.rouse(-1)
+        context.built.mark_modified(-1)
 
 
 def require_field(field: Any) -> ForceField | None:
@@ -96,7 +96,7 @@ def push_by_field(context: Context, field: ForceField) -> list[tuple[SoftBody, N
     Raises: what the field raises, or OptionError for what it returns; then no body is pushed.
     """
     rows = []
-    for body in context.slots.living:
+    for body in context.slots.occupants:
         if not body.is_frozen:
             given = field(body.positions(), context.clock.time)
             found = as_array(given, "what the force field returns", (body.vertex_count, 3), "m/s^2")

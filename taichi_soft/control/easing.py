@@ -72,7 +72,7 @@ class Easing:
 class Easings(Slice):
     """All changes of material that are under way in one world."""
 
-    name, bars_cuts, bars_levels = "easings", False, False
+    name, prevents_cuts, prevents_levels = "easings", False, False
 
     def __init__(self, context: Any) -> None:
         """None yet."""
@@ -84,7 +84,7 @@ class Easings(Slice):
         """Let a body become of a material."""
         record, built = record_of(body), self.context.built
         before, energy = record.present or self._arrays(body), elastic_energy(body)
-        self.let_go(body)
+        self.release_body(body)
         built.change(body.index, write_constants, body, replace(record.description, material=material))
         ratio = _growth(before, self._arrays(body))
         added = elastic_energy(body) - energy
@@ -120,13 +120,13 @@ class Easings(Slice):
                 arrays = record_of(body).present = _with(arrays, easing.constants)
                 rate = FADING * (now - before) / (now * seconds)
             else:
-                self.let_go(body)
+                self.release_body(body)
             self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
 
     def finish(self, body: SoftBody) -> None:
         """End a change at once: the body was put into another state, whose deformation is the caller's."""
         if body in self.by_body:
-            self.let_go(body)
+            self.release_body(body)
             arrays, place = self._arrays(body), self._place(body)
             self.context.built.change(body.index, _write, body, place, arrays, 0.0, 1.0)
 
@@ -136,8 +136,8 @@ class Easings(Slice):
     def _place(self, body: SoftBody) -> Any:
         return self.context.layout.ranges[body.index]
 
-    def let_go(self, body: SoftBody) -> None:
-        """As `Slice.let_go`."""
+    def release_body(self, body: SoftBody) -> None:
+        """As `Slice.release_body`."""
         self.by_body.pop(body, None)
         record_of(body).present = None
 
@@ -149,7 +149,7 @@ class Easings(Slice):
             pieces: what it has become, with the tetrahedron of the body before that each one is, (m,).
         """
         easing = self.by_body.get(body)
-        self.let_go(body)
+        self.release_body(body)
         if easing is None or self._arrays(body).bonds is not None:
             return
         rows = easing.constants.reshape(len(order), -1)[np.argsort(order)]
@@ -191,7 +191,7 @@ class Easings(Slice):
         """As `Slice.clear`."""
         self._left = list(self.by_body)
         for body in self._left:
-            self.let_go(body)
+            self.release_body(body)
 
     def restore(self, read: Any) -> None:
         """Go on with the changes that were `read`."""

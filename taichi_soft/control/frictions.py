@@ -21,9 +21,9 @@ def set_floor_friction(context: Context, friction: float) -> None:
             "bodies by Body.set_friction"
         )
     if coefficient != context.settings.friction:
-        context.become(replace(context.settings, friction=coefficient))
+        context.apply_settings(replace(context.settings, friction=coefficient))
         if context.fields is not None:
-            context.fields.rouse(-1)
+            context.fields.mark_modified(-1)
 
 
 def set_friction(body: SoftBody, friction: float) -> None:

@@ -100,10 +100,10 @@ class Grabs(Numbered[Grab]):
     """All grabs of one world, by number."""
 
     name = "grabs"
-    bars_levels = False  # see `hold_at`
+    prevents_levels = False  # see `hold_at`
     most, way_out = MOST_GRABS, "release"
 
-    def let_go(self, body: SoftBody) -> None:
+    def release_body(self, body: SoftBody) -> None:
         """Release all that hold a body."""
         for grab in self.holding(body):
             grab.release()

@@ -9,7 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.soft_body import Context, SoftBody
-from taichi_soft.control.change import attempt, change, mass_of, numbers, rouse, rows_of, some_particles
+from taichi_soft.control.change import (
+    attempt,
+    change,
+    mark_modified,
+    mass_of,
+    numbers,
+    rows_of,
+    some_particles,
+)
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.core.checks import as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
@@ -42,7 +50,7 @@ def apply_impulse_at_point(body: SoftBody, impulse: ArrayLike, point: ArrayLike,
             f"point {center.tolist()} is {nearest:.4g} m from the nearest particle of body {body.index}, "
             f"beyond radius={reach:g} m: aim at the body, or reach farther"
         )
-    rouse(body)
+    mark_modified(body)
 
 
 def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, radius: float) -> None:
@@ -53,7 +61,7 @@ def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, ra
     row, found = numbers(origin, reach, momentum), np.empty(1, dtype=np.float32)
     context.built.attempt(add_radial_impulse, len(context.slots.slots), row, found)
     _require_speed(float(found[0]), "impulse")
-    context.built.has_changed()
+    context.built.mark_changed()
     context.built.wake_near(origin - reach, origin + reach)
 
 

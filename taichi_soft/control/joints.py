@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.soft_body import (
     RowsOf,
     SoftBody,
+    belongs_to,
     context_of,
-    lives_in,
     record_of,
     require_alive,
 )
@@ -86,7 +86,7 @@ class Joint(Handle):
         built.wake(self.other.index)
         change(self.body, end_joint, self._number)
         del self._joints.by_number[self._number]
-        built.joints_have_changed()
+        built.mark_joints_changed()
 
     def _require_attached(self) -> None:
         if not self.is_attached:
@@ -110,7 +110,7 @@ class Joints(Numbered[Joint]):
         """Those that hold a body, from either side."""
         return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
-    def let_go(self, body: SoftBody) -> None:
+    def release_body(self, body: SoftBody) -> None:
         """Release all that hold a body."""
         for joint in self.holding(body):
             joint.release()
@@ -185,12 +185,12 @@ class Joints(Numbered[Joint]):
             self.context.handles.enlist(joint, serial)
             joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
             self.by_number[number] = joint
-        self.context.built.joints_have_changed()
+        self.context.built.mark_joints_changed()
 
     def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
         """As `Body.attach_to`."""
         context = self.context
-        if not isinstance(other, SoftBody) or other is body or not lives_in(other, context):
+        if not isinstance(other, SoftBody) or other is body or not belongs_to(other, context):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
         require_alive(other)
         vertices, places = _find_places(body, other, particles, onto)
@@ -221,7 +221,7 @@ class Joints(Numbered[Joint]):
         )
         joint = self.by_number[free] = Joint(body, other, free, vertices)
         handles_of(body).enlist(joint)
-        context.built.joints_have_changed()
+        context.built.mark_joints_changed()
         return joint
 
 

@@ -163,7 +163,7 @@ class Motors(Numbered[Motor]):
         """Particles that all motors drive together."""
         return sum(len(motor.particles) for motor in self.by_number.values())
 
-    def let_go(self, body: SoftBody) -> None:
+    def release_body(self, body: SoftBody) -> None:
         """Remove all that drive a body."""
         for motor in self.holding(body):
             motor.remove()

@@ -7,7 +7,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.attachments import attached_vertices, require_unattached
-from taichi_soft.control.change import attempt, change, named_particles, rouse, rows_of, some_particles
+from taichi_soft.control.change import (
+    attempt,
+    change,
+    mark_modified,
+    named_particles,
+    rows_of,
+    some_particles,
+)
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
 from taichi_soft.core.checks import as_array
@@ -55,5 +62,5 @@ def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> N
     loose = int(found[0])
     if loose >= 0:
         raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
-    rouse(body)
+    mark_modified(body)
     context_of(body).of(Frames).has_work = True

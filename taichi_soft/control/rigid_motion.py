@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.attachments import require_unattached
-from taichi_soft.control.change import attempt, numbers, rouse, some_particles
+from taichi_soft.control.change import attempt, mark_modified, numbers, some_particles
 from taichi_soft.control.kernels.rigid_motion import write_rigid_velocity
 from taichi_soft.control.rigid_transform import jump_to
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
@@ -31,7 +31,7 @@ def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
         raise OptionError(
             f"linear and angular make some vertices {fastest:.4g} m/s fast: keep below {VELOCITY_LIMIT:g} m/s"
         )
-    rouse(body)
+    mark_modified(body)
 
 
 def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: bool) -> None:
@@ -53,5 +53,5 @@ def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: 
         raise OptionError(
             f"position={target.tolist()} puts the body {lowest - bottom:.4g} m below the floor: raise it"
         )
-    rouse(body)
+    mark_modified(body)
     built.wake_near(*left)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.change import attempt, rouse
+from taichi_soft.control.change import attempt, mark_modified
 from taichi_soft.control.kernels.rigid_motion import jump
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
@@ -23,7 +23,7 @@ def jump_to(
     """Turn a body about its centre of mass and put that at `center`, its velocity turned or stopped.
 
     Returns: its lowest height, its highest, and its largest coordinate then [m]. Where the first is below
-        `lowest` or the last out of reach, nothing was changed; else the caller has to `rouse` it.
+        `lowest` or the last out of reach, nothing was changed; else the caller has to `mark_modified` it.
     """
     found = np.empty(3)
     attempt(body, jump, body.index, np.array([*center, lowest, float(keep)]), turn, found)
@@ -47,5 +47,5 @@ def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, 
         simulation = context_of(body).built
         left = simulation.box_of(body)
         jump_to(body, center, turn, lowest=-np.inf, keep=keep)
-        rouse(body)
+        mark_modified(body)
         simulation.wake_near(*left)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
-from taichi_soft.bodies.sag import MOST_SAG, sag
+from taichi_soft.bodies.sag import MAX_SAG, sag
 from taichi_soft.cages import tetrahedra_of
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, TaichiSoftError
@@ -119,7 +119,7 @@ def diagnose(
             found.say(Grade.BAD, str(error))
             return found
         asset = SoftBodyAsset(made.mesh, material, skin=surfaces)
-        for words in made.told:
+        for words in made.notes:
             found.say(Grade.NOTE, words)
         if made.is_refined:
             plain = tetrahedra_of(surfaces, cells=cells, refine=0).mesh
@@ -196,8 +196,8 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
         )
     squash = sag(asset, GRAVITY_EARTH)
     found.figures["sag under its own weight [%]"] = 50.0 * squash
-    if squash > MOST_SAG:
-        young = squash / MOST_SAG * float(np.mean(np.asarray(asset.description.per_tet("young") / mesh.fill)))
+    if squash > MAX_SAG:
+        young = squash / MAX_SAG * float(np.mean(np.asarray(asset.description.per_tet("young") / mesh.fill)))
         found.say(
             Grade.BAD,
             f"it cannot bear its own weight: take a Young's modulus of {young:.2g} Pa or a smaller body",

@@ -1,1 +1,1 @@
-"""What an element does: materials, laws, and the kernels that turn deformation into forces."""
+"""Elements: materials, laws, and the kernels that turn deformation into forces."""

@@ -1,6 +1,6 @@
-"""What has happened in the steps since it was last asked."""
+"""Events of the steps since the last drain."""
 
-from taichi_soft.events.event_state import Known, Memory
+from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (
     ContactBegan,
     ContactEnded,
@@ -21,11 +21,11 @@ __all__ = [
     "ContactEnded",
     "Event",
     "EventLog",
+    "EventState",
     "FellAsleep",
     "Froze",
-    "Known",
+    "HandleLookup",
     "Listener",
-    "Memory",
     "Observer",
     "Released",
     "StressExceeded",

@@ -1,4 +1,4 @@
-"""Which contacts go on, from the impulses of each step."""
+"""Contacts that are active, from the impulses of each step."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.kernels.touches import OF_BODY
 from taichi_soft.core.handles import serial_of
-from taichi_soft.events.event_state import CONTACT_WIDTH, Known
+from taichi_soft.events.event_state import CONTACT_WIDTH, HandleLookup
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
 
 CONTACT_PAUSE = 0.05
-"""Time without an impulse [s] after which a contact has ended. Single vertices of what rests, rolls or slides
-lose and find the ground all the time; a hop as long as this is 3 mm high."""
+"""Time without an impulse [s] after which a contact ends. Single vertices of a body that rests, rolls or
+slides leave the ground and touch it again all the time; a hop of this duration is 3 mm high."""
 
 Key = tuple[int, int, int]
-"""A body, what the other is, and that collider or body: rows of `read_touches`."""
+"""Index of a body, kind of the other object, index of that collider or body: rows of `read_touches`."""
 
 Vector = tuple[float, float, float]
 
@@ -30,25 +30,25 @@ class _Contact:
     a: SoftBody
     b: Collider | SoftBody
     began: float  # [s], start of the first step with an impulse
-    touched: float  # [s], end of the last, or of rest
-    pause: float = 0.0  # [s] in which either of them has moved since
+    touched: float  # [s], end of the last step with an impulse, or in which both objects rested
+    pause: float = 0.0  # [s] without an impulse since then, while either object moved
     impulse: Vector = (0.0, 0.0, 0.0)  # [N s]
 
     def add(self, impulse: Vector, time: float) -> None:
-        """An impulse in the step that ends at `time` [s]."""
+        """Add the impulse of the step that ends at `time` [s]."""
         (x, y, z), (dx, dy, dz) = self.impulse, impulse
         self.impulse = (x + dx, y + dy, z + dz)
         self.touched, self.pause = time, 0.0
 
-    def wait(self, dt: float, time: float, is_moving: bool) -> None:
-        """A step without an impulse: where neither moves, they lie as they lay."""
+    def skip(self, dt: float, time: float, is_moving: bool) -> None:
+        """Skip a step without an impulse. Between resting objects the contact continues."""
         if is_moving:
             self.pause += dt
         else:
             self.touched = time
 
     @property
-    def is_over(self) -> bool:
+    def has_ended(self) -> bool:
         return self.pause > CONTACT_PAUSE - 1e-9 or not (self.a.is_alive and self.b.is_alive)
 
     def end(self, step: int, time: float) -> ContactEnded:
@@ -57,11 +57,11 @@ class _Contact:
 
 @dataclass
 class Contacts:
-    """The contacts that go on now."""
+    """Contacts that are active now."""
 
-    _going_on: dict[Key, _Contact] = field(default_factory=dict)
+    _active: dict[Key, _Contact] = field(default_factory=dict)
 
-    def follow(
+    def update(
         self,
         touches: dict[Key, Vector],
         handles: Callable[[Key], tuple[SoftBody, Collider | SoftBody]],
@@ -70,47 +70,47 @@ class Contacts:
         time: float,
         dt: float,
     ) -> tuple[list[ContactBegan], list[ContactEnded]]:
-        """What began and what ended in a step, each in the order of the keys.
+        """Update the contacts after a step. Returns: those that began and those that ended, by key.
 
         Args:
-            touches: what the first of each pair that touched gave the second [N s].
-            handles: of a pair.
-            moving: indices of the bodies that move: between others a contact just goes on.
-            step, time, dt: of the world; at its end [s]; its length [s].
+            touches: impulse that the first of each touching pair gave the second [N s].
+            handles: returns the two handles of a pair.
+            moving: indices of the bodies that move; between resting objects a contact continues.
+            step, time, dt: index of the step; its end [s]; its length [s].
         """
         ended = []
-        for key in sorted(self._going_on):
-            contact = self._going_on[key]
+        for key in sorted(self._active):
+            contact = self._active[key]
             if key not in touches:
-                contact.wait(dt, time, key[0] in moving or (key[1] == OF_BODY and key[2] in moving))
-            if contact.is_over:
-                del self._going_on[key]
+                contact.skip(dt, time, key[0] in moving or (key[1] == OF_BODY and key[2] in moving))
+            if contact.has_ended:
+                del self._active[key]
                 ended.append(contact.end(step, time))
         began = []
         for key in sorted(touches):
-            if key not in self._going_on:
+            if key not in self._active:
                 a, b = handles(key)
-                self._going_on[key] = _Contact(a, b, time - dt, time)
+                self._active[key] = _Contact(a, b, time - dt, time)
                 began.append(ContactBegan(step, time, a, b, np.array(touches[key])))
-            self._going_on[key].add(touches[key], time)
+            self._active[key].add(touches[key], time)
         return began, ended
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """All of them, as `Memory` keeps them."""
+        """All contacts as rows of `EventState.contacts`."""
         rows = [
             (*key, serial_of(c.a), serial_of(c.b), c.began, c.touched, c.pause, *c.impulse)
-            for key, c in sorted(self._going_on.items())
+            for key, c in sorted(self._active.items())
         ]
         return np.array(rows, dtype=np.float64).reshape(-1, CONTACT_WIDTH)
 
-    def recall(self, rows: NDArray[np.float64], known: Known) -> None:
-        """Go on with the contacts of an earlier state; who was gone then, and nobody knows, has none."""
-        going_on: dict[Key, _Contact] = {}
+    def restore(self, rows: NDArray[np.float64], lookup: HandleLookup) -> None:
+        """Continue with the contacts of an earlier state, except those of objects that no longer exist."""
+        active: dict[Key, _Contact] = {}
         for row in rows.tolist():
             i, kind, j, serial, other = map(int, row[:5])
-            a, b = known.body(serial), (known.body if kind == OF_BODY else known.collider)(other)
+            a, b = lookup.body(serial), (lookup.body if kind == OF_BODY else lookup.collider)(other)
             if a is not None and b is not None and (a.index, b.index) == (i, j):
                 began, touched, pause, x, y, z = row[5:]
-                going_on[i, kind, j] = _Contact(a, b, began, touched, pause, (x, y, z))
-        self._going_on = going_on
+                active[i, kind, j] = _Contact(a, b, began, touched, pause, (x, y, z))
+        self._active = active

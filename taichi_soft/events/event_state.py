@@ -1,6 +1,6 @@
-"""What the events of coming steps depend on, of the steps before: kept in a snapshot, beside the state.
+"""State on which the events of coming steps depend. A snapshot stores it separately from the world's state.
 
-It is no part of the state: two worlds in step may listen to different events.
+It is not part of the world's state: two worlds in lockstep can record different events.
 """
 
 from __future__ import annotations
@@ -19,60 +19,60 @@ from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
 
 CONTACT_WIDTH = 11
-"""A row of a contact: key (3), serial numbers of the two, began, touched, pause [s], impulse (3) [N s]."""
+"""Columns of a contact: key (3), serial numbers of the two, began, touched, pause [s], impulse (3) [N s]."""
 
 _KINDS = {kind.__name__: kind for kind in STRESS_KINDS}
 
 
 @dataclass(frozen=True)
-class Known:
-    """Handles that somebody holds, by their serial numbers."""
+class HandleLookup:
+    """Lookup of the handles that the caller still holds, by serial number."""
 
     body: Callable[[int], SoftBody | None]
     collider: Callable[[int], Collider | None]
 
 
 @dataclass
-class WatchNote:
-    """A watch of `Body.watch_stress` or `watch_tearing`."""
+class WatchEntry:
+    """Stored watch of `Body.watch_stress` or `watch_tearing`."""
 
     kind: type[Event]
     serial: int  # of the body
     threshold: float  # [Pa]
-    is_over: bytes  # a bit for each tetrahedron, in kernel order
+    is_above: bytes  # one bit for each tetrahedron above the threshold, in kernel order
 
 
 @dataclass
-class Memory:
-    """None for what nobody asked for."""
+class EventState:
+    """State of the events. None for kinds that are not recorded."""
 
-    status: NDArray[np.int32] | None  # of the bodies in each slot, after the last step
-    contacts: NDArray[np.float64] | None  # that go on, (k, CONTACT_WIDTH)
-    watches: list[WatchNote]
+    status: NDArray[np.int32] | None  # of the body in each slot, after the last step
+    contacts: NDArray[np.float64] | None  # active contacts, (k, CONTACT_WIDTH)
+    watches: list[WatchEntry]
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As data that JSON takes."""
+        """As data for JSON."""
         return {
             "status": None if self.status is None else self.status.tolist(),
             "contacts": as_plain(self.contacts),
-            "watches": [[w.kind.__name__, w.serial, w.threshold, w.is_over.hex()] for w in self.watches],
+            "watches": [[w.kind.__name__, w.serial, w.threshold, w.is_above.hex()] for w in self.watches],
         }
 
     @classmethod
-    def of(cls, plain: Any, slots: int) -> Memory:
-        """The same again, for a world of so many slots. Raises: ValueError, or what Python raises."""
+    def of(cls, plain: Any, slots: int) -> EventState:
+        """Read `plain` for a world with a number of slots. Raises: ValueError, or what Python raises."""
         status, contacts = plain["status"], from_plain(plain["contacts"])
         if status is not None:
             status = np.array(status, dtype=np.int32)
             if status.shape != (slots,) or not ((status >= 0) & (status <= ABSENT)).all():
-                raise ValueError("it does not know who slept")
+                raise ValueError("the status of the bodies in its event state is invalid")
         if contacts is not None:
             contacts = np.array(contacts, dtype=np.float64)
             if contacts.shape != (len(contacts), CONTACT_WIDTH) or not np.isfinite(contacts).all():
-                raise ValueError("a contact is none")
+                raise ValueError("a contact in its event state is invalid")
         watches = [
-            WatchNote(_KINDS[kind], int(serial), float(threshold), bytes.fromhex(is_over))
-            for kind, serial, threshold, is_over in plain["watches"]
+            WatchEntry(_KINDS[kind], int(serial), float(threshold), bytes.fromhex(is_above))
+            for kind, serial, threshold, is_above in plain["watches"]
         ]
         return cls(status, contacts, watches)

@@ -1,4 +1,4 @@
-"""What can happen in a step, by kind."""
+"""Kinds of events."""
 
 from __future__ import annotations
 
@@ -20,102 +20,102 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """Something that happened in a fixed step."""
+    """An event in a fixed step."""
 
-    step: int  # of the world, counted from 0
+    step: int  # index of the step, from 0
     time: float  # [s], at the end of that step
 
 
 @dataclass(frozen=True, eq=False)
 class Released(Event):
-    """`Body.set_level` with `release=True` has released what has no place at the new level.
+    """`Body.set_level` with `release=True` released handles without vertices at the new level.
 
-    It happens before a step: `step` is the coming one, and `time` is that at its beginning.
+    It happens between steps: `step` is the coming step, and `time` its start.
     """
 
-    body: SoftBody  # whose level of detail changes
-    handles: tuple[Attachment | Joint | Motor, ...]  # which are dead now
+    body: SoftBody  # body whose level of detail changed
+    handles: tuple[Attachment | Joint | Motor, ...]  # released handles, which are no longer alive
 
 
 @dataclass(frozen=True, eq=False)
 class ContactBegan(Event):
-    """A body has begun to touch a collider (the floor is one) or another body.
+    """A body began to touch a collider (the floor is one) or another body.
 
-    `a` is always a soft body. `isinstance(event.b, Collider)` tells what it touches.
+    `a` is always a soft body. `isinstance(event.b, Collider)` is True for a collider.
     """
 
     a: SoftBody  # the body; of two bodies the one with the smaller index
     b: Collider | SoftBody  # the collider, or the other body
-    impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; a hit may go on in the next one
+    impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; an impact can continue in the next step
 
 
 @dataclass(frozen=True, eq=False)
 class ContactEnded(Event):
-    """A body and a collider, or two bodies, have not touched for 0.05 s, or one of them was removed."""
+    """A body and a collider, or two bodies, did not touch for 0.05 s, or one of them was removed."""
 
     a: SoftBody  # as in `ContactBegan`
     b: Collider | SoftBody  # as in `ContactBegan`
-    impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
-    duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep
+    impulse: Floats  # (3,) that `a` gave `b` in total [N s]; none is counted while bodies sleep
+    duration: float  # [s] from start of the first step with an impulse to end of the last, or of sleep
 
 
 @dataclass(frozen=True, eq=False)
 class StressExceeded(Event):
-    """Tetrahedra have come over the von Mises stress that `Body.watch_stress` was given.
+    """Tetrahedra exceeded the von Mises stress given to `Body.watch_stress`.
 
-    Of a body that `watch_stress` was not called for nothing is told.
+    Only bodies with a call of `watch_stress` send these events.
     """
 
-    body: SoftBody  # that the tetrahedra belong to
-    tetrahedra: Ints  # (k,) those that were not over it before, ascending
-    stress: Floats  # (k,) von Mises, as `Body.tet_stress` [Pa]
+    body: SoftBody  # body of the tetrahedra
+    tetrahedra: Ints  # (k,) that did not exceed it before, ascending
+    stress: Floats  # (k,) von Mises stress [Pa], see `Body.tet_stress`
 
 
 @dataclass(frozen=True, eq=False)
 class TearCandidates(Event):
-    """Tetrahedra are pulled harder than `Body.watch_tearing` allows: where a tear would begin (Rankine).
+    """Tetrahedra exceeded the tensile stress given to `Body.watch_tearing`: tears start there (Rankine).
 
-    Of a body that `watch_tearing` was not called for nothing is told. Nothing tears by it: see `Torn`.
+    Only bodies with a call of `watch_tearing` send these events. They do not tear the body: see `Torn`.
     """
 
-    body: SoftBody  # that the tetrahedra belong to
-    tetrahedra: Ints  # (k,) those that were not before, ascending
+    body: SoftBody  # body of the tetrahedra
+    tetrahedra: Ints  # (k,) that did not exceed it before, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
-    normals: Floats  # (k, 3) its direction, which is the normal of the tear; either sign
+    normals: Floats  # (k, 3) direction of that stress, which is the normal of the tear; either sign
 
 
 @dataclass(frozen=True, eq=False)
 class FellAsleep(Event):
-    """A body has come to rest, and is not moved until something wakes it."""
+    """A body came to rest, and does not move until something wakes it."""
 
-    body: SoftBody  # that sleeps
+    body: SoftBody  # the sleeping body
 
 
 @dataclass(frozen=True, eq=False)
 class Woke(Event):
     """A sleeping body moves again."""
 
-    body: SoftBody  # that moves again
+    body: SoftBody  # the body that woke
 
 
 @dataclass(frozen=True, eq=False)
 class Froze(Event):
-    """A body went non-finite and was put back to where it was before the step."""
+    """A body became non-finite, and was reset to its state before the step."""
 
-    body: SoftBody  # that is frozen
+    body: SoftBody  # the frozen body
 
     @property
     def failure(self) -> Failure | None:
-        """What broke first: `body.failure`, which is found out when first asked, and None once it moves."""
+        """Cause of the failure: `body.failure`, computed on first access; None once the body moves again."""
         return self.body.failure
 
 
 @dataclass(frozen=True, eq=False)
 class Torn(Event):
-    """A body with `Tearing` has torn after that step; whoever calls `Body.cut` knows without being told."""
+    """A body with `Tearing` tore after that step. `Body.cut` sends no event, because the caller knows."""
 
-    body: SoftBody  # what is left of it; see `Body.topology_version`
-    pieces: tuple[SoftBody, ...]  # new bodies that fell off, the largest first; () if it holds together
+    body: SoftBody  # the largest piece; see `Body.topology_version`
+    pieces: tuple[SoftBody, ...]  # new bodies, the largest first; () if the body stays connected
 
 
 KINDS: tuple[type[Event], ...] = (
@@ -129,7 +129,7 @@ KINDS: tuple[type[Event], ...] = (
     Froze,
     Torn,
 )
-"""In the order in which the events of one step come."""
+"""All kinds, in the order in which the events of one step are sent."""
 
 CONTACT_KINDS = frozenset((ContactBegan, ContactEnded))
 STRESS_KINDS = frozenset((StressExceeded, TearCandidates))

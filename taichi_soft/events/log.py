@@ -1,4 +1,4 @@
-"""What has happened in a world since it was last asked, and who wants to hear of it."""
+"""Queue of the events of a world, and its listeners."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Any
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError, StateError
-from taichi_soft.events.event_state import Known, Memory
+from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
-MOST_EVENTS = 10_000
-"""That wait to be drained; then the oldest are dropped."""
+MAX_EVENTS = 10_000
+"""Largest number of events in the queue. Beyond it, the oldest are dropped."""
 
-_WAY_OUT = "call drain_events in every frame, or record fewer kinds"
+_DRAIN_HINT = "call drain_events in every frame, or record fewer kinds"
 
 
 class Listener:
-    """A function that hears of events until `remove` is called."""
+    """A function that receives events until `remove` is called."""
 
     def __init__(self, kind: type[Event], function: Callable[[Any], object]) -> None:
         """Made by `World.on`."""
@@ -28,23 +28,23 @@ class Listener:
         self.is_active = True
 
     def remove(self) -> None:
-        """Hear of nothing more, also of what waits already."""
+        """Stop receiving events, including those already in the queue."""
         self.is_active = False
 
 
 class EventLog:
-    """The events of one world. Nothing is recorded until somebody asks."""
+    """The events of one world. Nothing is recorded before the first call of `record` or `on`."""
 
     def __init__(self, observer: Observer) -> None:
-        """Args: observer: who looks at the world."""
+        """Args: observer: finds the events of each step."""
         self._observer = observer
         self._kinds: frozenset[type[Event]] = frozenset()
-        self._was_asked = False
+        self._is_recording = False
         self._waiting: deque[Event] = deque()
-        self._heard = 0  # of those that wait, by listeners
+        self._delivered = 0  # events in the queue that listeners have received
         self._listeners: list[Listener] = []
         self._is_draining = False
-        self._has_lost = False  # since the last drain
+        self._has_warned = False  # True once a loss was reported since the last drain
         self.dropped = 0
 
     def record(self, kinds: Iterable[type[Event]]) -> None:
@@ -53,92 +53,97 @@ class EventLog:
             listed = list(kinds)
         except TypeError:
             raise OptionError(f"kinds must be a list of classes of events, got {kinds!r}") from None
-        chosen: frozenset[type[Event]] = frozenset().union(*[self._parts(kind) for kind in listed])
-        self._record(chosen)
+        recorded: frozenset[type[Event]] = frozenset().union(*[self._kinds_of(kind) for kind in listed])
+        self._record(recorded)
 
-    def _parts(self, kind: Any) -> frozenset[type[Event]]:
-        """The kinds that a class stands for. Raises: see `World.record_events`."""
+    def _kinds_of(self, kind: Any) -> frozenset[type[Event]]:
+        """Kinds that a class stands for. Raises: see `World.record_events`."""
         is_class = isinstance(kind, type) and issubclass(kind, Event)
-        parts = frozenset(part for part in KINDS if is_class and issubclass(part, kind))
-        if not parts:
-            raise OptionError(f"kind must be a class of events such as ContactBegan, or Event, got {kind!r}")
-        if parts <= CONTACT_KINDS and not self._observer.knows_contacts:
-            raise StateError(
-                f"{kind.__name__} is not seen in a world without colliders and soft_contact: make it with "
-                "collider_room=1, then its floor is a collider too"
+        kinds = frozenset(part for part in KINDS if is_class and issubclass(part, kind))
+        if not kinds:
+            raise OptionError(
+                f"kind must be a class of events, for example ContactBegan or Event, got {kind!r}"
             )
-        return parts
+        if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
+            raise StateError(
+                f"{kind.__name__} is not recorded in a world without colliders and soft_contact: make the "
+                "world with collider_room=1, so that its floor is a collider"
+            )
+        return kinds
 
     def _record(self, kinds: frozenset[type[Event]]) -> None:
-        if not self._observer.knows_contacts:
+        if not self._observer.has_contacts:
             kinds = kinds - CONTACT_KINDS
         self._observer.begin(kinds, self._kinds)
-        self._kinds, self._was_asked = kinds, True
+        self._kinds, self._is_recording = kinds, True
 
     @property
     def is_recording(self) -> bool:
-        """Whether somebody asked for events."""
-        return self._was_asked
+        """True if events are recorded."""
+        return self._is_recording
 
     def on(self, kind: type[Event], function: Callable[[Any], object]) -> Listener:
         """See `World.on`."""
-        parts = self._parts(kind)
+        kinds = self._kinds_of(kind)
         if not callable(function):
             raise OptionError(f"function must be callable with an event, got {function!r}")
-        self._record(self._kinds | parts)
+        self._record(self._kinds | kinds)
         listener = Listener(kind, function)
         self._listeners.append(listener)
         return listener
 
     def watch(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
-        """Look at a body's stress for one of `STRESS_KINDS`, from a threshold [Pa] on; None for no longer."""
+        """Watch a body's stress for one of `STRESS_KINDS`, from a threshold [Pa] on; None stops it."""
         self._observer.stress.set(kind, body, threshold)
         if threshold is not None:
             self._record(self._kinds | {kind})
 
     def warm_up(self) -> None:
-        """Look at the world as after a step, and tell nobody: see `World.warm_up`."""
+        """Evaluate the world as after a step without recording: see `World.warm_up`."""
         self._observer.warm_up()
 
     def renew_watches(self, body: SoftBody) -> None:
-        """Look at the tetrahedra that a cut has left of a body."""
+        """Update the watches of a body that lost tetrahedra in a cut."""
         self._observer.stress.renew(body)
 
-    def note_frozen(self, body: SoftBody) -> None:
-        """The step that is being made has frozen a body."""
+    def record_frozen(self, body: SoftBody) -> None:
+        """Record that the current step froze a body."""
         if self._kinds:
-            self._observer.note_frozen(body)
+            self._observer.record_frozen(body)
 
-    def note_torn(self, step: int, time: float, body: SoftBody, pieces: tuple[SoftBody, ...]) -> None:
-        """What the step that ended at `time` [s] has pulled too hard has torn a body."""
+    def record_torn(self, step: int, time: float, body: SoftBody, pieces: tuple[SoftBody, ...]) -> None:
+        """Record that the step that ended at `time` [s] tore a body."""
         if Torn in self._kinds:
             self._waiting.append(Torn(step, time, body, pieces))
 
-    def note_released(self, step: int, time: float, body: SoftBody, handles: tuple[Any, ...]) -> None:
-        """A change of its level before `step`, at `time` [s], has released what held a body."""
+    def record_released(self, step: int, time: float, body: SoftBody, handles: tuple[Any, ...]) -> None:
+        """Record that a change of level before `step`, at `time` [s], released handles of a body."""
         if handles and Released in self._kinds:
             self._waiting.append(Released(step, time, body, handles))
 
-    def remember(self) -> Memory:
-        """What the events of coming steps depend on."""
-        return self._observer.remember(self._kinds)
+    def save(self) -> EventState:
+        """State on which the events of coming steps depend."""
+        return self._observer.save(self._kinds)
 
-    def forget_since(self, step: int) -> None:
-        """Drop the events that wait from that step on: it was undone."""
+    def drop_since(self, step: int) -> None:
+        """Drop the queued events from that step on, because it was undone."""
         while self._waiting and self._waiting[-1].step >= step:
             self._waiting.pop()
-        self._heard = min(self._heard, len(self._waiting))
+        self._delivered = min(self._delivered, len(self._waiting))
 
-    def recall(self, memory: Memory, step: int, known: Known) -> None:
-        """Look at the world, which was put back to a state of that step count, as after that step."""
-        self._observer.recall(self._kinds, memory, step, known)
+    def restore(self, saved: EventState, step: int, lookup: HandleLookup) -> None:
+        """Continue after a restored step.
+
+        Args: saved: stored with that step. lookup: handles that the caller holds.
+        """
+        self._observer.restore(self._kinds, saved, step, lookup)
 
     def collect(self, step: int, time: float, dt: float) -> str:
-        """Take down what happened in a step.
+        """Record the events of a step.
 
         Args:
-            step, time, dt: its number, its end [s], its length [s].
-        Returns: for the first time since a drain, why something is lost; "" where nothing is.
+            step, time, dt: index of the step; its end [s]; its length [s].
+        Returns: the reason for lost events, at the first loss since a drain; otherwise "".
         """
         if not self._kinds:
             return ""
@@ -146,36 +151,36 @@ class EventLog:
             if type(event) in self._kinds:
                 self._waiting.append(event)
         loss = ""
-        while len(self._waiting) > MOST_EVENTS:
+        while len(self._waiting) > MAX_EVENTS:
             self._waiting.popleft()
-            self._heard = max(self._heard - 1, 0)
+            self._delivered = max(self._delivered - 1, 0)
             self.dropped += 1
-            loss = f"more than {MOST_EVENTS:,} events wait and the oldest are dropped: {_WAY_OUT}"
+            loss = f"more than {MAX_EVENTS:,} events are queued and the oldest are dropped: {_DRAIN_HINT}"
         if self._observer.lost_touches:
-            loss = "more pairs of bodies touch than can be told apart: some contacts have no events"
-        is_news, self._has_lost = not self._has_lost, self._has_lost or bool(loss)
-        return loss if is_news else ""
+            loss = "more pairs of bodies touch than can be recorded: some contacts have no events"
+        is_new, self._has_warned = not self._has_warned, self._has_warned or bool(loss)
+        return loss if is_new else ""
 
     def drain(self) -> list[Event]:
         """See `World.drain_events`."""
-        if not self._was_asked:
+        if not self._is_recording:
             raise StateError("no events are recorded: call record_events() once, or on() with a listener")
         if self._is_draining:
-            raise StateError("drain_events was called by a listener: it hears of all that waits anyway")
+            raise StateError("drain_events was called by a listener, which receives all queued events anyway")
         self._is_draining = True
         try:
-            self._tell(list(self._waiting)[self._heard :])
+            self._notify(list(self._waiting)[self._delivered :])
         finally:
             self._is_draining = False
-        self._has_lost = False
-        heard, self._heard = self._heard, 0
-        return [self._waiting.popleft() for _ in range(heard)]
+        self._has_warned = False
+        delivered, self._delivered = self._delivered, 0
+        return [self._waiting.popleft() for _ in range(delivered)]
 
-    def _tell(self, events: list[Event]) -> None:
-        """Let all listeners hear of events. Raises: the first exception of one of them, at the end."""
-        self._heard += len(events)
+    def _notify(self, events: list[Event]) -> None:
+        """Send events to all listeners. Raises: the first exception of a listener, after all were called."""
+        self._delivered += len(events)
         self._listeners = [listener for listener in self._listeners if listener.is_active]
-        listeners, errors = tuple(self._listeners), []  # who comes meanwhile hears of what comes later
+        listeners, errors = tuple(self._listeners), []  # listeners added meanwhile receive later events only
         for event in events:
             for listener in listeners:
                 if listener.is_active and isinstance(event, listener.kind):

@@ -1,4 +1,4 @@
-"""Who looks at a world after each step and says what has happened in it."""
+"""Find the events of each step from the state of the world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
-from taichi_soft.events.event_state import Known, Memory
+from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (
     CONTACT_KINDS,
     SLEEP_KINDS,
@@ -32,12 +32,12 @@ from taichi_soft.events.stress import StressWatches
 
 
 def touch_rows(room: ContactCapacity, bodies: int) -> int:
-    """How many pairs can touch in a step."""
+    """Largest number of pairs that can touch in a step."""
     return bodies * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
 
 
 class Observer:
-    """Compares each step with the one before it."""
+    """Finds events by comparing each step with the one before."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Observer:
         slots: Sequence[SoftBody | None],
         colliders: Colliders | None,
     ) -> None:
-        """Args: state: all fields of a world; slots: the body in each; colliders: None without contact."""
+        """Args: state: all fields of the world. slots: the body in each. colliders: None without contact."""
         self._state = state
         self._slots = slots
         self._colliders = colliders
@@ -59,40 +59,40 @@ class Observer:
         rows = touch_rows(room, len(slots))
         self._read = np.zeros(len(slots) + 2, dtype=np.int32)  # `status` of `read_touches`
         self._status = self._read[:-2]  # of each slot, after the last step
-        self._who = np.zeros((rows, 3), dtype=np.int32)
+        self._pairs = np.zeros((rows, 3), dtype=np.int32)
         self._impulses = np.zeros((rows, 3), dtype=np.float32)
-        self.lost_touches = False  # whether in the last step more pairs of bodies touched than have room
+        self.lost_touches = False  # True if more pairs touched in the last step than fit into the rows
 
     @property
-    def knows_contacts(self) -> bool:
-        """Whether the world was built with colliders or soft contact."""
+    def has_contacts(self) -> bool:
+        """True if the world was built with colliders or soft contact."""
         return self._colliders is not None
 
     def begin(self, kinds: frozenset[type[Event]], before: frozenset[type[Event]]) -> None:
-        """Look for `kinds` from now on, where it was for those `before`."""
-        if self.knows_contacts and self._state.capacity.contact.soft:
+        """Start observing `kinds`, after observing the kinds in `before`."""
+        if self.has_contacts and self._state.capacity.contact.soft:
             self._state.soft.records_touches[None] = int(bool(kinds & CONTACT_KINDS))
         if kinds & (CONTACT_KINDS | SLEEP_KINDS):
-            self._look()
+            self._read_step()
         if not before & CONTACT_KINDS:
             self._contacts = Contacts()
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
     def warm_up(self) -> None:
-        """Read stress and what touches, and take no note. What touched is forgotten, as where it is read."""
+        """Read stresses and touches without recording. Reading clears the touches."""
         self.stress.warm_up()
-        who, impulses = np.empty_like(self._who), np.empty_like(self._impulses)
-        read_touches(self._state, len(self._slots), self._read.copy(), who, impulses)
+        pairs, impulses = np.empty_like(self._pairs), np.empty_like(self._impulses)
+        read_touches(self._state, len(self._slots), self._read.copy(), pairs, impulses)
 
-    def note_frozen(self, body: SoftBody) -> None:
-        """The step that is being made has frozen a body."""
+    def record_frozen(self, body: SoftBody) -> None:
+        """Record that the current step froze a body."""
         self._frozen.append(body)
 
     def events(self, kinds: frozenset[type[Event]], step: int, time: float, dt: float) -> Iterator[Event]:
-        """What happened in the step that ends at `time` [s], of some kinds, in their order."""
+        """Yield the events of some kinds in the step that ends at `time` [s], in the order of `KINDS`."""
         if kinds & (CONTACT_KINDS | SLEEP_KINDS):
-            self._look()
+            self._read_step()
         else:
             self.lost_touches = False
         if kinds & CONTACT_KINDS:
@@ -100,16 +100,16 @@ class Observer:
             count = self._read[-1]
             touches = dict(
                 zip(
-                    map(tuple, self._who[:count].tolist()),
+                    map(tuple, self._pairs[:count].tolist()),
                     map(tuple, self._impulses[:count].tolist()),
                     strict=True,
                 )
             )
-            began, ended = self._contacts.follow(touches, self._handles, moving, step, time, dt)
+            began, ended = self._contacts.update(touches, self._handles, moving, step, time, dt)
             yield from began
             yield from ended
         if kinds & STRESS_KINDS:
-            self.stress.look()
+            self.stress.update()
             yield from self.stress.events(StressExceeded, step, time)
             yield from self.stress.events(TearCandidates, step, time)
         if kinds & SLEEP_KINDS:
@@ -122,34 +122,36 @@ class Observer:
         for body in frozen:
             yield Froze(step, time, body)
 
-    def remember(self, kinds: frozenset[type[Event]]) -> Memory:
-        """What events of some kinds depend on."""
-        return Memory(
+    def save(self, kinds: frozenset[type[Event]]) -> EventState:
+        """State on which the events of the given kinds depend."""
+        return EventState(
             self._status.copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
-            self.stress.notes if kinds & STRESS_KINDS else [],
+            self.stress.entries if kinds & STRESS_KINDS else [],
         )
 
-    def recall(self, kinds: frozenset[type[Event]], memory: Memory, step: int, known: Known) -> None:
-        """The world was put back to a state of that step count: go on as after it, where that is known."""
+    def restore(
+        self, kinds: frozenset[type[Event]], saved: EventState, step: int, lookup: HandleLookup
+    ) -> None:
+        """Continue after a restored step, with its events where they were stored."""
         self._frozen = []
-        if kinds & CONTACT_KINDS and memory.contacts is not None:
-            self._contacts.recall(memory.contacts, known)
+        if kinds & CONTACT_KINDS and saved.contacts is not None:
+            self._contacts.restore(saved.contacts, lookup)
         else:
             self._contacts = Contacts()
-        if memory.status is not None:
-            self._status[:] = memory.status
-            # Who came after the last step took the slot of one who may have slept in it.
+        if saved.status is not None:
+            self._status[:] = saved.status
+            # A body spawned after the last step can occupy the slot of one that slept.
             asleep = self._sleeping().items()
             self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
         elif kinds & (CONTACT_KINDS | SLEEP_KINDS):
-            self._look()
+            self._read_step()
             self._sleepers = self._sleeping()
-        self.stress.recall(memory.watches if kinds & STRESS_KINDS else [], known)
+        self.stress.restore(saved.watches if kinds & STRESS_KINDS else [], lookup)
 
-    def _look(self) -> None:
-        """Read who touched whom in the last step, and who sleeps."""
-        read_touches(self._state, len(self._slots), self._read, self._who, self._impulses)
+    def _read_step(self) -> None:
+        """Read the touches of the last step, and the status of all bodies."""
+        read_touches(self._state, len(self._slots), self._read, self._pairs, self._impulses)
         self.lost_touches = bool(self._read[-2])
 
     def _handles(self, key: Key) -> tuple[SoftBody, Collider | SoftBody]:

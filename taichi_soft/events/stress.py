@@ -1,4 +1,4 @@
-"""Watched bodies: which tetrahedra come over a stress in a step."""
+"""Watched bodies: find tetrahedra that exceed a stress in a step."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.handles import serial_of
 from taichi_soft.elements.kernels.stress import NO_LIMIT, read_stress
-from taichi_soft.events.event_state import Known, WatchNote
+from taichi_soft.events.event_state import HandleLookup, WatchEntry
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 
-BACK_BELOW = 0.9
-"""Part of a threshold below which a tetrahedron has to come before it can come over it again: or one that
-vibrates about it would do so in every other step."""
+RESET_FRACTION = 0.9
+"""Fraction of a threshold below which the stress must fall before the tetrahedron can exceed it again.
+Without it, a tetrahedron that vibrates about the threshold would exceed it in every other step."""
 
 VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 """Columns of `read_stress`."""
@@ -30,84 +30,84 @@ VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 class _Watch:
     body: SoftBody
     threshold: float  # [Pa]
-    is_over: NDArray[np.bool_]  # (m,) in kernel order
+    is_above: NDArray[np.bool_]  # (m,) in kernel order
 
-    def newly_over(self, stress: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Rows of those that have come over the threshold, given the stress of all (m,) [Pa]."""
-        over = stress > self.threshold
-        fresh = np.flatnonzero(over & ~self.is_over)
-        self.is_over &= stress >= BACK_BELOW * self.threshold
-        self.is_over |= over
-        return fresh
+    def newly_above(self, stress: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Rows of the tetrahedra that newly exceed the threshold. Args: stress: (m,) [Pa]."""
+        above = stress > self.threshold
+        new = np.flatnonzero(above & ~self.is_above)
+        self.is_above &= stress >= RESET_FRACTION * self.threshold
+        self.is_above |= above
+        return new
 
 
 class StressWatches:
-    """The bodies of one world whose stress is looked at after each step."""
+    """Bodies of one world whose stress is checked after each step."""
 
     def __init__(self, state: BodyFields, program: Program, scene: Scene) -> None:
-        """Nothing is watched yet."""
+        """Start without watches."""
         self._state = state
         self._program = program
         self._scene = scene
         self._watches: dict[tuple[type[Event], SoftBody], _Watch] = {}
-        self._places: dict[SoftBody, slice] = {}  # of each one's tetrahedra in what is read
+        self._ranges: dict[SoftBody, slice] = {}  # rows of each body's tetrahedra in `_read`
         self._blocks = np.zeros(0, dtype=np.int32)
-        self._limits = np.zeros(0, dtype=np.float32)  # of each block, for tears [Pa]
+        self._limits = np.zeros(0, dtype=np.float32)  # tensile limit of each block [Pa]
         self._read = np.zeros((0, 5), dtype=np.float32)
 
     def set(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
-        """Watch a body for a kind of event from a stress [Pa] on; None for no longer."""
+        """Watch a body for a kind of event from a stress [Pa] on; None stops it."""
         self._watches.pop((kind, body), None)
         if threshold is not None:
-            self._watches[kind, body] = _Watch(body, threshold, self._none_over(body))
+            self._watches[kind, body] = _Watch(body, threshold, self._none_above(body))
         self._arrange()
         if len(self._blocks):
-            self._evaluate()  # so that nothing compiles in the game's next step
+            self._evaluate()  # so that the kernel is compiled before the game's next step
 
-    def _none_over(self, body: SoftBody) -> NDArray[np.bool_]:
+    def _none_above(self, body: SoftBody) -> NDArray[np.bool_]:
         return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)
 
     def renew(self, body: SoftBody) -> None:
-        """Go on with a body that has lost tetrahedra; those over a threshold count as new."""
+        """Continue with a body that lost tetrahedra; those above the threshold count as new."""
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:
                 self.set(kind, body, watch.threshold)
 
     @property
-    def notes(self) -> list[WatchNote]:
-        """Of all bodies that are alive."""
+    def entries(self) -> list[WatchEntry]:
+        """Watches of all bodies that are alive."""
         return [
-            WatchNote(kind, serial_of(body), watch.threshold, np.packbits(watch.is_over).tobytes())
+            WatchEntry(kind, serial_of(body), watch.threshold, np.packbits(watch.is_above).tobytes())
             for (kind, body), watch in self._watches.items()
             if body.is_alive
         ]
 
-    def recall(self, notes: list[WatchNote], known: Known) -> None:
-        """Go on as in an earlier state. Watches that were set since stay, and all over them count as new."""
-        if not notes and not self._watches:
+    def restore(self, entries: list[WatchEntry], lookup: HandleLookup) -> None:
+        """Continue as in an earlier state. Later watches stay, and all tetrahedra above them count as new."""
+        if not entries and not self._watches:
             return
         for (_, body), watch in self._watches.items():
-            watch.is_over = self._none_over(body)
-        for note in notes:
-            found = known.body(note.serial)
-            if found is not None:
-                bits = np.frombuffer(note.is_over, dtype=np.uint8)
-                is_over = np.unpackbits(bits, count=len(self._none_over(found))).astype(np.bool_)
-                self._watches[note.kind, found] = _Watch(found, note.threshold, is_over)
+            watch.is_above = self._none_above(body)
+        for entry in entries:
+            watched = lookup.body(entry.serial)
+            if watched is not None:
+                bits = np.frombuffer(entry.is_above, dtype=np.uint8)
+                is_above = np.unpackbits(bits, count=len(self._none_above(watched))).astype(np.bool_)
+                self._watches[entry.kind, watched] = _Watch(watched, entry.threshold, is_above)
         self._arrange()
 
     def _arrange(self) -> None:
         bodies = sorted({body for _, body in self._watches}, key=lambda body: body.index)
         ranges = [self._scene.ranges[body.index].blocks for body in bodies]
-        self._places, start = {}, 0
+        self._ranges, start = {}, 0
         for body, (first, last) in zip(bodies, ranges, strict=True):
             count = len(self._scene.bodies[body.index].tet_vertices)
-            self._places[body] = slice(start, start + count)
+            self._ranges[body] = slice(start, start + count)
             start += (last - first) * LANES
-        rows = [np.arange(*place, dtype=np.int32) for place in ranges]
+        rows = [np.arange(*span, dtype=np.int32) for span in ranges]
         self._blocks = np.concatenate([np.zeros(0, dtype=np.int32), *rows])
-        pulls = [self._watches.get((TearCandidates, body)) for body in bodies]
-        limits = [NO_LIMIT if watch is None else watch.threshold for watch in pulls]
+        tear_watches = [self._watches.get((TearCandidates, body)) for body in bodies]
+        limits = [NO_LIMIT if watch is None else watch.threshold for watch in tear_watches]
         self._limits = np.repeat(limits, [len(blocks) for blocks in rows]).astype(np.float32)
         self._read = np.zeros((start, 5), dtype=np.float32)
 
@@ -115,36 +115,36 @@ class StressWatches:
         read_stress(self._state, self._program, self._blocks, self._limits, self._read)
 
     def warm_up(self) -> None:
-        """Read a stress, and take no note."""
+        """Evaluate a stress without recording."""
         read_stress(
             *(self._state, self._program, np.zeros(1, np.int32), np.zeros(1, np.float32)),
             np.empty((LANES, 5), np.float32),
         )
 
     def events(self, kind: type[Event], step: int, time: float) -> Iterator[Event]:
-        """Of one kind, in the order of bodies, of what `look` has seen."""
-        for body, place in self._places.items():
+        """Yield events of one kind in the order of bodies, from the stress that `update` evaluated."""
+        for body, span in self._ranges.items():
             watch = self._watches.get((kind, body))
             if watch is None:
                 continue
             column = PRINCIPAL if kind is TearCandidates else VON_MISES
-            rows = watch.newly_over(self._read[place, column])
+            rows = watch.newly_above(self._read[span, column])
             if not len(rows):
                 continue
             names = self._scene.bodies[body.index].tet_order[rows].astype(np.int64)
             order = np.argsort(names)
-            found = self._read[place][rows[order]].astype(np.float64)
+            values = self._read[span][rows[order]].astype(np.float64)
             if kind is TearCandidates:
-                yield TearCandidates(step, time, body, names[order], found[:, PRINCIPAL], found[:, AXIS])
+                yield TearCandidates(step, time, body, names[order], values[:, PRINCIPAL], values[:, AXIS])
             else:
-                yield StressExceeded(step, time, body, names[order], found[:, VON_MISES])
+                yield StressExceeded(step, time, body, names[order], values[:, VON_MISES])
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Evaluate the stress of all watched bodies that are alive."""
-        gone = [key for key in self._watches if not key[1].is_alive]
-        for key in gone:
+        removed = [key for key in self._watches if not key[1].is_alive]
+        for key in removed:
             del self._watches[key]
-        if gone:
+        if removed:
             self._arrange()
         if len(self._blocks):
             self._evaluate()

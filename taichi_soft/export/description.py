@@ -26,14 +26,14 @@ from taichi_soft.control.motors import Motors
 from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
 from taichi_soft.core.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.events.contacts import CONTACT_PAUSE
-from taichi_soft.events.log import MOST_EVENTS
+from taichi_soft.events.log import MAX_EVENTS
 from taichi_soft.events.observer import touch_rows
 from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
 from taichi_soft.export.levels import constant_names, passage_arrays, slot_arrays
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.persistence.kernels.packing import OWNERS, carried, owners
-from taichi_soft.persistence.snapshot import carried_rows, steering
+from taichi_soft.persistence.snapshot import carried_rows, finite_fields
 from taichi_soft.solver.context import WorldContext
 
 Arrays = dict[str, NDArray[Any]]
@@ -96,7 +96,7 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/floor_collider": _ints([-1 if floor is None or not floor.is_alive else floor.index]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
-        "events/limits": _floats([CONTACT_PAUSE, MOST_EVENTS, touch_rows(room, len(context.slots.slots))]),
+        "events/limits": _floats([CONTACT_PAUSE, MAX_EVENTS, touch_rows(room, len(context.slots.slots))]),
         "grabs/limits": _floats(
             [PATCH_SIZE, FARTHEST_PULL, WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]
         ),
@@ -119,7 +119,7 @@ def _of_fields(context: WorldContext) -> Arrays:
     slices = [name for name, groups in state.carried.items() for _ in groups]
     grabs, motors = state.grabs, state.motors
     # What moves bodies must be finite.
-    moving = [state.particle_position, state.particle_velocity, *(field for _, field in steering(state))]
+    moving = [state.particle_position, state.particle_velocity, *(field for _, field in finite_fields(state))]
     moving += [grabs.weights, grabs.target, grabs.spring, grabs.limits, grabs.share]
     # Of grabs and motors all rows: the game makes more. Of joints and motors so many particles as they hold.
     whose = [_ALWAYS] * len(rows)

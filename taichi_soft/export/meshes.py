@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.kernels.render_mesh import write_render_mesh
 from taichi_soft.bodies.kernels.skin import write_skin
-from taichi_soft.bodies.render_mesh import FEWEST_SHARED as FEWEST_OF_SURFACE
+from taichi_soft.bodies.render_mesh import MIN_PARALLEL_VERTICES as FEWEST_OF_SURFACE
 from taichi_soft.bodies.render_mesh import render_table
-from taichi_soft.bodies.skin_mesh import FEWEST_SHARED as FEWEST_OF_SKIN
+from taichi_soft.bodies.skin_mesh import MIN_PARALLEL_VERTICES as FEWEST_OF_SKIN
 from taichi_soft.meshing.creases import split_at_creases
 
 CREASE = 40.0

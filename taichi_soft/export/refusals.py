@@ -67,7 +67,7 @@ def _of_assets(context: WorldContext) -> list[str]:
 def _of_bodies(context: WorldContext) -> list[str]:
     status = context.built.state.body_status.to_numpy()
     found = []
-    for body in context.slots.living:
+    for body in context.slots.occupants:
         if record_of(body).description is not present_asset(body).description:
             found.append(f"body {body.index} {MATERIAL}")
         if status[body.index] == SKIPPING:

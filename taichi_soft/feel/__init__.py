@@ -1,4 +1,4 @@
-"""From how a body is to behave back to what it is made of."""
+"""Material constants from the requested behaviour of a body."""
 
 from taichi_soft.feel.feel import Behaviour, Feel, material_from_feel
 

@@ -1,4 +1,4 @@
-"""A material from what a body should do: sag so far, wobble so fast, settle so soon."""
+"""Find a material for a requested behaviour: sag, vibration frequency and settling time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.first_mode import first_mode
-from taichi_soft.bodies.sag import MOST_SAG
+from taichi_soft.bodies.sag import MAX_SAG
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import OptionError
@@ -24,39 +24,41 @@ from taichi_soft.solver.substeps import FRAME, MANY_SUBSTEPS
 _log = logging.getLogger(__name__)
 
 SETTLED = 0.05
-"""What is left of a vibration when it has settled: the 5 % settling time of control engineering."""
+"""Fraction of a vibration's amplitude at its settling time: the 5 % settling time of control engineering."""
 
-DECAYS = -log(SETTLED)
-"""Rate of a vibration times its settling time."""
+DECAY_FACTOR = -log(SETTLED)
+"""Decay rate of a vibration times its settling time."""
 
-EXACT = 1e-5
-"""Change of the squared frequency at which the slowest mode is known well enough."""
+MODE_TOLERANCE = 1e-5
+"""Relative change of the squared frequency at which the search for the slowest mode ends."""
 
-CLOSE, PROMISED = 0.015, 0.05
-"""Of a wish: at which the search ends, and what it promises. A game's floor and steps differ a little."""
+TOLERANCE, GUARANTEED = 0.015, 0.05
+"""Relative error of a target at which the search ends, and that it guarantees. They differ because a game's
+floor and steps differ slightly from the simulated ones."""
 
-MOST_TRIALS = 8
+MAX_TRIALS = 8
+"""Largest number of simulations in a search."""
 
-SAGS = 1e-3, 0.3
-"""Below, a body looks rigid and rounding counts; above, none was seen that stays whole."""
+SAG_RANGE = 1e-3, 0.3
+"""Range of sags. Below it, a body looks rigid and rounding matters; above it, bodies invert."""
 
-SCALES = 0.05, 20.0
-"""Of gravity: beyond, nothing falls like this."""
+GRAVITY_SCALE_RANGE = 0.05, 20.0
+"""Range of gravity scales. Outside of it, motion does not look natural."""
 
-SWINGS = 1.0, 100.0
-"""Periods until a vibration has settled: fewer are not seen as a vibration, more not as its end."""
+PERIOD_RANGE = 1.0, 100.0
+"""Range of periods until a vibration settles: fewer do not look like a vibration, more never seem to end."""
 
-LEANS = 0.2
-"""Turn of a body [rad] from which on it does not stand: it rolls or tips over."""
+MAX_LEAN = 0.2
+"""Largest lean of a standing body [rad]. Beyond it, the body rolls or tips over."""
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """How a body behaves."""
+    """Behaviour of a body."""
 
-    sag: float  # lowering of its highest point as it stands on a floor, over its height; nan if it tips over
-    wobble_hz: float  # frequency of its slowest vibration where nothing holds it [Hz]
-    settle_s: float  # time after which a twentieth of that vibration is left [s]
+    sag: float  # lowering of its highest point over its height, standing on a floor; nan if it tips over
+    wobble_hz: float  # frequency of its slowest vibration when nothing holds it [Hz]
+    settle_s: float  # time after which 5 % of that vibration remain [s]
 
     def __str__(self) -> str:
         return f"sag {self.sag:.3g}, wobble_hz {self.wobble_hz:.3g}, settle_s {self.settle_s:.3g}"
@@ -64,12 +66,12 @@ class Behaviour:
 
 @dataclass(frozen=True)
 class Feel:
-    """What `material_from_feel` found."""
+    """Result of `material_from_feel`."""
 
     material: Material  # for `World.add_body`
-    gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were wished for
-    predicted: Behaviour  # by its statics, and by its slowest mode
-    simulated: Behaviour  # as in a game: put down on a floor, and ringing in the air
+    gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
+    predicted: Behaviour  # from its statics and its slowest mode
+    simulated: Behaviour  # as in a game: standing on a floor, and vibrating in the air
 
 
 def material_from_feel(
@@ -82,211 +84,216 @@ def material_from_feel(
     density: float = 1000.0,
     law: LawName | None = None,
 ) -> Feel:
-    """The Young's modulus, gravity_scale and damping with which a body behaves as wished.
+    """Find the Young's modulus, gravity_scale and damping that give a body the requested behaviour.
 
-    Sag and frequency both follow from Young's modulus. One of them sets it; where both are wished for, the
-    frequency does, and gravity is scaled for the sag. What is found is simulated, and meets each wish to 5 %.
-    It takes seconds, and starts Taichi as it is by default where nobody has called `init`.
+    Sag and frequency both depend on Young's modulus. If both are requested, the frequency sets Young's
+    modulus and gravity is scaled for the sag. The result is simulated, and meets each target to 5 %. The
+    search takes seconds, and starts Taichi with its defaults if `init` was not called.
     Args:
-        mesh: the body at rest, as it stands, z being up. Of an artist's mesh the cage, `asset.mesh`.
-        sag: lowering of its highest point as it stands on a floor, over its height.
-        wobble_hz: frequency of its slowest vibration where nothing holds it [Hz].
-        settle_s: time after which a twentieth of that vibration is left [s]; None takes the damping_ratio
-            that a `Material` has if nothing is said.
-        poisson: of the material, as `Material` takes it.
+        mesh: the body at rest, standing upright with z up. For an artist's mesh pass the cage, `asset.mesh`.
+        sag: lowering of its highest point over its height, when it stands on a floor.
+        wobble_hz: frequency of its slowest vibration when nothing holds it [Hz].
+        settle_s: time after which 5 % of that vibration remain [s]; None for the default damping_ratio of
+            `Material`.
+        poisson: Poisson's ratio, as in `Material`.
         density: [kg/m^3].
-        law: of the body, as `SoftBodyAsset` takes it.
-    Raises: OptionError for wishes that are out of range or cannot be met together, with the nearest that
-        can; MeshError and MaterialError as `SoftBodyAsset`.
+        law: law of the body, as in `SoftBodyAsset`.
+    Raises: OptionError for targets that are out of range or cannot be met together, with the nearest
+        possible one; MeshError and MaterialError as `SoftBodyAsset`.
     Example:
         feel = material_from_feel(sphere(radius=0.3), sag=0.05, settle_s=0.8)
         print(feel.material)
     """
     if not isinstance(mesh, TetMesh):
-        raise OptionError(f"mesh must be a TetMesh, such as asset.mesh, got {mesh!r}")
-    sag = None if sag is None else as_number(sag, "sag", *SAGS)
+        raise OptionError(f"mesh must be a TetMesh, for example asset.mesh, got {mesh!r}")
+    sag = None if sag is None else as_number(sag, "sag", *SAG_RANGE)
     wobble_hz = None if wobble_hz is None else as_number(wobble_hz, "wobble_hz", 1e-3, 1e5)
     settle_s = None if settle_s is None else as_number(settle_s, "settle_s", 1e-4, 1e5)
     if sag is None and wobble_hz is None:
         raise OptionError("sag or wobble_hz must be given: settle_s alone leaves Young's modulus open")
     body = _Body(mesh, poisson, density, law)
-    return _Search(body, sag, wobble_hz, settle_s).found()
+    return _Search(body, sag, wobble_hz, settle_s).run()
 
 
 class _Body:
-    """A body of which Young's modulus, gravity and damping are open, in a world of its own."""
+    """A body with unknown Young's modulus, gravity and damping, alone in a world."""
 
     def __init__(self, mesh: TetMesh, poisson: float, density: float, law: LawName | None) -> None:
         self.constants = poisson, density
         material = Material(1e5, poisson, density)
         self.asset = SoftBodyAsset(mesh, material, law=law)
         if self.asset.description.bonds is not None:
-            raise OptionError(f"law {law!r} has no Young's modulus of its own: 'neo_hookean' has")
-        omega, self.mode = first_mode(self.asset.description, EXACT)
+            raise OptionError(
+                f"law {law!r} has no Young's modulus: use another law, for example 'neo_hookean'"
+            )
+        omega, self.mode = first_mode(self.asset.description, MODE_TOLERANCE)
         if omega == 0.0:
-            raise OptionError(f"{mesh!r} has no vibration of its own: take a finer mesh")
+            raise OptionError(f"{mesh!r} has no vibration mode: use a finer mesh")
         height = float(np.ptp(mesh.vertices[:, 2]))
-        self.weight = density * GRAVITY_EARTH * height  # of a column as high as the body [Pa]
-        self.speed = omega / sqrt(1e5)  # of the slowest mode, over the root of Young's modulus
-        self.estimate = self.asset.first_frequency / sqrt(1e5)  # to which a damping ratio belongs
-        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)  # the same, of a frame
+        self.weight = density * GRAVITY_EARTH * height  # pressure under a column of the body's height [Pa]
+        self.speed = omega / sqrt(1e5)  # angular frequency of the slowest mode, over the root of `young`
+        self.estimate = self.asset.first_frequency / sqrt(1e5)  # the estimate that damping ratios refer to
+        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)  # of a frame, likewise
         self.trial = Trial(self.asset)
 
     def material(self, young: float, rate: float) -> Material:
-        """One whose slowest mode fades at a rate [1/s]."""
+        """Material whose slowest mode decays at a rate [1/s]."""
         poisson, density = self.constants
         return Material(young, poisson, density, damping_ratio=rate / (self.estimate * sqrt(young)))
 
     def omega(self, young: float) -> float:
-        """Angular frequency of its slowest mode, undamped [rad/s]."""
+        """Angular frequency of the slowest mode without damping [rad/s]."""
         return self.speed * sqrt(young)
 
-    def sag_of(self, share: float) -> float:
-        """How far it sags, by its statics, if its column weighs `share` of Young's modulus."""
-        young = self.weight / MOST_SAG
+    def static_sag(self, weight_ratio: float) -> float:
+        """Sag by statics, for a pressure `weight` of this ratio to Young's modulus."""
+        young = self.weight / MAX_SAG
         material = self.material(young, DAMPING_RATIO * self.omega(young))
-        standing = self.trial.stand(material, share / MOST_SAG, 2 * pi / self.omega(young), 0.0)
-        _require_upright(standing.turn)
-        return standing.held
+        standing = self.trial.stand(material, weight_ratio / MAX_SAG, 2 * pi / self.omega(young), 0.0)
+        _require_upright(standing.lean)
+        return standing.static_sag
 
-    def share_for(self, sag: float) -> float:
-        """Weight over Young's modulus with which it sags so far: by secants of logarithms.
+    def weight_ratio_for(self, sag: float) -> float:
+        """Ratio of `weight` to Young's modulus for a sag, by the secant method on logarithms.
 
-        Raises: OptionError where it would take too soft a body.
+        Raises: OptionError if the body would be too soft.
         """
-        share, power, before = min(2 * sag, MOST_SAG), 1.0, (0.0, 0.0)
-        for _ in range(MOST_TRIALS):
-            seen = self.sag_of(share)
-            if share == MOST_SAG and seen < sag * (1 - CLOSE):
+        weight_ratio, power, before = min(2 * sag, MAX_SAG), 1.0, (0.0, 0.0)
+        for _ in range(MAX_TRIALS):
+            result = self.static_sag(weight_ratio)
+            if weight_ratio == MAX_SAG and result < sag * (1 - TOLERANCE):
                 raise OptionError(
-                    f"sag must be at most {0.99 * seen:.3g} for this body, got {sag:g}: what is softer turns "
-                    "inside out where it lands"
+                    f"sag must be at most {0.99 * result:.3g} for this body, got {sag:g}: a softer body "
+                    "turns inside out when it lands"
                 )
-            if abs(seen / sag - 1) <= CLOSE:
+            if abs(result / sag - 1) <= TOLERANCE:
                 break
-            point = log(share), log(seen)
+            point = log(weight_ratio), log(result)
             if before != (0.0, 0.0) and abs(point[0] - before[0]) > 1e-3:
                 power = min(max((point[1] - before[1]) / (point[0] - before[0]), 0.4), 2.0)
             before = point
-            share = min(share * (sag / seen) ** (1 / power), MOST_SAG)
-        return share
+            weight_ratio = min(weight_ratio * (sag / result) ** (1 / power), MAX_SAG)
+        return weight_ratio
 
 
 class _Search:
-    """The constants of a body for some wishes."""
+    """Search for the constants of a body that meet the targets."""
 
     def __init__(
         self, body: _Body, sag: float | None, wobble_hz: float | None, settle_s: float | None
     ) -> None:
         self.body, self.sag, self.wobble_hz, self.settle_s = body, sag, wobble_hz, settle_s
-        self.wished_rate = 0.0 if settle_s is None else DECAYS / settle_s
-        self.share = 0.0 if sag is None else body.share_for(sag)
+        self.target_rate = 0.0 if settle_s is None else DECAY_FACTOR / settle_s
+        self.weight_ratio = 0.0 if sag is None else body.weight_ratio_for(sag)
         if wobble_hz is None:
-            self.young = body.weight / self.share
-        else:  # a damped vibration is slower than an undamped one
-            self.young = ((2 * pi * wobble_hz) ** 2 + self.wished_rate**2) / body.speed**2
+            self.young = body.weight / self.weight_ratio
+        else:  # damping lowers the frequency
+            self.young = ((2 * pi * wobble_hz) ** 2 + self.target_rate**2) / body.speed**2
 
     @property
     def rate(self) -> float:
-        """At which the slowest mode is to fade [1/s]."""
-        return self.wished_rate or DAMPING_RATIO * self.body.omega(self.young)
+        """Decay rate of the slowest mode [1/s]."""
+        return self.target_rate or DAMPING_RATIO * self.body.omega(self.young)
 
     @property
     def gravity_scale(self) -> float:
-        """With which it sags as wished."""
-        is_free = self.sag is not None and self.wobble_hz is not None
-        return self.share * self.young / self.body.weight if is_free else 1.0
+        """Gravity scale for the requested sag."""
+        scales_gravity = self.sag is not None and self.wobble_hz is not None
+        return self.weight_ratio * self.young / self.body.weight if scales_gravity else 1.0
 
-    def found(self) -> Feel:
-        """Simulate, and correct each constant by what its wish was missed by, until all are met."""
-        for _ in range(MOST_TRIALS):
-            self._require()
-            feel = self._tried()
+    def run(self) -> Feel:
+        """Simulate, and correct each constant by the error of its target, until all targets are met."""
+        for _ in range(MAX_TRIALS):
+            self._check()
+            feel = self._evaluate()
             _log.info("%r, gravity x %.3g: %s", feel.material, feel.gravity_scale, feel.simulated)
-            if self._miss(feel.simulated) <= CLOSE:
+            if self._largest_error(feel.simulated) <= TOLERANCE:
                 break
             self._correct(feel.simulated)
-        if not self._miss(feel.simulated) <= PROMISED:
+        if not self._largest_error(feel.simulated) <= GUARANTEED:
             raise OptionError(
-                f"these wishes cannot be met together; the nearest that was found is {feel.simulated}"
+                f"these targets cannot be met together: the nearest result found is {feel.simulated}"
             )
         return feel
 
-    def _tried(self) -> Feel:
-        """What the constants make of the body, by its statics and slowest mode, and in a simulation."""
+    def _evaluate(self) -> Feel:
+        """Behaviour with the current constants, from statics and the slowest mode, and from a simulation."""
         omega, trial = self.body.omega(self.young), self.body.trial
-        period, settle = 2 * pi / omega, DECAYS / self.rate
+        period, settle = 2 * pi / omega, DECAY_FACTOR / self.rate
         material = self.body.material(self.young, self.rate)
-        frequency, rate = trial.ring(material, self.body.mode, period)
+        frequency, rate = trial.ring_down(material, self.body.mode, period)
         standing = trial.stand(material, self.gravity_scale, period, settle)
-        if standing.flipped:
+        if standing.inverted:
             raise OptionError(
-                f"so soft a body does not bear its own weight: {standing.flipped} tetrahedra are inside out. "
-                "Wish for less sag or a higher wobble_hz"
+                f"the body is too soft for its own weight: {standing.inverted} tetrahedra are inverted. "
+                "Request less sag or a higher wobble_hz"
             )
         if self.sag is not None:
-            _require_upright(standing.turn)
-        held, free = (standing.held, standing.free) if standing.turn <= LEANS else (nan, nan)
-        predicted = Behaviour(held, sqrt(omega**2 - self.rate**2) / (2 * pi), settle)
-        simulated = Behaviour(free, frequency, DECAYS / rate if rate > 0 else inf)
+            _require_upright(standing.lean)
+        predicted_sag, simulated_sag = (
+            (standing.static_sag, standing.free_sag) if standing.lean <= MAX_LEAN else (nan, nan)
+        )
+        predicted = Behaviour(predicted_sag, sqrt(omega**2 - self.rate**2) / (2 * pi), settle)
+        simulated = Behaviour(simulated_sag, frequency, DECAY_FACTOR / rate if rate > 0 else inf)
         return Feel(material, self.gravity_scale, predicted, simulated)
 
-    def _miss(self, seen: Behaviour) -> float:
-        """Share by which the wish is missed that is missed most."""
-        pairs = (self.sag, seen.sag), (self.wobble_hz, seen.wobble_hz), (self.settle_s, seen.settle_s)
-        return max(abs(got / wish - 1) for wish, got in pairs if wish is not None)
+    def _largest_error(self, result: Behaviour) -> float:
+        """Largest relative error of all targets."""
+        pairs = (self.sag, result.sag), (self.wobble_hz, result.wobble_hz), (self.settle_s, result.settle_s)
+        return max(abs(value / target - 1) for target, value in pairs if target is not None)
 
-    def _correct(self, seen: Behaviour) -> None:
+    def _correct(self, result: Behaviour) -> None:
         if self.settle_s is not None:
-            self.wished_rate *= seen.settle_s / self.settle_s
+            self.target_rate *= result.settle_s / self.settle_s
         if self.sag is not None:
-            self.share *= self.sag / seen.sag
+            self.weight_ratio *= self.sag / result.sag
         if self.wobble_hz is not None:
-            self.young *= (self.wobble_hz / seen.wobble_hz) ** 2
+            self.young *= (self.wobble_hz / result.wobble_hz) ** 2
         else:
-            self.young = self.body.weight / self.share
+            self.young = self.body.weight / self.weight_ratio
 
-    def _require(self) -> None:
-        """Raises: OptionError for constants that no game wants, with the nearest wish that gives others."""
+    def _check(self) -> None:
+        """Check the constants. Raises: OptionError for impractical ones, with the nearest possible target."""
         body, omega = self.body, self.body.omega(self.young)
         hz = sqrt(max(omega**2 - self.rate**2, 0.0)) / (2 * pi)
-        swings = hz * DECAYS / self.rate
-        if not SWINGS[0] <= swings <= SWINGS[1]:
-            count = min(max(swings, SWINGS[0]), SWINGS[1])
-            nearest = count / hz if self.wobble_hz else sqrt((2 * pi * count) ** 2 + DECAYS**2) / omega
+        periods = hz * DECAY_FACTOR / self.rate
+        if not PERIOD_RANGE[0] <= periods <= PERIOD_RANGE[1]:
+            count = min(max(periods, PERIOD_RANGE[0]), PERIOD_RANGE[1])
+            nearest = count / hz if self.wobble_hz else sqrt((2 * pi * count) ** 2 + DECAY_FACTOR**2) / omega
             raise OptionError(
-                f"settle_s {DECAYS / self.rate:.3g} is {swings:.3g} periods at {hz:.3g} Hz, where "
-                f"{SWINGS[0]:g} to {SWINGS[1]:g} can be: the nearest is {nearest:.3g}"
+                f"settle_s={DECAY_FACTOR / self.rate:.3g} is {periods:.3g} periods at {hz:.3g} Hz, outside "
+                f"the range {PERIOD_RANGE[0]:g} to {PERIOD_RANGE[1]:g}: the nearest settle_s is {nearest:.3g}"
             )
         scale = self.gravity_scale
-        if not SCALES[0] <= scale <= SCALES[1]:
-            nearest = hz * sqrt(min(max(scale, SCALES[0]), SCALES[1]) / scale)
+        if not GRAVITY_SCALE_RANGE[0] <= scale <= GRAVITY_SCALE_RANGE[1]:
+            nearest = hz * sqrt(min(max(scale, GRAVITY_SCALE_RANGE[0]), GRAVITY_SCALE_RANGE[1]) / scale)
             raise OptionError(
-                f"sag {self.sag:g} at {hz:.3g} Hz takes a gravity_scale of {scale:.3g}, where "
-                f"{SCALES[0]:g} to {SCALES[1]:g} can be: with this sag the nearest wobble_hz is {nearest:.3g}"
+                f"sag={self.sag:g} at {hz:.3g} Hz needs a gravity_scale of {scale:.3g}, outside the range "
+                f"from {GRAVITY_SCALE_RANGE[0]:g} to {GRAVITY_SCALE_RANGE[1]:g}: with this sag the nearest "
+                f"wobble_hz is {nearest:.3g}"
             )
-        share = scale * body.weight / self.young
-        if share > MOST_SAG * (1 + PROMISED):
+        weight_ratio = scale * body.weight / self.young
+        if weight_ratio > MAX_SAG * (1 + GUARANTEED):
             raise OptionError(
-                f"wobble_hz {hz:.3g} is so soft that the body turns inside out by its own weight: the "
-                f"nearest is {hz * sqrt(share / MOST_SAG):.3g}, or wish for a sag, which scales gravity"
+                f"wobble_hz={hz:.3g} makes the body so soft that its own weight turns it inside out: the "
+                f"nearest wobble_hz is {hz * sqrt(weight_ratio / MAX_SAG):.3g}; a sag would scale gravity too"
             )
         excess = body.substeps * sqrt(self.young) / MANY_SUBSTEPS
         if excess > 1.0:
             if self.wobble_hz is None and self.sag is not None:
-                way_out = f"the nearest sag is {self.sag * excess**2:.3g}"
+                hint = f"the nearest sag is {self.sag * excess**2:.3g}"
             else:
-                way_out = f"the nearest wobble_hz is {hz / excess:.3g}"
+                hint = f"the nearest wobble_hz is {hz / excess:.3g}"
             raise OptionError(
-                f"so stiff a body takes {MANY_SUBSTEPS * excess:,.0f} substeps of a 60 Hz frame, where "
-                f"{MANY_SUBSTEPS} can be: {way_out}. A coarser mesh takes fewer"
+                f"the body is so stiff that a 60 Hz frame needs {MANY_SUBSTEPS * excess:,.0f} substeps, "
+                f"above the limit of {MANY_SUBSTEPS}: {hint}, or use a coarser mesh"
             )
 
 
-def _require_upright(turn: float) -> None:
-    """Raises: OptionError for a body that leans by too much [rad] to have a sag."""
-    if turn > LEANS:
+def _require_upright(lean: float) -> None:
+    """Check that a body stands. Raises: OptionError if it leans by more than `MAX_LEAN` [rad]."""
+    if lean > MAX_LEAN:
         raise OptionError(
-            f"the body does not stand as its mesh is: it leans by {degrees(turn):.0f} degrees. Turn the mesh "
-            "so that it stands, z being up, or wish for wobble_hz without sag"
+            f"the body does not stand as its mesh is oriented: it leans by {degrees(lean):.0f} degrees. "
+            "Rotate the mesh so that it stands with z up, or request wobble_hz without sag"
         )

@@ -1,4 +1,4 @@
-"""One body in a world of its own: how far it sags as it stands, and how it rings where nothing holds it."""
+"""One body in a world of its own: measure its sag on a floor, and its free vibration."""
 
 from __future__ import annotations
 
@@ -15,78 +15,79 @@ from taichi_soft.world.world import World
 
 Floats = NDArray[np.float64]
 
-SWING = 1e-3
-"""Of a vibration that is measured, over the body's size: small, and far above the rounding of positions."""
+AMPLITUDE = 1e-3
+"""Amplitude of a measured vibration over the body's size: small, and far above the rounding of positions."""
 
 SAMPLES = 12
-"""Of a period: few enough to tell a frequency from rounding, many enough for the shape of the wave."""
+"""Samples per period: few enough to separate the frequency from rounding, many enough to resolve the wave."""
 
 PERIODS = 6
-"""That are measured."""
+"""Number of measured periods."""
 
-STILL = 2e-3
-"""Change of the height over a period, as a part of the sag, at which a body that is held back stands."""
+SETTLED_CHANGE = 2e-3
+"""Relative change of the sag over a period below which a damped body counts as standing."""
 
-MOST_PERIODS = 60
+MAX_PERIODS = 60
+"""Limit of the time until a damped body rests."""
 
 
 class Standing(NamedTuple):
-    """Lowering of a body's highest point over its height, under its own weight."""
+    """Sag of a standing body: lowering of its highest point under its own weight, over its height."""
 
-    held: float  # by its statics
-    free: float  # as a game has it
-    turn: float  # [rad], by which it leans from where its mesh stands
-    flipped: int  # tetrahedra that are inside out, or all where the body froze
+    static_sag: float  # by statics
+    free_sag: float  # without the drag, as in a game
+    lean: float  # rotation from the pose of the mesh [rad]
+    inverted: int  # number of inverted tetrahedra; all if the body froze
 
 
 class Trial:
-    """The world; its body is given each material in turn."""
+    """A world with one body, which gets each material in turn."""
 
     def __init__(self, asset: SoftBodyAsset) -> None:
-        """Build it. Raises: StateError as `World.build`."""
+        """Build the world. Raises: StateError, see `World.build`."""
         mesh = asset.mesh
         self._world = World(floor=0.0)
-        self._low = float(mesh.vertices[:, 2].min())
+        self._lowest = float(mesh.vertices[:, 2].min())
         self._height = float(np.ptp(mesh.vertices[:, 2]))
         self._size = float(np.ptp(mesh.vertices, axis=0).max())
-        self._body = self._world.add_body(asset, position=(0.0, 0.0, -self._low))
+        self._body = self._world.add_body(asset, position=(0.0, 0.0, -self._lowest))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what is too soft or too slow is refused by whoever asks
+            warnings.simplefilter("ignore")  # the caller refuses materials that are too soft or too stiff
             self._world.build()
 
     def stand(self, material: Material, gravity_scale: float, period: float, seconds: float) -> Standing:
-        """Put it on the floor as its mesh is, held back by a drag until nothing moves; then let it go.
+        """Put the body on the floor in the pose of its mesh, with drag until it rests; then remove the drag.
 
         Args:
             period: of its slowest vibration [s].
-            seconds: that it moves freely.
+            seconds: time without drag [s].
         """
-        body = self._take(material, gravity_scale, 2 * np.pi / period)
-        body.set_motion(self._placed(0.0), np.zeros_like(body.asset.mesh.vertices))
-        before = held = 0.0
-        for _ in range(MOST_PERIODS):
-            before, held = held, self._sag_over(period)
-            if abs(held - before) <= STILL * abs(held):
+        body = self._prepare(material, gravity_scale, 2 * np.pi / period)
+        body.set_motion(self._positions_at(0.0), np.zeros_like(body.asset.mesh.vertices))
+        before = sag = 0.0
+        for _ in range(MAX_PERIODS):
+            before, sag = sag, self._sag_over(period)
+            if abs(sag - before) <= SETTLED_CHANGE * abs(sag):
                 break
         body.set_linear_damping(0.0)
-        free = [self._sag_over(period) for _ in range(int(np.ceil(seconds / period)))]
-        turn = np.arccos(np.clip((np.trace(body.pose().rotation) - 1) / 2, -1.0, 1.0))
-        flipped = len(body.tets) if body.is_frozen else body.flipped_count()
-        return Standing(held, float(np.mean(free[-2:])) if free else held, float(turn), flipped)
+        free_sags = [self._sag_over(period) for _ in range(int(np.ceil(seconds / period)))]
+        lean = np.arccos(np.clip((np.trace(body.pose().rotation) - 1) / 2, -1.0, 1.0))
+        inverted = len(body.tets) if body.is_frozen else body.flipped_count()
+        return Standing(sag, float(np.mean(free_sags[-2:])) if free_sags else sag, float(lean), inverted)
 
-    def ring(self, material: Material, mode: Floats, period: float) -> tuple[float, float]:
-        """Let it swing in a mode, far above the floor and without weight: frequency [Hz] and rate at which
-        the amplitude falls [1/s].
+    def ring_down(self, material: Material, mode: Floats, period: float) -> tuple[float, float]:
+        """Let the body vibrate in a mode, without contact and gravity.
 
-        A sample of a damped wave is a sum of its two last ones, by factors that tell both (Prony 1795); here
-        by least squares over all samples.
+        Each sample of a damped wave is a linear combination of the two before it, whose coefficients give
+        frequency and decay (Prony 1795). They are fitted by least squares over all samples.
         Args:
-            mode: (n, 3), the largest entry being 1.
-            period: about that of the mode [s].
+            mode: (n, 3), with a largest entry of 1.
+            period: approximate period of the mode [s].
+        Returns: the frequency [Hz], and the decay rate of the amplitude [1/s].
         """
-        body = self._take(material, 0.0, 0.0)
-        rest = self._placed(2.0 * self._size)
-        body.set_motion(rest, SWING * self._size * 2 * np.pi / period * mode)
+        body = self._prepare(material, 0.0, 0.0)
+        rest = self._positions_at(2.0 * self._size)
+        body.set_motion(rest, AMPLITUDE * self._size * 2 * np.pi / period * mode)
         weights = body.masses[:, None] * mode
         wave = [0.0]
         for _ in range(SAMPLES * PERIODS):
@@ -94,26 +95,26 @@ class Trial:
             wave.append(float((weights * (body.positions() - rest)).sum()))
         q = np.array(wave)
         (first, second), *_ = np.linalg.lstsq(np.stack([q[1:-1], q[:-2]], axis=1), q[2:], rcond=None)
-        shrink = np.sqrt(max(-second, 1e-12))
-        turn = np.arccos(np.clip(first / (2 * shrink), -1.0, 1.0))
+        decay = np.sqrt(max(-second, 1e-12))
+        angle = np.arccos(np.clip(first / (2 * decay), -1.0, 1.0))
         dt = period / SAMPLES
-        return float(turn / (2 * np.pi * dt)), float(-np.log(shrink) / dt)
+        return float(angle / (2 * np.pi * dt)), float(-np.log(decay) / dt)
 
-    def _take(self, material: Material, gravity_scale: float, drag: float) -> Body:
+    def _prepare(self, material: Material, gravity_scale: float, drag: float) -> Body:
         body = self._body
         body.set_material(material)
         body.set_gravity_scale(gravity_scale)
         body.set_linear_damping(drag)
         return body
 
-    def _placed(self, height: float) -> Floats:
+    def _positions_at(self, height: float) -> Floats:
         rest = self._body.asset.mesh.vertices
-        placed: Floats = rest + np.array([0.0, 0.0, height - self._low])
-        return placed
+        positions: Floats = rest + np.array([0.0, 0.0, height - self._lowest])
+        return positions
 
     def _sag_over(self, period: float) -> float:
-        """Go on for a period [s]: mean lowering of the highest point over the height."""
-        count = max(SAMPLES, int(np.ceil(60.0 * period)))  # a step is no longer than a frame of a game
+        """Step for a period [s]. Returns: mean lowering of the highest point, over the height."""
+        count = max(SAMPLES, int(np.ceil(60.0 * period)))  # no step is longer than a game's frame
         highest = []
         for _ in range(count):
             self._world.step(period / count)

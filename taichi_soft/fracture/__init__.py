@@ -1,1 +1,1 @@
-"""Bodies that are cut, and that tear by themselves."""
+"""Cutting and tearing of bodies."""

@@ -1,8 +1,8 @@
-"""Bodies cut in two, or open, along the faces of their tetrahedra (thesis chapter 7).
+"""Cut bodies along the faces of their tetrahedra (thesis chapter 7).
 
-No tetrahedron changes: particles are the only bond between them, so a cut gives some of them copies. Mass
-goes with the tetrahedra; a copy begins where its original is, as fast. So mass, momentum and elastic energy
-stay.
+Tetrahedra are connected only by shared particles, so a cut duplicates particles and changes no tetrahedron.
+A copy starts with the position and velocity of its original, and mass follows the tetrahedra. So mass,
+momentum and elastic energy are conserved.
 """
 
 from __future__ import annotations
@@ -19,7 +19,14 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
-from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
+from taichi_soft.bodies.soft_body import (
+    Context,
+    SoftBody,
+    context_of,
+    record_of,
+    redescribe,
+    slices_against_cuts,
+)
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.contact.hull_fields import touching_rows
@@ -40,92 +47,95 @@ from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertice
 
 Floats = NDArray[np.float64]
 
-CRUMB = 0.02
-"""Part of the whole body's volume below which what is torn off takes no slot: those are for larger parts."""
+MIN_FRAGMENT = 0.02
+"""Smallest part of the body's volume that gets its own slot when torn off: slots are for larger pieces."""
 
 
 def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
-    """As `Body.cut`."""
+    """See `Body.cut`."""
     require_cuttable(body)
-    corners, normal, is_endless = _blade(plane, triangle)
+    corners, normal, is_plane = _blade(plane, triangle)
     mesh = body.mesh
     faces = record_of(body).description.inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
-    is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
+    is_cut = _crosses(corners, normal, is_plane, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
     return divide(body, faces, is_cut)
 
 
 def require_cuttable(body: SoftBody) -> None:
-    """Raises: OptionError for a body that was not made to be cut; StateError for one that cannot be now."""
+    """Check that a body can be cut.
+
+    Raises: OptionError if its asset does not allow cuts; StateError if the body cannot be cut now.
+    """
     context = context_of(body)
     if body.asset.spare_vertices == 0:
         raise OptionError(
-            f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices"
+            f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices > 0"
         )
     if context.fields is None:
-        raise StateError("the world is not built: call world.build() first, and cut what moves")
-    bars = bars_to_cut(body)
-    if bars:
+        raise StateError("the world is not built: call world.build() before the cut")
+    reasons = slices_against_cuts(body)
+    if reasons:
         raise StateError(
-            f"body {body.index} has {' and '.join(bars)}: release or remove them before it is cut"
+            f"body {body.index} has {' and '.join(reasons)}: release or remove them before it is cut"
         )
     if body.is_frozen:
-        raise StateError(f"body {body.index} is frozen: bring it back with set_motion before it is cut")
+        raise StateError(f"body {body.index} is frozen: reactivate it with set_motion before it is cut")
 
 
 def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
-    """Corners (3, 3) of a triangle or of any in a plane, the normal, and whether it is a plane."""
+    """Corners (3, 3) [m] of the triangle, or three points of the plane; its normal; True for a plane."""
     if (plane is None) == (triangle is None):
-        raise OptionError("give plane=(point, normal) or triangle=(3, 3), one of the two")
+        raise OptionError("pass plane=(point, normal) or triangle=(3, 3), one of the two")
     if triangle is not None:
         corners = as_array(triangle, "triangle", (3, 3), "m")
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
         if not np.linalg.norm(normal) > 1e-9 * longest**2:
-            raise OptionError(f"triangle has no area: {corners.tolist()}")
+            raise OptionError(f"triangle has no area: {corners.tolist()}. Pass three corners not on one line")
         return corners, normal, False
     if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 2:
         raise OptionError(f"plane must be (point, normal), got {plane!r}")
     point, normal = as_vector(plane[0], "point", "m"), as_vector(plane[1], "normal", "(any length)")
     if not np.linalg.norm(normal) > 0.0:
-        raise OptionError("normal is zero: give the direction across the plane")
+        raise OptionError(f"normal is zero in plane={plane!r}: pass the direction across the plane")
     return np.tile(point, (3, 1)), normal, True
 
 
-def _crosses(corners: Floats, normal: Floats, is_endless: bool, a: Floats, b: Floats) -> NDArray[np.bool_]:
-    """Which segments a-b, (f, 3) each, go through the blade."""
-    over, under = (a - corners[0]) @ normal, (b - corners[0]) @ normal
-    passes = (over > 0) != (under > 0)
-    if is_endless:
+def _crosses(corners: Floats, normal: Floats, is_plane: bool, a: Floats, b: Floats) -> NDArray[np.bool_]:
+    """True for each segment a-b that crosses the blade, (f,). Args: a, b: end points (f, 3) [m]."""
+    height_a, height_b = (a - corners[0]) @ normal, (b - corners[0]) @ normal
+    passes = (height_a > 0) != (height_b > 0)
+    if is_plane:
         return np.asarray(passes)
-    part = over / np.where(passes, over - under, 1.0)
-    at = a + part[:, None] * (b - a)
+    parameter = height_a / np.where(passes, height_a - height_b, 1.0)
+    crossing = a + parameter[:, None] * (b - a)
     for i in range(3):
         start, end = corners[i], corners[(i + 1) % 3]
-        passes &= np.cross(end - start, at - start) @ normal >= 0
+        passes &= np.cross(end - start, crossing - start) @ normal >= 0
     return np.asarray(passes)
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """What a cut makes of a body, or of a part of it."""
+    """One connected piece of a cut body."""
 
     description: BodyDescription
     arrays: BodyArrays
-    vertices: NDArray[np.int64]  # of the body before, of which each is itself or a copy
-    tets: NDArray[np.int64]  # of the body before
+    vertices: NDArray[np.int64]  # (n,) vertex of the body before that each is, or is a copy of
+    tets: NDArray[np.int64]  # (m,) rows in the body before
 
 
 def divide(
-    body: SoftBody, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_crumbs: bool = False
+    body: SoftBody, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_fragments: bool = False
 ) -> tuple[SoftBody, ...]:
-    """Open a body along faces. Returns the bodies that fell off, the largest first.
+    """Open a body along faces. Returns: the pieces that were separated, the largest first.
 
     Args:
-        keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
+        keeps_fragments: True leaves small pieces in the body, and those for which no slot is free.
     """
     context, mesh = context_of(body), body.mesh
-    assert isinstance(mesh, TetMesh), "others are refused before"
+    assert isinstance(mesh, TetMesh), "other meshes were refused before"
     tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
     if len(vertices) == len(mesh.vertices):
         return ()
@@ -133,27 +143,27 @@ def divide(
     sizes = np.bincount(part, mesh.volumes)
     numbers = np.argsort(-sizes, kind="stable")  # largest first
     slots = context.slots.free_slots(body.asset)
-    if keeps_crumbs:
-        own = numbers[1 : 1 + len(slots)]
+    if keeps_fragments:
+        separated = numbers[1 : 1 + len(slots)]
         volume = body.asset.mesh.volumes.sum()  # type: ignore[attr-defined]
-        own = own[sizes[own] >= CRUMB * volume]
-        part[~np.isin(part, own)] = numbers[0]
-        numbers = np.r_[numbers[0], own]
+        separated = separated[sizes[separated] >= MIN_FRAGMENT * volume]
+        part[~np.isin(part, separated)] = numbers[0]
+        numbers = np.r_[numbers[0], separated]
     if len(numbers) > 1 + len(slots):
         raise StateError(
             f"body {body.index} would fall into {len(numbers)} pieces, and {len(slots)} slots are free for "
-            f"the {len(numbers) - 1} new ones: reserve more of its asset before build, or despawn bodies"
+            f"the {len(numbers) - 1} new ones: reserve more slots of its asset before build, or despawn some"
         )
     pieces = [_piece(body, tets, vertices, np.flatnonzero(part == number)) for number in numbers]
     for piece in pieces:
         require_room(context, body.index, piece.arrays)
-    return _settle(context, body, pieces, slots)
+    return _write_pieces(context, body, pieces, slots)
 
 
 def _piece(
     body: SoftBody, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> _Piece:
-    """A body of some of the tetrahedra."""
+    """Create the piece that has the given tetrahedra."""
     before = record_of(body).description
     assert isinstance(before.mesh, TetMesh)
     used, corners = np.unique(tets[rows], return_inverse=True)
@@ -169,7 +179,7 @@ def _piece(
 
 
 def require_room(context: Context, slot: int, arrays: BodyArrays) -> None:
-    """Raises: StateError where a part of a body does not fit into its slot."""
+    """Check that a piece of a body fits into its slot. Raises: StateError."""
     place = context.layout.ranges[slot]
     for name, rows, (begin, end) in (
         ("vertices", arrays.mass, place.particles),
@@ -178,14 +188,15 @@ def require_room(context: Context, slot: int, arrays: BodyArrays) -> None:
     ):
         if len(rows) > end - begin:
             raise StateError(
-                f"the cut would leave {len(rows)} {name} in body {slot}, and there is room for "
-                f"{end - begin}: make its asset with more spare_vertices than "
-                f"{context.slots.assets[slot].spare_vertices}"
+                f"the cut would leave {len(rows)} {name} in body {slot}, which has room for {end - begin}: "
+                f"make its asset with spare_vertices > {context.slots.assets[slot].spare_vertices}"
             )
 
 
-def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[int]) -> tuple[SoftBody, ...]:
-    """Write the first piece into the body's slot and the others into free ones. Refuses nothing."""
+def _write_pieces(
+    context: Context, body: SoftBody, pieces: list[_Piece], slots: list[int]
+) -> tuple[SoftBody, ...]:
+    """Write the first piece into the body's slot and the others into free slots. Cannot fail."""
     built = context.built
     state = built.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
@@ -200,32 +211,32 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
         free = rows[:, 12] > 0.0
         masses = piece.description.masses
         rows[free, 12] = 1.0 / masses[free]
-        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # pushes and reactions are shared like the mass
+        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # external forces and reactions follow the mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         write_slot(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-    built.has_changed()
-    fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
+    built.mark_changed()
+    detached = tuple(context.make_handle(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
-    for each, piece in zip((body, *fallen), pieces, strict=True):
+    for each, piece in zip((body, *detached), pieces, strict=True):
         redescribe(each, piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
-        record_of(each).become(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
+        record_of(each).set_topology(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
     if record_of(body).friction is not None:
-        for each in fallen:
+        for each in detached:
             give_friction(state, each, body.friction)
     share_attachments(
-        body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
+        body, [(each, piece.vertices) for each, piece in zip((body, *detached), pieces, strict=True)]
     )
     context.of(Easings).share(
-        body, tet_order, [(each, piece.tets) for each, piece in zip((body, *fallen), pieces, strict=True)]
+        body, tet_order, [(each, piece.tets) for each, piece in zip((body, *detached), pieces, strict=True)]
     )
-    built.was_cut(body)
-    return fallen
+    built.on_cut(body)
+    return detached
 
 
 def warm_up(context: Context, state: BodyFields, slot: int) -> None:
-    """Make a body's slot what it is, so that nothing compiles where the first cut comes in the game."""
+    """Rewrite a body's slot unchanged, so that the kernels are compiled before the first cut in a game."""
     read_motion(
         state, slot, np.empty((len(context.layout.bodies[slot].mass), MOTION_WIDTH), dtype=np.float32)
     )
@@ -235,17 +246,17 @@ def warm_up(context: Context, state: BodyFields, slot: int) -> None:
 def refill_slot(
     context: Context, state: BodyFields, slot: int, level: int = 0, part: BodyArrays | None = None
 ) -> None:
-    """Write the whole body of its asset, a level of it or a part, into a slot where another was, at rest."""
+    """Write an asset's body, a level or a part of it, at rest into a slot that held another body."""
     asset = context.slots.assets[slot].levels[level]
     arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
-    _write_kind(state, slot, asset)  # who was there before may have been of another material
+    _write_kind(state, slot, asset)  # the body before can have had another material
     context.layout.bodies[slot] = arrays
 
 
 def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    """Write what follows from an asset as a whole, where levels of detail or what cuts leave differ in it."""
+    """Write the constants of an asset if they differ between its levels of detail, or after a cut."""
     if context.slots.assets[slot].coarser or asset.spare_vertices:
         _write_kind(state, slot, asset)
 
@@ -255,7 +266,7 @@ def _write_kind(state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
 
 
 def kind_numbers(state: BodyFields, asset: SoftBodyAsset) -> NDArray[np.float32]:
-    """The row that `write_kind` takes for bodies of an asset."""
+    """Row of an asset for `write_kind`."""
     row = [*asset.surface_row[:2], *asset.kind_row(is_implicit=state.capacity.implicit)]
     return np.array(row, dtype=np.float32)
 
@@ -270,12 +281,12 @@ def write_slot(
     model_of: int,
     inverses: NDArray[np.float32] | None,
 ) -> None:
-    """Write a body into a slot, in the middle of its motion.
+    """Write a body into a slot while it moves.
 
     Args:
-        motion: rows of its vertices, as `read_motion` has them.
-        status, model_of: as of `write_body`.
-        inverses: of the rest shapes as they are, (m, 3, 3), where they may have flowed.
+        motion: rows of its vertices, as in `read_motion`.
+        status, model_of: as in `write_body`.
+        inverses: current inverse rest shapes (m, 3, 3), if plasticity can have changed them.
     """
     write_body(state, slot, status, model_of, motion, *body_rows(arrays, inverses))
     write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
@@ -284,9 +295,9 @@ def write_slot(
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:
-    """The arrays that `write_body` takes behind the motion of a body. Args: as of `write_slot`."""
-    first = _real_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
-    present = first if inverses is None else _real_blocks(np.swapaxes(inverses, 1, 2), 9)
+    """Arguments of `write_body` after `motion`. Args: as in `write_slot`."""
+    first = _float_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
+    present = first if inverses is None else _float_blocks(np.swapaxes(inverses, 1, 2), 9)
     return (
         arrays.rest_position.astype(np.float32),
         arrays.rank,
@@ -301,5 +312,5 @@ def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -
     )
 
 
-def _real_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:
+def _float_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:
     return blocks_of(rows.reshape(len(rows), width), width, 0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Bodies that tear where they are pulled too hard."""
+"""Bodies that tear where their stress exceeds a limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.measures import positions_of, tet_stresses
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, bars_to_cut, record_of
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, record_of, slices_against_cuts
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.serialisation import below
 from taichi_soft.fracture.cutting import divide
@@ -20,94 +20,99 @@ from taichi_soft.meshing.splitting import InnerFaces
 
 Floats = NDArray[np.float64]
 
-_WORST = 0.9
-"""Of the largest stress: what bears less waits for the next step, in which the tear has shifted the load."""
+_WORST_FRACTION = 0.9
+"""Fraction of the largest stress. Faces below it wait for the next step, after the tear has redistributed the
+load."""
 
-_TIP = 2.0
-"""Stress at the end of a tear over that of the tetrahedra there, which are too large to resolve its rise: so
-that a tear runs on before another begins."""
+_TIP_FACTOR = 2.0
+"""Factor on the stress at the end of a tear, where the tetrahedra are too coarse to resolve the peak. With it
+a tear continues before another one begins."""
 
 
 class Tears(Slice):
-    """Where a world's bodies may tear, after every step."""
+    """Bodies of a world that can tear; checked after every step."""
 
     name = "tears"
 
     def __init__(self, context: Context) -> None:
-        """Nobody tears."""
+        """Start without bodies that tear."""
         super().__init__(context)
         self._limits = np.zeros(0, dtype=np.float32)
         self._found = np.zeros(0, dtype=np.int32)
 
     @property
-    def is_open(self) -> bool:
-        """Whether any body of the world can tear."""
+    def is_active(self) -> bool:
+        """True if any body of the world can tear."""
         return len(self._limits) > 0
 
-    def open(self, state: BodyFields, program: Program) -> None:
-        """Look from now on, in a world that is being built, if anything in it can tear."""
+    def activate(self, state: BodyFields, program: Program) -> None:
+        """Start checking in a world that is being built, if any of its assets can tear."""
         slots = self.context.slots
         if any(asset.tearing for asset in slots.kinds):
             self._limits = np.zeros(len(slots.slots), dtype=np.float32)
             self._found = np.zeros(len(slots.slots), dtype=np.int32)
             find_overloaded(state, program, self._limits, self._found)  # compiles
-            for body in slots.living:
+            for body in slots.occupants:
                 self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
-        """Look at a body from now on, if it can tear; its slot may have held another."""
-        if not self.is_open:
+        """Check a body from now on if it can tear, and stop checking the body that had its slot before."""
+        if not self.is_active:
             return
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
-    def rests(self, body: SoftBody) -> bool:
-        """Whether a body that can tear has no room for it any more."""
+    def is_exhausted(self, body: SoftBody) -> bool:
+        """True if a body could tear but has no spare vertices left for it."""
         return body.asset.tearing is not None and bool(self._limits[body.index] == 0.0)
 
-    def rest(self, body: SoftBody) -> None:
-        """Look at a body no more."""
+    def stop(self, body: SoftBody) -> None:
+        """Stop checking a body."""
         self._limits[body.index] = 0.0
 
     def entries(self) -> list[list[Any]]:
-        """Slots of the bodies that tear no more."""
-        return [[body.index] for body in self.context.slots.living if self.is_open and self.rests(body)]
+        """Slots of the bodies that are exhausted."""
+        return [
+            [body.index]
+            for body in self.context.slots.occupants
+            if self.is_active and self.is_exhausted(body)
+        ]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """None."""
+        """Empty: no entry has a serial number."""
         return []
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[int]:
-        """Rows of `entries`. Raises: ValueError for a slot that holds nobody."""
+        """Read the slots of `entries`. Raises: ValueError for a slot without a body."""
         slots = [below(slot, len(vertex_counts)) for (slot,) in entries]
-        if slots and not (self.is_open and all(vertex_counts[slot] for slot in slots)):
-            raise ValueError("nobody tears there")
+        if slots and not (self.is_active and all(vertex_counts[slot] for slot in slots)):
+            raise ValueError("slots of tears without a body that can tear")
         return slots
 
     def restore(self, read: Any) -> None:
-        """Look at all bodies but those that were `read`."""
-        for body in self.context.slots.living:
+        """Check all bodies that can tear except the ones in `read`."""
+        for body in self.context.slots.occupants:
             self.watch(body)
             if body.index in read:
-                self.rest(body)
+                self.stop(body)
 
     def tear(self) -> Iterator[tuple[SoftBody, tuple[SoftBody, ...]]]:
-        """Tear what the last step has pulled too hard. Yields: each body that tore, and what fell off it."""
-        if not self.is_open:
+        """Tear bodies overloaded in the last step. Yields: each torn body, with the pieces it lost."""
+        if not self.is_active:
             return
         built = self.context.built
         find_overloaded(built.state, built.program, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
             body = self.context.slots.slots[slot]
-            if body is None or bars_to_cut(body):
+            if body is None or slices_against_cuts(body):
                 continue
             version = body.topology_version
             try:
                 pieces = _tear(body)
-            except StateError:  # no room for more copies
-                self.rest(body)
+            except StateError:  # no spare vertices are left
+                self.stop(body)
                 continue
             if body.topology_version != version:
                 yield body, pieces
@@ -122,20 +127,20 @@ def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1
     corners = _corners(mesh.tets, faces)
-    # A vertex that is held opens nothing when it is split: copies of it are held where it is.
-    over = (pull > tearing.stress) & ~np.isin(corners, body.pinned).any(axis=1)
-    if not over.any():
+    # Splitting a pinned vertex opens nothing, because its copies are pinned at the same position.
+    overloaded = (pull > tearing.stress) & ~np.isin(corners, body.pinned).any(axis=1)
+    if not overloaded.any():
         return ()
-    pull[is_torn[corners].any(axis=1)] *= _TIP
-    chosen = _worst_faces(x, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
+    pull[is_torn[corners].any(axis=1)] *= _TIP_FACTOR
+    chosen = _select_faces(x, mesh.tets, faces, np.where(overloaded, pull, 0.0), axis, tearing.most)
     is_cut = np.zeros(len(pull), dtype=np.bool_)
     is_cut[chosen] = True
     centers = x[mesh.tets].mean(axis=1)
     for face in chosen:
-        near = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
-        side = (centers[faces.tets[near]] - x[corners[face]].mean(axis=0)) @ axis[face] > 0
-        is_cut[near[side[:, 0] != side[:, 1]]] = True
-    return divide(body, faces, is_cut, keeps_crumbs=True)
+        neighbours = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
+        side = (centers[faces.tets[neighbours]] - x[corners[face]].mean(axis=0)) @ axis[face] > 0
+        is_cut[neighbours[side[:, 0] != side[:, 1]]] = True
+    return divide(body, faces, is_cut, keeps_fragments=True)
 
 
 def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
@@ -143,7 +148,7 @@ def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
     return np.asarray(tets[faces.tets[:, :1], faces.corners[:, 0]])
 
 
-def _worst_faces(
+def _select_faces(
     positions: Floats,
     tets: NDArray[np.int32],
     faces: InnerFaces,
@@ -151,19 +156,19 @@ def _worst_faces(
     axis: Floats,
     most: int,
 ) -> list[int]:
-    """Those that tear: the worst, most across the pull, without a common vertex.
+    """Faces that tear: those with the largest stress normal to them, without common vertices.
 
-    `pull`: (f,) [Pa], zero for faces that hold.
+    Args: pull: (f,) largest principal stress [Pa], zero for faces that must not tear.
     """
-    over = np.flatnonzero((pull > 0.0) & (pull >= _WORST * pull.max()))
+    overloaded = np.flatnonzero((pull > 0.0) & (pull >= _WORST_FRACTION * pull.max()))
     corners = _corners(tets, faces)
-    x = positions[corners[over]]
+    x = positions[corners[overloaded]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)  # drawn to a line, a face has no normal
-    across = np.abs(np.einsum("fa,fa->f", normal, axis[over])) / length
+    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)  # a degenerate face has no normal
+    alignment = np.abs(np.einsum("fa,fa->f", normal, axis[overloaded])) / length
     chosen: list[int] = []
     used: set[int] = set()
-    for face in over[np.argsort(-pull[over] * across, kind="stable")].tolist():
+    for face in overloaded[np.argsort(-pull[overloaded] * alignment, kind="stable")].tolist():
         if len(chosen) < most and not used & set(corners[face].tolist()):
             chosen.append(face)
             used |= set(corners[face].tolist())

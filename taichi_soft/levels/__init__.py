@@ -1,1 +1,1 @@
-"""Bodies of more or fewer tetrahedra while they move."""
+"""Change of a body's level of detail while it moves."""

@@ -1,7 +1,7 @@
-"""The rigid motion that fits some vertices best, with the same bits on every processor.
+"""Best-fitting rigid motion between two sets of vertices, with the same bits on every processor.
 
-LAPACK rounds differently on each processor, and round-off decides the turn of vertices on a line. So each sum
-is written out here. The native library has the same sums in `fitting.hpp`.
+LAPACK rounds differently on each processor, and for vertices on one line round-off decides the rotation.
+Therefore each sum is written out here. The native library has the same sums in `fitting.hpp`.
 """
 
 from __future__ import annotations
@@ -16,64 +16,64 @@ from taichi_soft.core.residue import weighted_sum
 
 Floats = NDArray[np.float64]
 
-LEANING = 1e-10
-"""Weight of turning as little as possible: it decides only what the places leave open."""
+REGULARISATION = 1e-10
+"""Weight of the smallest rotation. It decides only rotations that the vertices leave undetermined."""
 
 SWEEPS = 30
-"""Jacobi rotations of all pairs of axes. Pairs with a zero between them are skipped."""
+"""Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
 
 
 def fitting_motion(rest: Floats, now: Floats) -> tuple[Floats, Floats]:
-    """Fit a rotation (3, 3) and the place of the origin, (3,) [m], that put `rest` nearest to `now`.
+    """Fit the rotation (3, 3) and the translation (3,) [m] that map `rest` closest to `now`.
 
     Args: rest, now: (n, 3) [m].
     """
-    shares = np.full(len(rest), 1.0 / len(rest))
-    rest_center, center = weighted_sum(shares, rest), weighted_sum(shares, now)
-    arms = rest - rest_center
-    moment, spread = moments(shares, now - center, arms), moments(shares, arms, arms)
-    moment += LEANING * (spread[0, 0] + spread[1, 1] + spread[2, 2]) * np.eye(3)
-    turn = nearest_rotation(moment)
-    return turn, center - turned(rest_center[None], turn)[0]
+    weights = np.full(len(rest), 1.0 / len(rest))
+    rest_center, center = weighted_sum(weights, rest), weighted_sum(weights, now)
+    offsets = rest - rest_center
+    covariance, spread = moments(weights, now - center, offsets), moments(weights, offsets, offsets)
+    covariance += REGULARISATION * (spread[0, 0] + spread[1, 1] + spread[2, 2]) * np.eye(3)
+    rotation = nearest_rotation(covariance)
+    return rotation, center - turned(rest_center[None], rotation)[0]
 
 
 def moments(weights: Floats, a: Floats, b: Floats) -> Floats:
-    """Sum of w a b^T, (3, 3), of weights (n,) and rows (n, 3)."""
+    """Sum of w a b^T, (3, 3), for weights (n,) and rows (n, 3)."""
     return np.asarray((weights[:, None, None] * a[:, :, None] * b[:, None, :]).sum(axis=0))
 
 
 def nearest_rotation(matrix: Floats) -> Floats:
-    """The rotation R with the largest trace of R^T m, (3, 3): Horn 1987. No turn for zeros."""
+    """Rotation R with the largest trace of R^T m, (3, 3), by Horn 1987. The identity for zeros."""
     m = matrix.tolist()
-    square = [
+    horn_matrix = [
         [m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[0][2] + m[2][0], m[2][1] - m[1][2]],
         [m[0][1] + m[1][0], m[1][1] - m[0][0] - m[2][2], m[1][2] + m[2][1], m[0][2] - m[2][0]],
         [m[0][2] + m[2][0], m[1][2] + m[2][1], m[2][2] - m[0][0] - m[1][1], m[1][0] - m[0][1]],
         [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1], m[0][0] + m[1][1] + m[2][2]],
     ]
-    vectors = _diagonalized(square)
+    vectors = _eigenvectors(horn_matrix)
     best = 3
     for i in range(3):
-        if square[i][i] > square[best][best]:
+        if horn_matrix[i][i] > horn_matrix[best][best]:
             best = i
     quaternion = np.array([row[best] for row in vectors])
     return matrix_of(quaternion / length_of(quaternion))
 
 
-def _diagonalized(a: list[list[float]]) -> list[list[float]]:
-    """Turn a symmetric matrix until it is diagonal. Returns: the eigenvectors, in columns."""
+def _eigenvectors(a: list[list[float]]) -> list[list[float]]:
+    """Eigenvectors of a symmetric matrix, in columns. Diagonalizes `a` in place by Jacobi rotations."""
     size = len(a)
     vectors = [[float(i == k) for k in range(size)] for i in range(size)]
     for _ in range(SWEEPS):
         for p in range(size):
             for q in range(p + 1, size):
                 if a[p][q] != 0.0:
-                    _turn(a, vectors, p, q)
+                    _rotate_axes(a, vectors, p, q)
     return vectors
 
 
-def _turn(a: list[list[float]], vectors: list[list[float]], p: int, q: int) -> None:
-    """Turn two axes of a matrix so that it has a zero between them, but for round-off."""
+def _rotate_axes(a: list[list[float]], vectors: list[list[float]], p: int, q: int) -> None:
+    """Rotate two axes so that their off-diagonal entry becomes zero up to round-off."""
     slope = (a[q][q] - a[p][p]) / (2.0 * a[p][q])
     t = (-1.0 if slope < 0.0 else 1.0) / (abs(slope) + math.sqrt(slope * slope + 1.0))
     c = 1.0 / math.sqrt(t * t + 1.0)

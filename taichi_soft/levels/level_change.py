@@ -1,9 +1,9 @@
-"""A body that goes on with more or fewer tetrahedra.
+"""Change of a body's level of detail: it continues with more or fewer tetrahedra.
 
-Positions, velocities and what was before the last step pass over as a skin is drawn: see `Passage`. Then a
-body that nothing holds is moved, and its velocities are given a rigid motion, so that centre of mass,
-momentum and angular momentum are to round-off what they were. What is finer than the new mesh is lost, with
-its energy. What holds the body goes on to hold it where the new mesh has its place.
+`Passage` maps positions and velocities, now and before the last step, as a skin is mapped. If the body is
+free, a correction of its position and a rigid motion added to its velocities then preserve centre of mass,
+momentum and angular momentum to round-off. Deformation finer than the new mesh is lost, with its energy. A
+body that is held stays held at the corresponding vertices of the new mesh.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from taichi_soft.core.residue import kept, weighted_sum
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
 from taichi_soft.levels.fitting import fitting_motion, moments
-from taichi_soft.levels.hanging import Hanging, hang_on, hanging_at, let_hold
 from taichi_soft.levels.passage import Passage, passage
+from taichi_soft.levels.reattaching import Reattachments, reattachments_at, update_handles, write_targets
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,162 +45,175 @@ TARGET, PUSH = slice(17, 20), slice(20, 23)
 
 
 def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
-    """As `Body.set_level`. Returns: what was released."""
+    """See `Body.set_level`. Returns: the released handles."""
     context = context_of(body)
     may_release = as_flag(release, "release")
     before = record_of(body).level
-    wanted = as_count(level, "level", 0)
+    requested = as_count(level, "level", 0)
     count = len(body.asset.levels)
-    if wanted >= count:
-        fix = f"give 0 to {count - 1}" if count > 1 else "from_surface with cells=(12, 8, 5) makes several"
-        raise OptionError(f"level is {wanted}, and the asset of body {body.index} has {count}: {fix}")
-    bar = bar_to_levels(body, may_release=may_release)
-    if bar:
-        raise StateError(bar)
-    if wanted == before:
+    if requested >= count:
+        levels = f"levels 0 to {count - 1}: pass one of them"
+        if count == 1:
+            levels = "only level 0: from_surface(cells=(12, 8, 5)) creates several levels"
+        raise OptionError(f"level is {requested}, but body {body.index} has {levels}")
+    reason = reason_against_level_change(body, may_release=may_release)
+    if reason:
+        raise StateError(reason)
+    if requested == before:
         return ()
-    state, target = context.built.state, body.asset.levels[wanted]
-    over, arrays = passage(body.asset, before, wanted), target.arrays
-    released, held, hanging = _make_room(body, over, wanted, may_release=may_release)
+    state, target = context.built.state, body.asset.levels[requested]
+    over, arrays = passage(body.asset, before, requested), target.arrays
+    released, held, reattachments = _reattach(body, over, requested, may_release=may_release)
     grabbed = [(grab, place_of(grab)) for grab in context.of(Grabs).holding(body)]
     found = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, found)
     motion = found.astype(np.float64)
-    rows = _passed(over, motion, target.description.masses, held)
-    hang_on(hanging, motion, rows)
+    rows = _mapped_rows(over, motion, target.description.masses, held)
+    write_targets(reattachments, motion, rows)
     status = int(state.body_status[body.index])
     write_slot(context, state, body.index, arrays, rows.astype(np.float32), status, body.index, None)
     write_surface(context, state, body.index, target)
-    context.built.was_placed(body)
-    record_of(body).become(None, wanted)
+    context.built.on_placed(body)
+    record_of(body).set_topology(None, requested)
     redescribe(body, target.description, arrays)
     if record_of(body).friction is not None:
         give_friction(state, body, body.friction)
-    let_hold(hanging)
+    update_handles(reattachments)
     for grab, place in grabbed:
         hold_at(grab, place)
-    context.built.was_cut(body)
-    context.built.rouse(body.index)
+    context.built.on_cut(body)
+    context.built.mark_modified(body.index)
     return tuple(released)
 
 
-def bar_to_levels(body: SoftBody, *, may_release: bool = False) -> str:
-    """Why the level of a body cannot change now, and the way out; "" where it can.
+def reason_against_level_change(body: SoftBody, *, may_release: bool = False) -> str:
+    """Reason why the level of a body cannot change now, with a fix; "" if it can change.
 
-    Args: may_release: what has no place at another level is no bar.
-    Raises: StateError where the body or its world is gone.
+    Args: may_release: True to release handles that the other level cannot keep.
+    Raises: StateError if the body or its world was removed.
     """
     context = context_of(body)
     if context.fields is None:
-        return "the world is not built: call world.build() first, and change what moves"
-    holds = [each.name for each in context.slices if each.bars_levels and each.holds(body)]
+        return "the world is not built: call world.build() before a level changes"
+    holds = [each.name for each in context.slices if each.prevents_levels and each.holds(body)]
     if holds and not may_release:
         return (
             f"body {body.index} has {' and '.join(holds)} that name its vertices: release or remove them "
-            "before its level changes, or let set_level do so with release=True"
+            "before its level changes, or pass release=True to set_level"
         )
     if body.is_frozen:
-        return f"body {body.index} is frozen: bring it back with set_motion before its level changes"
+        return f"body {body.index} is frozen: reactivate it with set_motion before its level changes"
     if record_of(body).description is not present_asset(body).description:
         return (
-            f"body {body.index} was given a material of its own, which its other levels do not have: spawn "
-            "it anew from an asset of that material"
+            f"body {body.index} has a material of its own, which its other levels do not have: spawn a new "
+            "body from an asset of that material"
         )
     return ""
 
 
-def _make_room(
+def _reattach(
     body: SoftBody, over: Passage, level: int, *, may_release: bool
-) -> tuple[list[Handle], Ints, Hanging]:
-    """Release what has no place at another level.
+) -> tuple[list[Handle], Ints, Reattachments]:
+    """Find the vertices that stay held at another level, and release the handles that would hold none.
 
-    Returns: that; the vertices that will be held; what will hold them.
+    Returns: the released handles; the vertices that will be pinned; the attachments that will hold them.
 
-    Raises: StateError where there is an attachment without a place that may not be released.
+    Raises: StateError if an attachment would hold nothing and `may_release` is False.
     """
     released: list[Handle] = []
     for each in context_of(body).slices:
-        if each.bars_levels and isinstance(each, Numbered):
+        if each.prevents_levels and isinstance(each, Numbered):
             released += each.holding(body)
-            each.let_go(body)
-    while True:  # without what was released fewer vertices are held, and others may have no place
+            each.release_body(body)
+    while True:  # a release leaves fewer pinned vertices, so that other attachments can lose theirs
         finest = _finest_held(body)
         held = _nearest_at(body, finest, level)
-        hanging = hanging_at(body, over, held)
-        homeless = [each for each, particles in hanging if not len(particles)]
-        if homeless and not may_release:
+        reattachments = reattachments_at(body, over, held)
+        lost = [each for each, particles in reattachments if not len(particles)]
+        if lost and not may_release:
             raise StateError(
-                f"{homeless[0]!r} would hold nothing at level {level}, where its vertices have no place of "
-                "their own: release it before the level changes, or let set_level do so with release=True"
+                f"{lost[0]!r} would hold nothing at level {level}, which has no vertices of its own for it: "
+                "release it before the level changes, or pass release=True to set_level"
             )
         record_of(body).held = finest
-        if not homeless:
-            return released, held, hanging
-        for each in homeless:
+        if not lost:
+            return released, held, reattachments
+        for each in lost:
             each.release()
-        released += homeless
+        released += lost
 
 
-def _passed(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:
-    """Rows of `read_motion` for the vertices of another level, of which some are held."""
+def _mapped_rows(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:
+    """Rows of `read_motion` for the vertices of the new level. Args: held: vertices that are pinned."""
     old = motion[:, MASS]
     rows = np.zeros((len(masses), MOTION_WIDTH))
     rows[:, :INV_MASS] = over(motion[:, :INV_MASS])
     rows[:, MASS], rows[:, INV_MASS] = masses, 1.0 / masses
     if len(held):
-        _hold(over, motion, rows, held)
-    else:  # a body that is held shares its momentum with what holds it
+        _pin(over, motion, rows, held)
+    else:  # the momentum of a held body is not conserved
         for x, v in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
-            _keep_momentum(motion[:, x], motion[:, v], old, rows[:, x], rows[:, v], masses)
+            _preserve_momentum(motion[:, x], motion[:, v], old, rows[:, x], rows[:, v], masses)
     center = weighted_sum(old, motion[:, POSITION]) / old.sum()
-    push = motion[:, PUSH]
-    torque = np.cross(motion[:, POSITION] - center, push).sum(axis=0)
-    rows[:, PUSH] = masses[:, None] * _rigid(rows[:, POSITION] - center, masses, push.sum(axis=0), torque)
+    force = motion[:, PUSH]
+    torque = np.cross(motion[:, POSITION] - center, force).sum(axis=0)
+    rows[:, PUSH] = masses[:, None] * _rigid(rows[:, POSITION] - center, masses, force.sum(axis=0), torque)
     return rows
 
 
-def _hold(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
-    """Let vertices be held as those of the level before are that are nearest to each.
+def _pin(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
+    """Pin vertices in the state of the nearest vertices that are pinned in the old level.
 
-    What is held together stays together: the held ones move as a rigid body does that fits those before best,
-    and each by what the nearest one is beside that. So nothing creeps from change to change.
+    The pinned vertices follow the rigid motion that fits the old ones best, plus the deviation of the nearest
+    old one from it. So their arrangement does not drift over repeated changes of level.
     """
     sources = np.flatnonzero(motion[:, INV_MASS] == 0.0)
     nearest = sources[over.nearest_sources(held, sources)]
-    before, after = over.places
-    for part in (POSITION, EARLIER_POSITION):
-        turn, place = (kept(each) for each in fitting_motion(before[sources], motion[sources, part]))
-        beside = motion[nearest, part] - (turned(before[nearest], turn) + place)
-        rows[held, part] = turned(after[held], turn) + place + beside
+    before, after = over.vertices
+    for columns in (POSITION, EARLIER_POSITION):
+        rotation, translation = (
+            kept(each) for each in fitting_motion(before[sources], motion[sources, columns])
+        )
+        deviation = motion[nearest, columns] - (turned(before[nearest], rotation) + translation)
+        rows[held, columns] = turned(after[held], rotation) + translation + deviation
     rows[held, INV_MASS] = 0.0
     rows[held, VELOCITY] = motion[nearest, VELOCITY]
     rows[held, AIM] = motion[nearest, AIM]
     rows[held, TARGET] = motion[nearest, TARGET] + rows[held, POSITION] - motion[nearest, POSITION]
 
 
-def _keep_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats, masses: Floats) -> None:
-    """Move `new_x` and change `new_v`, so that centre, momentum and angular momentum are those of x and v."""
+def _preserve_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats, masses: Floats) -> None:
+    """Shift `new_x` and change `new_v` to the centre, momentum and angular momentum of `x` and `v`."""
     center = weighted_sum(m, x) / m.sum()
     new_x += center - weighted_sum(masses, new_x) / masses.sum()
-    arms = new_x - center
+    offsets = new_x - center
     momentum = weighted_sum(m, v) - weighted_sum(masses, new_v)
-    new_v += _rigid(arms, masses, momentum, _spin(x - center, v, m) - _spin(arms, new_v, masses))
+    new_v += _rigid(
+        offsets,
+        masses,
+        momentum,
+        _angular_momentum(x - center, v, m) - _angular_momentum(offsets, new_v, masses),
+    )
 
 
-def _rigid(arms: Floats, masses: Floats, momentum: Floats, spin: Floats) -> Floats:
-    """Velocities of the rigid motion that has a momentum, and an angular momentum about the centre of mass;
-    or accelerations, of a force and a torque. (n, 3), for places `arms` from about the centre."""
-    arms = arms - weighted_sum(masses, arms) / masses.sum()
-    own = moments(masses, arms, arms)
-    # A little more, or there is none about the line on which all may lie.
-    inertia = np.trace(own) * (1.0 + 1e-9) * np.eye(3) - own
-    a, b, c = shares_by(edge_inverses(np.vstack([np.zeros(3), inertia])), spin)[1:]
-    turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
-    return np.asarray(momentum / masses.sum() + turned(arms, turning))
+def _rigid(offsets: Floats, masses: Floats, momentum: Floats, angular_momentum: Floats) -> Floats:
+    """Velocities (n, 3) of the rigid motion with a momentum and an angular momentum about the centre of mass.
+
+    Or accelerations, from a force and a torque.
+
+    Args: offsets: positions of the particles about the centre of mass [m], (n, 3).
+    """
+    offsets = offsets - weighted_sum(masses, offsets) / masses.sum()
+    second_moments = moments(masses, offsets, offsets)
+    # The small increase keeps the inertia regular where all particles lie on one line.
+    inertia = np.trace(second_moments) * (1.0 + 1e-9) * np.eye(3) - second_moments
+    a, b, c = shares_by(edge_inverses(np.vstack([np.zeros(3), inertia])), angular_momentum)[1:]
+    cross_matrix = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # angular velocity x r = cross_matrix @ r
+    return np.asarray(momentum / masses.sum() + turned(offsets, cross_matrix))
 
 
 def _finest_held(body: SoftBody) -> Ints | None:
-    """Vertices of the finest level that what is held now stands for; None for none."""
+    """Vertices of the finest level that correspond to the vertices pinned now; None if none is pinned."""
     record, present = record_of(body), body.pinned.astype(np.int64)
     if not len(present):
         return None
@@ -208,18 +221,18 @@ def _finest_held(body: SoftBody) -> Ints | None:
         return present
     if record.held is not None and np.array_equal(_nearest_at(body, record.held, record.level), present):
         return record.held
-    # Pinned meanwhile: what is nearest to that, in the finest level.
+    # The pinned vertices have changed since: take the nearest ones of the finest level.
     return passage(body.asset, record.level, 0).nearest(present)
 
 
 def _nearest_at(body: SoftBody, finest: Ints | None, level: int) -> Ints:
-    """Vertices of a level that are nearest to some of the finest, ascending."""
+    """Vertices of a level that are nearest to the given ones of the finest level, ascending."""
     if finest is None:
         return np.zeros(0, dtype=np.int64)
     return np.unique(finest if level == 0 else passage(body.asset, 0, level).nearest(finest))
 
 
-def _spin(arms: Floats, v: Floats, masses: Floats) -> Floats:
-    """Sum of m r x v, (3,)."""
-    products = moments(masses, arms, v)
+def _angular_momentum(offsets: Floats, v: Floats, masses: Floats) -> Floats:
+    """Sum of m r x v, (3,) [kg m^2/s]."""
+    products = moments(masses, offsets, v)
     return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])

@@ -1,4 +1,4 @@
-"""Bodies at rest: particles, edges and tetrahedra, where they come from and how good they are."""
+"""Meshes of bodies at rest: particles, edges and tetrahedra; their shapes, files and quality."""
 
 from taichi_soft.meshing.body_mesh import BodyMesh
 from taichi_soft.meshing.delaunay import delaunay_mesh

@@ -1,4 +1,4 @@
-"""Ways out that several refusals name."""
+"""Suggested fixes that several error messages share."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import importlib.util
 from typing import Any
 
 
-def needing(call: str, *packages: str) -> str:
-    """`call`, and how to get those of the packages it needs that are not installed."""
+def with_install_hint(call: str, *packages: str) -> str:
+    """Append to `call` how to install those of its packages that are missing."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if not missing:
         return call
@@ -16,14 +16,14 @@ def needing(call: str, *packages: str) -> str:
     )
 
 
-def joining(source: Any) -> str:
-    """How to get one mesh where a trimesh.Scene was given, and nothing to say of anything else."""
+def scene_hint(source: Any) -> str:
+    """Suggest how to make one mesh of a trimesh.Scene; empty for any other source."""
     if not (hasattr(source, "geometry") and hasattr(source, "graph")):
         return ""
     method = "to_geometry()" if hasattr(source, "to_geometry") else "dump(concatenate=True)"
     return f': read the file by trimesh.load(path, force="mesh"), or join the scene by scene.{method}'
 
 
-def filling(surface: str) -> str:
-    """How to get a body from a surface that the expression `surface` gives."""
-    return f"SoftBodyAsset.from_surface({surface}, material) makes a body of it"
+def fill_hint(surface: str) -> str:
+    """Suggest how to make a body from the surface that the expression `surface` returns."""
+    return f"SoftBodyAsset.from_surface({surface}, material) makes a body from it"

@@ -1,4 +1,4 @@
-"""Arrays at the boundary: what a caller passes in becomes a checked, read-only copy."""
+"""Array arguments: checked, read-only copies of what a caller passes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ IntArray: TypeAlias = NDArray[np.int32]
 # Products of three lengths must stay finite in float64 (largest 1.8e308), with room to spare.
 LARGEST_COORDINATE = 1e30
 
-MOST_TETS = 10_000_000
-"""Of a built-in shape: more take minutes and tens of gigabytes to make."""
+MAX_TETS = 10_000_000
+"""Largest number of tetrahedra of a built-in shape: more take minutes and tens of gigabytes."""
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """The same array, C-contiguous and locked against writing."""
+    """Return the array C-contiguous and read-only."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
@@ -33,33 +33,34 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
         raise MeshError(f"{name} is not a rectangular array of numbers ({error})") from None
 
 
-def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], what: str) -> FloatArray:
-    """A float64 copy of `values` after checking its shape (None: any length) and that it is finite.
+def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], element: str) -> FloatArray:
+    """Return a float64 copy of `values`, checked to be finite and of a shape (None: any length).
 
-    Raises: MeshError naming the shape, the dtype or the first bad row (called `what`).
+    Raises: MeshError with the shape, the dtype or the first bad row (called `element`).
     """
     array = _as_array(values, name)
-    wanted = "(" + ", ".join("n" if length is None else str(length) for length in shape) + ")"
+    expected = "(" + ", ".join("n" if length is None else str(length) for length in shape) + ")"
     if array.size == 0:
-        raise MeshError(f"{name} is empty (shape {array.shape}): pass an array of shape {wanted}")
+        raise MeshError(f"{name} is empty (shape {array.shape}): pass an array of shape {expected}")
     if array.dtype.kind not in "fiu":
         raise MeshError(f"{name} has dtype {array.dtype}: pass real numbers")
     if array.ndim != len(shape) or any(
         want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
     ):
-        raise MeshError(f"{name} has shape {array.shape}: pass an array of shape {wanted}")
+        raise MeshError(f"{name} has shape {array.shape}: pass an array of shape {expected}")
     real = array.astype(np.float64)
     bad = ~np.isfinite(real).reshape(len(real), -1).all(axis=1)
     if bad.any():
         row = int(np.argmax(bad))
-        raise MeshError(f"{what} {row} is {real[row].tolist()}: every number must be finite")
+        raise MeshError(f"{element} {row} is {real[row].tolist()}: every number must be finite")
     return real
 
 
 def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> FloatArray:
-    """Points as a float64 copy of shape (n, dimension) [m].
+    """Return points as a float64 copy of shape (n, dimension) [m].
 
-    Raises: MeshError if the shape or dtype is wrong or a coordinate is not finite or absurdly large.
+    Raises: MeshError for a wrong shape or dtype, or a coordinate that is not finite or above
+        `LARGEST_COORDINATE`.
     """
     points = as_real(values, name, (None, dimension), "vertex")
     far = np.abs(points).max(axis=1) > LARGEST_COORDINATE
@@ -72,16 +73,16 @@ def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> 
 
 
 def as_indices(
-    values: ArrayLike, name: str, width: int, vertex_count: int, what: str, *, may_repeat: bool = False
+    values: ArrayLike, name: str, width: int, vertex_count: int, element: str, *, may_repeat: bool = False
 ) -> IntArray:
-    """Vertex indices as an int32 copy of shape (m, width), each in 0..vertex_count-1.
+    """Return vertex indices as an int32 copy of shape (m, width), each from 0 to vertex_count - 1.
 
-    Raises: MeshError if the shape or dtype is wrong, or a row (called `what`) has an index out of range
-        or the same vertex twice, unless it `may_repeat`.
+    Raises: MeshError for a wrong shape or dtype, or if a row (called `element`) has an index out of range, or
+        the same vertex twice unless it `may_repeat`.
     """
     array = _as_array(values, name)
     if array.size == 0:
-        raise MeshError(f"{name} is empty (shape {array.shape}): a mesh needs at least one {what}")
+        raise MeshError(f"{name} is empty (shape {array.shape}): a mesh needs at least one {element}")
     if array.dtype.kind not in "iu":
         raise MeshError(f"{name} has dtype {array.dtype}: pass integer vertex indices")
     if array.ndim != 2 or array.shape[1] != width:
@@ -90,25 +91,26 @@ def as_indices(
     if outside.any():
         row = int(np.argmax(outside))
         raise MeshError(
-            f"{what} {row} names vertices {name_vertices(array[row])}, but there are {vertex_count} of them: "
-            f"indices run from 0 to {vertex_count - 1}"
+            f"{element} {row} names vertices {name_vertices(array[row])}, but there are {vertex_count} of "
+            f"them: indices run from 0 to {vertex_count - 1}"
         )
     ordered = np.sort(array, axis=1)
     repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
     if repeated.any() and not may_repeat:
         row = int(np.argmax(repeated))
         raise MeshError(
-            f"{what} {row} names a vertex twice (vertices {name_vertices(array[row])}): repair or remove it"
+            f"{element} {row} names a vertex twice (vertices {name_vertices(array[row])}): repair or "
+            "remove it"
         )
     return array.astype(np.int32)
 
 
 def require_tet_count(tets: int) -> None:
-    """Raises: OptionError if a shape would have more tetrahedra than `MOST_TETS`."""
-    if tets > MOST_TETS:
-        raise OptionError(f"that is {tets:,} tetrahedra: ask for a coarser shape of at most {MOST_TETS:,}")
+    """Check the size of a shape. Raises: OptionError above `MAX_TETS` tetrahedra."""
+    if tets > MAX_TETS:
+        raise OptionError(f"the shape would have {tets:,} tetrahedra: make it coarser, at most {MAX_TETS:,}")
 
 
 def name_vertices(indices: NDArray[Any]) -> str:
-    """The indices of one element, as they appear in messages: `4, 9, 2, 31`."""
+    """Vertex indices of one element as messages print them: `4, 9, 2, 31`."""
     return ", ".join(str(int(index)) for index in indices)

@@ -1,4 +1,4 @@
-"""What every body is made of: particles and the edges between them."""
+"""Base of all meshes of bodies: particles and the edges between them."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ Self = TypeVar("Self", bound="BodyMesh")
 
 
 class BodyMesh(ABC):
-    """Particles and edges of a body at rest; `ParticleMesh` and `TetMesh` are its two kinds.
+    """Particles and edges of a body at rest; its subclasses are `ParticleMesh` and `TetMesh`.
 
-    Immutable: attributes cannot be set, arrays cannot be written to, the moves return new meshes.
+    Immutable: attributes cannot be set, arrays are read-only, and `translated`, `scaled` and `rotated` return
+    new meshes.
 
     Attributes:
         vertices: float64 (n, 3), positions at rest [m].
-        edges: int32 (k, 2), each row i < j, rows in ascending order.
+        edges: int32 (k, 2), each row i < j; rows of a `TetMesh` are in ascending order.
         tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for a `ParticleMesh`.
         surface: int32 (f, 3), triangles of the surface; f = 0 for a rope.
     """
@@ -33,7 +34,7 @@ class BodyMesh(ABC):
     surface: IntArray
 
     def __init__(self, vertices: FloatArray, edges: IntArray, tets: IntArray) -> None:
-        # Through __dict__, past the lock below; cached_property stores its value the same way.
+        # __dict__ bypasses __setattr__ below; cached_property stores its value in the same way.
         self.__dict__.update(vertices=read_only(vertices), edges=read_only(edges), tets=read_only(tets))
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
@@ -49,7 +50,7 @@ class BodyMesh(ABC):
 
     @abstractmethod
     def _with_vertices(self: Self, vertices: FloatArray) -> Self:
-        """The same mesh with its particles elsewhere."""
+        """Return the same mesh with other positions."""
 
     @cached_property
     def edge_lengths(self) -> FloatArray:
@@ -64,28 +65,28 @@ class BodyMesh(ABC):
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def translated(self: Self, offset: ArrayLike) -> Self:
-        """A copy moved by `offset` (3,) [m].
+        """Return a copy moved by `offset`.
 
         Args:
             offset: (3,) [m].
-        Raises: OptionError if it is not three finite numbers.
+        Raises: OptionError if `offset` is not three finite numbers.
         """
         return self._with_vertices(self.vertices + as_array(offset, "offset", (3,), "m"))
 
     def scaled(self: Self, factor: float) -> Self:
-        """A copy `factor` times as large about the origin.
+        """Return a copy scaled about the origin.
 
         Args:
             factor: above 0.
-        Raises: OptionError if factor is not positive.
+        Raises: OptionError if `factor` is not positive.
         """
         return self._with_vertices(self.vertices * as_positive(factor, "factor", "(one number)"))
 
     def rotated(self: Self, rotation: ArrayLike) -> Self:
-        """A copy turned about the origin by a matrix (3, 3) or a quaternion (x, y, z, w).
+        """Return a copy rotated about the origin.
 
         Args:
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
-        Raises: OptionError if it is no rotation.
+        Raises: OptionError if it is not a rotation.
         """
         return self._with_vertices(self.vertices @ as_rotation(rotation).T)

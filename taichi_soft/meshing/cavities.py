@@ -1,7 +1,7 @@
-"""Cavities of a tetrahedral mesh and what may fill them instead: flips, collapses and moves of one vertex.
+"""Cavities of a tetrahedral mesh and their replacements: flips, collapses and moves of one vertex.
 
-The mesh is closed by one vertex OUTSIDE, with a tetrahedron on each triangle of the surface. So a vertex of
-the surface has a star like any other, and changes of the surface are flips and collapses like any other.
+A virtual vertex OUTSIDE closes the mesh, with one tetrahedron on each triangle of the surface. Surface
+vertices then have complete stars, and changes of the surface need no special case.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 OUTSIDE = 0
-LARGEST_RING = 7  # tetrahedra round an edge that a flip removes; 42 ways to fill the ring
-# The two corners left by corners i and j, in the order in which (i, j, k, l) is an even permutation.
+LARGEST_RING = 7  # most tetrahedra around an edge that a flip removes: the ring has 42 triangulations
+# The other two corners for corners i and j, ordered so that (i, j, k, l) is an even permutation.
 _OPPOSITE = np.zeros((4, 4, 2), dtype=np.int64)
 for _face in range(4):
     for _turn in range(3):
@@ -30,40 +30,40 @@ for _face in range(4):
 
 
 class Cavities(NamedTuple):
-    """Sets of tetrahedra, and others with the same faces outwards to replace them; rows sorted by cavity."""
+    """Sets of tetrahedra and their replacements with the same boundary; rows sorted by cavity."""
 
     removed: Ints  # (r,) rows of the mesh
     removed_of: Ints  # (r,) cavity of each
     added: Ints  # (a, 4) vertices
     added_of: Ints  # (a,)
-    parent: Ints  # (a,) row whose place each takes, -1 where it has no single one
+    parent: Ints  # (a,) row that each replaces, -1 if it is not a single one
 
     @property
     def total(self) -> int:
-        """How many cavities."""
+        """Number of cavities."""
         return int(self.removed_of[-1]) + 1 if len(self.removed_of) else 0
 
     def in_rows(self, rows: Ints) -> Cavities:
-        """The same where row i of a part of the mesh is `rows[i]` of the whole."""
+        """Cavities of part of a mesh, renumbered so that row i becomes `rows[i]`."""
         return self._replace(
             removed=rows[self.removed], parent=np.where(self.parent < 0, -1, rows[self.parent])
         )
 
     def kept(self, keep: Bools) -> Cavities:
-        """Those of `keep`, (number of cavities,), renumbered."""
-        name = np.cumsum(keep) - 1
-        gone, new = keep[self.removed_of], keep[self.added_of]
+        """Cavities for which `keep` (number of cavities,) is True, renumbered."""
+        new_index = np.cumsum(keep) - 1
+        is_removed, is_added = keep[self.removed_of], keep[self.added_of]
         return Cavities(
-            self.removed[gone],
-            name[self.removed_of[gone]],
-            self.added[new],
-            name[self.added_of[new]],
-            self.parent[new],
+            self.removed[is_removed],
+            new_index[self.removed_of[is_removed]],
+            self.added[is_added],
+            new_index[self.added_of[is_added]],
+            self.parent[is_added],
         )
 
 
-class Closed:
-    """A mesh at one moment: its tetrahedra, also those beyond the surface, and who is whose neighbour."""
+class ClosedMesh:
+    """Adjacency of the closed mesh, including the tetrahedra outside the surface."""
 
     def __init__(self, tets: Ints, keys: NDArray[np.uint64]) -> None:
         self.tets = tets
@@ -72,27 +72,27 @@ class Closed:
         self._counts = np.bincount(tets.ravel(), minlength=len(keys))
         self._starts = np.cumsum(self._counts) - self._counts
         corner = keys[tets]
-        whole = corner.sum(axis=1)
-        self._faces = whole[:, None] - corner
-        pairs = corner[:, LOCAL_EDGES].sum(axis=2)
-        self._simplices = np.unique(np.concatenate([whole, self._faces.ravel(), pairs.ravel()]))
+        tet_keys = corner.sum(axis=1)
+        self._face_keys = tet_keys[:, None] - corner
+        edge_keys = corner[:, LOCAL_EDGES].sum(axis=2)
+        self._simplex_keys = np.unique(np.concatenate([tet_keys, self._face_keys.ravel(), edge_keys.ravel()]))
 
     def star(self, vertices: Ints) -> tuple[Ints, Ints]:
-        """Rows round each vertex, one after the other, and which entry of `vertices` each belongs to."""
+        """Rows around each vertex, vertex by vertex, and the entry of `vertices` that each belongs to."""
         counts = self._counts[vertices]
         of = np.repeat(np.arange(len(vertices)), counts)
         return self._by_vertex[ranges(self._starts[vertices], counts)], of
 
     def has(self, simplices: Ints) -> Bools:
-        """Whether edges (k, 2), triangles (k, 3) or tetrahedra (k, 4) are part of the mesh."""
+        """True for edges (k, 2), triangles (k, 3) or tetrahedra (k, 4) that are part of the mesh."""
         key = self.keys[simplices].sum(axis=1)
-        place = np.minimum(np.searchsorted(self._simplices, key), len(self._simplices) - 1)
-        return np.asarray(self._simplices[place] == key)
+        place = np.minimum(np.searchsorted(self._simplex_keys, key), len(self._simplex_keys) - 1)
+        return np.asarray(self._simplex_keys[place] == key)
 
     def neighbours(self) -> Ints:
-        """Row beyond each face, (m, 4)."""
-        order = np.argsort(self._faces.ravel(), kind="stable")
-        key = self._faces.ravel()[order]
+        """Row on the other side of each face, (m, 4)."""
+        order = np.argsort(self._face_keys.ravel(), kind="stable")
+        key = self._face_keys.ravel()[order]
         first = np.flatnonzero(key[1:] == key[:-1])
         rows = np.zeros(len(order), dtype=np.int64)
         rows[order[first]], rows[order[first + 1]] = order[first + 1] // 4, order[first] // 4
@@ -100,14 +100,14 @@ class Closed:
 
 
 def ranges(starts: Ints, counts: Ints) -> Ints:
-    """start, start + 1, ... of each entry, `counts` of them, one entry after the other."""
+    """Concatenate the ranges start, start + 1, ... that have the given counts."""
     return np.repeat(starts - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
 
 
 def sizes(x: FloatArray, tets: Ints) -> FloatArray:
     """Edge of the regular tetrahedron with the same sum of squared shape gradients, (k,) [m].
 
-    Negative for a tetrahedron inside out, infinite beyond the surface.
+    Negative for an inverted tetrahedron, infinite outside the surface.
     """
     p = x.T[:, tets.T]
     a, b, c = (p[:, i] - p[:, 0] for i in (1, 2, 3))
@@ -120,7 +120,7 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
-    """How fast each tetrahedron's size grows as one of its corners (k,) moves, by differences, (k, 3)."""
+    """Gradient of each tetrahedron's size at one of its corners (k,), by finite differences, (k, 3)."""
     rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
     own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
     step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)
@@ -134,65 +134,65 @@ def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
 
 
 def volumes(x: FloatArray, tets: Ints) -> FloatArray:
-    """Signed volumes (k,) [m^3], 0 beyond the surface."""
+    """Signed volumes (k,) [m^3], 0 outside the surface."""
     p = x[tets]
     six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
     return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
 
 
 def is_flat(x: FloatArray, tets: Ints) -> Bools:
-    """Which tetrahedra (k, 4) a mesh would refuse, or nearly so."""
+    """True for tetrahedra (k, 4) that `TetMesh` refuses as flat, or almost."""
     ends = x[tets[:, LOCAL_EDGES]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
     flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
     return np.asarray(flat & (tets != OUTSIDE).all(axis=1))
 
 
-def collapses(mesh: Closed, gone: Ints, into: Ints) -> Cavities:
-    """Each vertex of `gone` (k,) becomes one of `into`: a neighbour, or a new vertex where it moves to."""
-    rows, of = mesh.star(gone)
+def collapses(mesh: ClosedMesh, removed: Ints, target: Ints) -> Cavities:
+    """Collapse each vertex of `removed` (k,) into `target`: a neighbour, or a new vertex for a move."""
+    rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
-    stay = ~(tets == into[of, None]).any(axis=1)
-    added = np.where(tets[stay] == gone[of[stay], None], into[of[stay], None], tets[stay])
+    stay = ~(tets == target[of, None]).any(axis=1)
+    added = np.where(tets[stay] == removed[of[stay], None], target[of[stay], None], tets[stay])
     return Cavities(rows, of, added, of[stay], rows[stay])
 
 
-def meets_link_condition(mesh: Closed, gone: Ints, into: Ints) -> Bools:
-    """Whether all that `gone` and `into` touch touches their edge, so that a collapse keeps the topology."""
-    rows, of = mesh.star(gone)
+def meets_link_condition(mesh: ClosedMesh, removed: Ints, target: Ints) -> Bools:
+    """True where a collapse keeps the topology: whatever touches both vertices must touch their edge."""
+    rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
-    far = ~(tets == into[of, None]).any(axis=1)
+    far = ~(tets == target[of, None]).any(axis=1)
     tets, of = tets[far], of[far]
-    link = tets[tets != gone[of, None]].reshape(-1, 3)
-    u, v = gone[of, None], into[of, None]
+    link = tets[tets != removed[of, None]].reshape(-1, 3)
+    u, v = removed[of, None], target[of, None]
     wrong = mesh.has(np.hstack([v, link]))
     for i in range(3):
         vertex, edge = link[:, [i]], np.delete(link, i, axis=1)
         wrong |= mesh.has(np.hstack([v, vertex])) & ~mesh.has(np.hstack([u, v, vertex]))
         wrong |= mesh.has(np.hstack([v, edge])) & ~mesh.has(np.hstack([u, v, edge]))
-    return np.asarray(np.bincount(of[wrong], minlength=len(gone)) == 0)
+    return np.asarray(np.bincount(of[wrong], minlength=len(removed)) == 0)
 
 
-def face_flips(mesh: Closed, rows: Ints) -> Cavities:
-    """Two tetrahedra on a face of `rows` become three round the edge between their far corners."""
+def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
+    """Replace two tetrahedra on a face of `rows` by three around the edge between their apexes (2-3 flip)."""
     row, corner = np.repeat(rows, 4), np.tile(np.arange(4), len(rows))
-    beyond = mesh.neighbours()[row, corner]
-    near = mesh.tets[row, corner]
-    far = mesh.tets[beyond].sum(axis=1) - (mesh.tets[row].sum(axis=1) - near)
-    new = ~mesh.has(np.stack([near, far], axis=1))
-    row, corner, beyond, far = row[new], corner[new], beyond[new], far[new]
+    neighbour = mesh.neighbours()[row, corner]
+    apex = mesh.tets[row, corner]
+    opposite = mesh.tets[neighbour].sum(axis=1) - (mesh.tets[row].sum(axis=1) - apex)
+    new = ~mesh.has(np.stack([apex, opposite], axis=1))
+    row, corner, neighbour, opposite = row[new], corner[new], neighbour[new], opposite[new]
     added = np.repeat(mesh.tets[row], 3, axis=0)
-    added[np.arange(len(added)), ((corner[:, None] + [1, 2, 3]) % 4).ravel()] = np.repeat(far, 3)
+    added[np.arange(len(added)), ((corner[:, None] + [1, 2, 3]) % 4).ravel()] = np.repeat(opposite, 3)
     of = np.arange(len(row))
-    removed = np.stack([row, beyond], axis=1).ravel()
+    removed = np.stack([row, neighbour], axis=1).ravel()
     return Cavities(removed, of.repeat(2), added, of.repeat(3), np.full(len(added), -1))
 
 
-def edge_removals(x: FloatArray, mesh: Closed, edges: Ints) -> list[Cavities]:
-    """The tetrahedra round each edge (k, 2) give way to the best that their other corners can make."""
+def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities]:
+    """Replace the tetrahedra around each edge (k, 2) by the best triangulation of their ring."""
     rows, of = mesh.star(edges[:, 0])
-    hit = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
-    rows, of = rows[hit], of[hit]
+    shares_edge = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
+    rows, of = rows[shares_edge], of[shares_edge]
     counts = np.bincount(of, minlength=len(edges))
     return [
         _ring_fills(x, mesh, edges[counts == n], rows[counts[of] == n].reshape(-1, n))
@@ -201,11 +201,12 @@ def edge_removals(x: FloatArray, mesh: Closed, edges: Ints) -> list[Cavities]:
     ]
 
 
-def _ring_fills(x: FloatArray, mesh: Closed, edges: Ints, rows: Ints) -> Cavities:
+def _ring_fills(x: FloatArray, mesh: ClosedMesh, edges: Ints, rows: Ints) -> Cavities:
+    """Best triangulation of the ring of each edge (k, 2) whose tetrahedra are `rows` (k, n)."""
     count, n = rows.shape
     tets = mesh.tets[rows]
-    place = [(tets == edges[:, None, end, None]).argmax(axis=2) for end in (0, 1)]
-    links = np.take_along_axis(tets, _OPPOSITE[place[0], place[1]], axis=2)
+    ends_at = [(tets == edges[:, None, end, None]).argmax(axis=2) for end in (0, 1)]
+    links = np.take_along_axis(tets, _OPPOSITE[ends_at[0], ends_at[1]], axis=2)
     ring = np.empty((count, n + 1), dtype=np.int64)
     ring[:, 0] = links[:, 0, 0]
     for i in range(n):
@@ -221,13 +222,13 @@ def _ring_fills(x: FloatArray, mesh: Closed, edges: Ints, rows: Ints) -> Cavitie
         [np.stack([k, ends[..., 1], i, j], axis=2), np.stack([ends[..., 0], k, i, j], axis=2)], axis=2
     )  # (count, triples, 2, 4)
     worst = sizes(x, tips.reshape(-1, 4)).reshape(*corners.shape[:2], 2).min(axis=2)
-    # What is new inside must not be elsewhere: a chord, or of a ring of three the triangle.
+    # New simplices inside must not exist elsewhere: a chord, or the triangle of a ring of three.
     if n == 3:
         worst[mesh.has(corners[:, 0]), 0] = -np.inf
     else:
-        there = mesh.has(ring[:, chords].reshape(-1, 2)).reshape(count, len(chords))
+        exists = mesh.has(ring[:, chords].reshape(-1, 2)).reshape(count, len(chords))
         sides = (chords[:, None, :, None] == triples[None, :, None, :]).any(axis=3).all(axis=2)
-        worst[(there[:, :, None] & sides).any(axis=1)] = -np.inf
+        worst[(exists[:, :, None] & sides).any(axis=1)] = -np.inf
     worst[~closes] = -np.inf
     best = worst[:, fills].min(axis=2).argmax(axis=1)
     added = tips[np.arange(count)[:, None], fills[best]].reshape(-1, 4)
@@ -238,7 +239,7 @@ def _ring_fills(x: FloatArray, mesh: Closed, edges: Ints, rows: Ints) -> Cavitie
 
 @cache
 def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
-    """Of a ring of n: all triples (t, 3), ways to fill it by them (w, n - 2), its chords (c, 2)."""
+    """Triples (t, 3) of a ring of n, its triangulations by triples (w, n - 2), its chords (c, 2)."""
 
     def fill(i: int, j: int) -> list[list[tuple[int, int, int]]]:
         return [
@@ -246,13 +247,13 @@ def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
         ] or [[]]
 
     triples = list(combinations(range(n), 3))
-    fills = [[triples.index(triple) for triple in way] for way in fill(0, n - 1)]
+    fills = [[triples.index(triple) for triple in triangulation] for triangulation in fill(0, n - 1)]
     chords = [pair for pair in combinations(range(n), 2) if pair[1] - pair[0] not in (1, n - 1)]
     return np.array(triples), np.array(fills), np.array(chords, dtype=np.int64).reshape(-1, 2)
 
 
 def joined(parts: list[Cavities]) -> Cavities:
-    """All cavities of several lists, numbered on."""
+    """Concatenate lists of cavities and renumber the cavities."""
     shift = 0
     shifted: list[tuple[Any, ...]] = []
     for part in parts:

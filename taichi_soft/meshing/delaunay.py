@@ -1,4 +1,4 @@
-"""Delaunay or not: whether the sphere through each tetrahedron's corners is empty (thesis section 4.1)."""
+"""Delaunay meshes: the sphere through each tetrahedron's corners contains no vertex (thesis section 4.1)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 TOLERANCE = 1e-6
-"""How far a vertex may be inside a sphere, as its power over the square of the longest edge: a cube's eight
-corners lie on one sphere but for rounding."""
+"""Largest depth of a vertex inside a sphere, as its power over the square of the longest edge. It allows for
+rounding: the eight corners of a cube lie on one sphere."""
 
 
 def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
-    """scipy.spatial. Raises: MissingExtraError with the purpose."""
+    """Import scipy.spatial. Raises: MissingExtraError with the purpose."""
     require_extra("voronoi", f"{purpose} need")
     from scipy import spatial
 
@@ -35,7 +35,7 @@ def circumspheres(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def require_delaunay(mesh: TetMesh) -> None:
-    """Raises: MeshError naming the worst tetrahedron where a circumsphere is not empty."""
+    """Check that all circumspheres are empty. Raises: MeshError with the worst tetrahedron."""
     centers, radii = circumspheres(mesh)
     distance, nearest = scipy_spatial().cKDTree(mesh.vertices).query(centers)
     ends = mesh.vertices[mesh.tets]
@@ -45,18 +45,18 @@ def require_delaunay(mesh: TetMesh) -> None:
     if len(bad):
         worst = int(power.argmin())
         raise MeshError(
-            f"the mesh is not Delaunay: vertex {nearest[worst]} lies inside the sphere round tetrahedron "
-            f"{worst} ({len(bad)} of {len(mesh.tets)} are such): delaunay_mesh(mesh) connects the same "
-            "vertices anew"
+            f"the mesh is not Delaunay: vertex {nearest[worst]} lies inside the circumsphere of tetrahedron "
+            f"{worst} ({len(bad)} of {len(mesh.tets)} tetrahedra fail): reconnect its vertices by "
+            "delaunay_mesh(mesh)"
         )
 
 
 def delaunay_mesh(mesh: TetMesh) -> TetMesh:
-    """The same vertices in the same body, connected so that all circumspheres are empty.
+    """Reconnect the vertices of a mesh so that all circumspheres are empty; the body keeps its shape.
 
     Args:
-        mesh: tetrahedra whose surface stays as it is.
-    Raises: MeshError where the surface of the body cannot be kept: it then needs more vertices.
+        mesh: tetrahedra; their surface stays as it is.
+    Raises: MeshError if the surface of the body cannot be kept: it then needs more vertices.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
@@ -68,26 +68,27 @@ def delaunay_mesh(mesh: TetMesh) -> TetMesh:
     tets = tets[solid]
     kept = tets[_is_inside(mesh, corners[solid].mean(axis=1))]
     try:
-        made = TetMesh(mesh.vertices, kept, fix_orientation=True)
+        result = TetMesh(mesh.vertices, kept, fix_orientation=True)
     except MeshError as error:
         raise MeshError(
-            f"the vertices of the mesh have no Delaunay mesh of the same body ({error})"
+            f"the vertices of the mesh have no Delaunay mesh that fills the same body ({error}): put more "
+            "vertices on its surface"
         ) from None
-    if not np.isclose(made.volume, mesh.volume, rtol=1e-9):
+    if not np.isclose(result.volume, mesh.volume, rtol=1e-9):
         raise MeshError(
-            f"a Delaunay mesh of the same vertices fills {made.volume:.6g} m^3 instead of {mesh.volume:.6g}: "
-            "its surface is not that of the body; put more vertices on it"
+            f"the Delaunay mesh of these vertices fills {result.volume:.6g} m^3 instead of "
+            f"{mesh.volume:.6g}: it does not keep the surface of the body; put more vertices on it"
         )
-    return made
+    return result
 
 
 def _is_inside(mesh: TetMesh, points: FloatArray) -> FloatArray:
-    """Which of (p, 3) points lie in any tetrahedron."""
+    """True for points (p, 3) that lie in a tetrahedron."""
     corners = mesh.vertices[mesh.tets]
     inverses = edge_inverses(corners)
-    found = np.zeros(len(points), dtype=bool)
+    is_inside = np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), 256):
-        arm = points[start : start + 256, None] - corners[None, :, 0]
-        outside = shares_by(inverses, arm).min(axis=2) < -1e-9
-        found[start : start + 256] = ~outside.all(axis=1)
-    return found
+        offset = points[start : start + 256, None] - corners[None, :, 0]
+        outside = shares_by(inverses, offset).min(axis=2) < -1e-9
+        is_inside[start : start + 256] = ~outside.all(axis=1)
+    return is_inside

@@ -1,4 +1,4 @@
-"""What a mesh is made of in Gmsh's files (.msh), whatever version wrote them and whatever else they hold."""
+"""Gmsh files (.msh) of any version, reduced to the sections that a mesh consists of."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from pathlib import Path
 from taichi_soft.core.errors import MeshError
 
 NEEDED = ("MeshFormat", "Nodes", "Elements")
-"""Sections that meshio is given: over others, such as names and data, it stumbles in sound files."""
+"""Sections that meshio receives: it fails on others, such as names and data, even in valid files."""
 
 OPENING = re.compile(rb"\s*\$(\w+)[ \t]*(?:\r\n?|\n)")
 
 
 def mesh_sections(path: Path, content: bytes) -> bytes:
-    """A Gmsh file of the same mesh that holds its format, nodes and elements only; version 1 becomes 2.2.
+    """Return a Gmsh file with the format, nodes and elements of the mesh only; version 1 becomes 2.2.
 
-    Raises: MeshError for what is no Gmsh file, a section without an end, or one that is missing.
+    Raises: MeshError if the content is not a Gmsh file, or a section is missing or has no end.
     """
     found = _sections(path, content)
     if "NOD" in found or "ELM" in found:
@@ -25,7 +25,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
             "Nodes": _section(path, found, "NOD"),
             "Elements": _modern_elements(path, _section(path, found, "ELM")),
         }
-    # In binary files the line's end before `$End...` may be missing; a second one does no harm.
+    # Binary files may lack the line break before `$End...`; a second one is harmless.
     return b"".join(
         b"$%b\n%b\n$End%b\n" % (name.encode(), _section(path, found, name), name.encode()) for name in NEEDED
     )
@@ -40,27 +40,27 @@ def _section(path: Path, sections: dict[str, bytes], name: str) -> bytes:
 
 
 def _sections(path: Path, content: bytes) -> dict[str, bytes]:
-    """The bytes of every section by its name, one after the other: binary data may hold anything else."""
+    """Bytes of every section by name, parsed in sequence: binary data may contain anything."""
     sections: dict[str, bytes] = {}
-    place = 0
-    while opening := OPENING.match(content, place):
+    position = 0
+    while opening := OPENING.match(content, position):
         name = opening[1].decode()
         end = re.compile(rb"\$%b%b(?!\w)" % (b"END" if name.isupper() else b"End", opening[1]))
         closing = end.search(content, opening.end())
         if closing is None:
             raise MeshError(f"{path.name}: section ${name} has no end: the file is cut short")
         if name in sections and name in (*NEEDED, "NOD", "ELM"):
-            raise MeshError(f"{path.name}: has two sections ${name}: save each mesh as a file of its own")
+            raise MeshError(f"{path.name}: has two sections ${name}: save each mesh to its own file")
         sections[name] = content[opening.end() : closing.start()]
-        place = closing.end()
-    rest = content[place:].strip()
+        position = closing.end()
+    rest = content[position:].strip()
     if not sections:
         raise MeshError(
             f"{path.name}: not a Gmsh file: it begins with {_quoted(rest)}, not with $MeshFormat or $NOD. "
-            "Other programs give their files the same suffix: have them write .vtu or TetGen's .node and .ele"
+            "Other programs use the same suffix: save as .vtu or as TetGen's .node and .ele instead"
         )
     if rest:
-        raise MeshError(f"{path.name}: {_quoted(rest)} is no section: the file is cut short or damaged")
+        raise MeshError(f"{path.name}: {_quoted(rest)} is not a section: the file is cut short or damaged")
     return sections
 
 
@@ -69,12 +69,15 @@ def _quoted(content: bytes) -> str:
 
 
 def _modern_elements(path: Path, old: bytes) -> bytes:
-    """Version 1: `number kind physical geometrical count nodes...`; 2.2: `number kind 2 tag tag nodes...`."""
+    """Convert elements of version 1 to version 2.2.
+
+    Version 1: `number kind physical geometrical count nodes...`; 2.2: `number kind 2 tag tag nodes...`.
+    """
     rows = [line.split() for line in old.splitlines() if line.strip()]
-    announced = int(rows[0][0]) if rows and rows[0][0].isdigit() else -1
+    declared = int(rows[0][0]) if rows and rows[0][0].isdigit() else -1
     rows = rows[1:]
-    if len(rows) != announced or any(len(row) < 6 or row[4] != b"%d" % len(row[5:]) for row in rows):
-        raise MeshError(f"{path.name}: section $ELM is not what it announces: the file is damaged")
-    return b"%d\n" % announced + b"".join(
+    if len(rows) != declared or any(len(row) < 6 or row[4] != b"%d" % len(row[5:]) for row in rows):
+        raise MeshError(f"{path.name}: section $ELM does not match its counts: the file is damaged")
+    return b"%d\n" % declared + b"".join(
         b" ".join([*row[:2], b"2", *row[2:4], *row[5:]]) + b"\n" for row in rows
     )

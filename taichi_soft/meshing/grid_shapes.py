@@ -1,4 +1,4 @@
-"""Shapes made of box-shaped cells: five tetrahedra in each, one in the middle and one at four corners."""
+"""Shapes made of box-shaped cells, each of five tetrahedra: one in the middle and one at four corners."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import as_count, as_positive, to_array
 from taichi_soft.core.errors import MeshError, OptionError
-from taichi_soft.meshing.arrays import MOST_TETS, FloatArray, require_tet_count
+from taichi_soft.meshing.arrays import MAX_TETS, FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
-# Corner i of a cell lies at the bits of i: x = bit 0, y = bit 1, z = bit 2.
+# Corner i of a cell has the bits of i as coordinates: x = bit 0, y = bit 1, z = bit 2.
 CORNERS: NDArray[np.int64] = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)])
-# Two ways to cut a cell, mirror images. Neighbours take opposite ways, so that diagonals of faces meet.
+# Two divisions of a cell, mirror images. Neighbours use opposite ones, so that diagonals of shared faces
+# match.
 EVEN_CELL: NDArray[np.int64] = np.array(
     [(0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5)]
 )
@@ -24,11 +25,11 @@ ODD_CELL: NDArray[np.int64] = EVEN_CELL ^ 1
 def box(
     size: tuple[float, float, float] = (1.0, 1.0, 1.0), cells: tuple[int, int, int] = (4, 4, 4)
 ) -> TetMesh:
-    """A box about the origin.
+    """Make a box centred at the origin.
 
     Args:
         size: edge lengths along x, y and z [m].
-        cells: number of cells along x, y and z; five tetrahedra in each. The smallest dihedral angle is
+        cells: number of cells along x, y and z, each of five tetrahedra. The smallest dihedral angle is
             54.7 degrees with cubic cells.
     Raises: OptionError for sizes that are not positive or counts below 1.
     Example:
@@ -42,12 +43,12 @@ def box(
 
 
 def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_across: int = 2) -> TetMesh:
-    """A bar along x about the origin, in cells as near to cubes as whole numbers of them allow.
+    """Make a bar along x, centred at the origin, whose cells are as close to cubes as possible.
 
     Args:
         length, width, height: edges along x, y and z [m].
         cells_across: number of cells along the shortest edge. The smallest dihedral angle is 54.7 degrees
-            if the cells come out cubic and at least 32 otherwise.
+            if the cells are cubic and at least 32 otherwise.
     Raises: OptionError for sizes that are not positive or a count below 1.
     """
     size = (
@@ -56,19 +57,19 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
         as_positive(height, "height", "m"),
     )
     cell = min(size) / as_count(cells_across, "cells_across")
-    nx, ny, nz = (max(1, round(min(edge / cell, MOST_TETS))) for edge in size)
+    nx, ny, nz = (max(1, round(min(edge / cell, MAX_TETS))) for edge in size)
     return box(size, (nx, ny, nz))
 
 
 def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh:
-    """A body of cells, one for every True in a grid: frames, letters, scanned shapes.
+    """Make a body with one cell for every True in a grid: frames, letters, scanned shapes.
 
     Args:
-        mask: bool (nx, ny, nz), which cells are filled. The bounding box of the filled ones is centred at
+        mask: bool (nx, ny, nz), True for filled cells. The bounding box of the filled cells is centred at
             the origin.
         spacing: edge of a cell [m], one number or three (x, y, z). The smallest dihedral angle is 54.7
             degrees with cubic cells.
-    Raises: MeshError for a mask of another shape or type, or without any cell; OptionError for a spacing
+    Raises: MeshError for a mask of another shape or type, or without a filled cell; OptionError for a spacing
         that is not positive.
     """
     filled = to_array(mask, "mask")

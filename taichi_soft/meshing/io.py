@@ -1,4 +1,4 @@
-"""Meshes from and to files; the suffix of the path says the format.
+"""Read and write meshes; the suffix of the path selects the format.
 
     .npz          this package's own: arrays `vertices` and `tets`, compressed
     .node, .ele   TetGen, a pair of files; name either
@@ -7,7 +7,7 @@
     .mesh         Medit, text
 
 Gmsh, VTK and Medit files need the extra `taichi-soft[io]`. A surface (.obj, .stl and the like) has no
-tetrahedra; `SoftBodyAsset.from_surface` makes a body of it.
+tetrahedra; `SoftBodyAsset.from_surface` makes a body from it.
 """
 
 from __future__ import annotations
@@ -23,45 +23,44 @@ import numpy as np
 
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.errors import MeshError
-from taichi_soft.meshing.advice import filling, needing
+from taichi_soft.meshing.advice import fill_hint, with_install_hint
 from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
 SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-"""Triangles only, which `SoftBodyAsset.from_surface` reads."""
+"""Formats of triangles only, which `SoftBodyAsset.from_surface` reads."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
     """Read a tetrahedral mesh.
 
-    Vertices that no tetrahedron uses (Gmsh files hold the construction points) are dropped and the rest
-    renumbered in their order. All blocks of tetrahedra become one mesh; of tetrahedra with more than four
-    nodes the corners are taken. Cells of other kinds are left out, with a SkippedCellsWarning that counts
-    them, unless they are points, edges or faces of the body.
+    Vertices that no tetrahedron uses (such as the construction points in Gmsh files) are dropped, and the
+    rest renumbered in their order. All blocks of tetrahedra become one mesh; tetrahedra with more than four
+    nodes are reduced to their corners. Cells of other kinds are skipped with a SkippedCellsWarning that
+    counts them, unless they are points, edges or faces of the body.
 
     Args:
         path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu, .mesh. Coordinates are metres.
-        fix_orientation: turn tetrahedra of negative volume round. True by default, unlike in `TetMesh`,
-            because programs do not agree on the sense; neighbours that overlap are refused either way.
+        fix_orientation: reverse tetrahedra of negative volume. True by default, unlike in `TetMesh`, because
+            programs differ in orientation; overlapping neighbours are refused in either case.
     Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
-        cut short, without tetrahedra (where it is a surface, with how to fill it), not a sound mesh (see
-        `TetMesh`), or if meshio is needed and missing;
-        OptionError for a path that names no file.
+        cut short, without tetrahedra (for a surface, with how to fill it) or not a valid mesh (see
+        `TetMesh`), or if meshio is needed and missing; OptionError if `path` does not name a file.
     """
     source = as_path(path)
     suffix = source.suffix.lower()
     if suffix in SURFACES:
-        raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {filling(repr(source.name))}")
-    converted = needing(f"`meshio convert {source.name} {source.stem}.vtu`", "meshio")
-    _require_format(source, f"; of many others {converted} makes one of these")
+        raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {fill_hint(repr(source.name))}")
+    converter = with_install_hint(f"`meshio convert {source.name} {source.stem}.vtu`", "meshio")
+    _require_format(source, f"; {converter} converts many others")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
     try:
-        refuse_stand_in(source)
+        reject_placeholder(source)
         vertices, tets = read(source)
     except OSError as error:
-        raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
+        raise MeshError(f"{_file_name(error, source)}: cannot be read ({error.strerror or error})") from None
     try:
         return TetMesh(*_without_unused(vertices, tets), fix_orientation=fix_orientation)
     except MeshError as error:
@@ -69,15 +68,15 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
 
 
 def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
-    """Write a tetrahedral mesh in the format that the suffix of `path` names; every digit is kept.
+    """Write a tetrahedral mesh in the format of the suffix of `path`; every digit is kept.
 
-    The file appears whole or not at all: one that was there before stays until the new one is complete.
-    Naming either of TetGen's two files writes both.
+    The write is atomic: an existing file stays until the new one is complete. Naming either of TetGen's two
+    files writes both.
     Args:
         mesh: tetrahedra.
-        path: of the file. Its suffix is one of those that `load_mesh` reads.
-    Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
-        to, or if meshio is needed and missing; OptionError for a path that names no file.
+        path: path of the file. Its suffix is one of those that `load_mesh` reads.
+    Raises: MeshError for an unknown suffix, a mesh that is not a TetMesh, a path that cannot be written to,
+        or if meshio is needed and missing; OptionError if `path` does not name a file.
     Example:
         save_mesh(box(), "crate.npz")
         crate = load_mesh("crate.npz")
@@ -101,7 +100,7 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
     try:
         for final, write in writers.items():
             if final.is_dir():
-                raise MeshError(f"{final.name}: cannot be written (there is a folder of that name)")
+                raise MeshError(f"{final.name}: cannot be written (a folder has this name)")
             write(temporaries[final])
         for final, temporary in temporaries.items():
             os.replace(temporary, final)
@@ -116,15 +115,13 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
                 temporary.unlink(missing_ok=True)
 
 
-def _require_format(path: Path, way_out: str = "") -> None:
+def _require_format(path: Path, hint: str = "") -> None:
     if path.suffix.lower() not in SUFFIXES:
-        raise MeshError(
-            f"{path.name}: unknown mesh format {path.suffix!r}: use {', '.join(SUFFIXES)}{way_out}"
-        )
+        raise MeshError(f"{path.name}: unknown mesh format {path.suffix!r}: use {', '.join(SUFFIXES)}{hint}")
 
 
-def refuse_stand_in(source: Path) -> None:
-    """Raises: MeshError where git or a browser has put something else in the place of the file."""
+def reject_placeholder(source: Path) -> None:
+    """Check that a file is not a Git LFS pointer or a web page in its place. Raises: MeshError."""
     pair = source.suffix.lower() in (".node", ".ele")
     for path in (source.with_suffix(".node"), source.with_suffix(".ele")) if pair else (source,):
         with path.open("rb") as file:
@@ -132,14 +129,14 @@ def refuse_stand_in(source: Path) -> None:
         if start.startswith(b"version https://git-lfs.github.com/spec/"):
             raise MeshError(
                 f"{path.name}: a Git LFS pointer, not the file itself: run `git lfs pull` in its repository "
-                "(with the program of https://git-lfs.com), or download the file from its web page"
+                "(with the program from https://git-lfs.com), or download the file from its web page"
             )
         if start.startswith((b"<!doctype html", b"<html")):
-            raise MeshError(f"{path.name}: a web page, not the file that it shows: download the raw file")
+            raise MeshError(f"{path.name}: a web page, not the file itself: download the raw file")
 
 
-def _named(error: OSError, source: Path) -> str:
-    """The file that the error is about: with TetGen it may be the other one of the pair."""
+def _file_name(error: OSError, source: Path) -> str:
+    """Name of the file that the error concerns: for TetGen, either one of the pair."""
     return Path(os.fsdecode(error.filename)).name if error.filename else source.name
 
 
@@ -151,19 +148,19 @@ def _read_npz(path: Path) -> tuple[Any, Any]:
     try:
         with np.load(path, allow_pickle=False) as contents:
             names = sorted(contents.files)
-            whole = {"vertices", "tets"} <= set(names)
-            arrays = (contents["vertices"], contents["tets"]) if whole else None
+            has_both = {"vertices", "tets"} <= set(names)
+            arrays = (contents["vertices"], contents["tets"]) if has_both else None
     except OSError:
         raise
-    # Damaged inside, of other things than arrays, holding Python objects: each raises something else.
+    # Damaged contents, objects that are not arrays and Python objects each raise another exception.
     except Exception as error:
         reason = " ".join(str(error).split())[:200]
         raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
     if arrays is None:
-        held = ", ".join(repr(name) for name in names[:10]) + (", ..." if len(names) > 10 else "")
+        found = ", ".join(repr(name) for name in names[:10]) + (", ..." if len(names) > 10 else "")
         raise MeshError(
-            f"{path.name}: wanted are arrays 'vertices' (n, 3) and 'tets' (m, 4), and the file has "
-            f"{held or 'none'}: give TetMesh(vertices, tets) the two that are them, and save_mesh that"
+            f"{path.name}: needs arrays 'vertices' (n, 3) and 'tets' (m, 4), but the file has "
+            f"{found or 'none'}: pass its arrays to TetMesh(vertices, tets) and write that by save_mesh"
         )
     if any(array.ndim != 2 for array in arrays):
         shapes = " and ".join(str(array.shape) for array in arrays)
@@ -172,12 +169,12 @@ def _read_npz(path: Path) -> tuple[Any, Any]:
 
 
 def _write_npz(mesh: TetMesh, path: Path) -> None:
-    with path.open("wb") as file:  # given a name, numpy would add its own suffix
+    with path.open("wb") as file:  # given a path, numpy would append its own suffix
         np.savez_compressed(file, vertices=mesh.vertices, tets=mesh.tets)
 
 
 def _without_unused(vertices: Any, tets: Any) -> tuple[Any, Any]:
-    """Drop vertices that no tetrahedron names; what is not even an index array is left for TetMesh."""
+    """Drop vertices that no tetrahedron uses. `TetMesh` reports arrays that are not indices."""
     if tets.dtype.kind not in "iu" or tets.size == 0 or tets.min() < 0 or tets.max() >= len(vertices):
         return vertices, tets
     used, inverse = np.unique(tets, return_inverse=True)

@@ -14,16 +14,16 @@ from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0), (0, 2))}
-"""Springs of a cloth by the steps over its grid that they span."""
+"""Springs of a cloth by kind, as the steps over its grid that they span."""
 
 
 def rope(length: float, segments: int, mass: float) -> ParticleMesh:
-    """A chain of particles along x, centred at the origin. Vertex 0 is the end at the lowest x.
+    """Make a chain of particles along x, centred at the origin. Vertex 0 is the end at the lowest x.
 
     Args:
-        length: of the whole [m].
+        length: total length [m].
         segments: number of springs.
-        mass: of the whole [kg]; the ends weigh half.
+        mass: total mass [kg]; the particles at the ends have half the mass of the others.
     Example:
         arena = World(floor=0.0)
         line = rope(length=2.0, segments=20, mass=0.5)
@@ -41,14 +41,15 @@ def rope(length: float, segments: int, mass: float) -> ParticleMesh:
 def cloth(
     size: ArrayLike, cells: tuple[int, int], mass: float, *, springs: tuple[str, ...] = tuple(KINDS)
 ) -> ParticleMesh:
-    """A rectangle of cloth in the x-y plane, centred at the origin.
+    """Make a rectangular cloth in the x-y plane, centred at the origin.
 
-    Vertex i (cells[1] + 1) + j lies at column i and row j. Vertex 0 is the corner at the lowest x and y.
+    Vertex i * (cells[1] + 1) + j lies at column i and row j. Vertex 0 is the corner at the lowest x and y.
     Args:
-        size: (2,) along x and y [m].
-        cells: meshes along x and y.
-        mass: of the whole [kg], by the area round each particle.
-        springs: of which kinds: "tensile" along the threads, "shear" across the meshes, "bend" over two.
+        size: (2,) lengths along x and y [m].
+        cells: number of cells along x and y.
+        mass: total mass [kg], distributed by the area around each particle.
+        springs: kinds of springs: "tensile" along the threads, "shear" along the diagonals of the cells,
+            "bend" over two cells.
     Raises: OptionError for a number out of range or an unknown kind.
     """
     width, height = as_array(size, "size", (2,), "m")
@@ -64,8 +65,8 @@ def cloth(
         fits = (i + di <= nx) & (j + dj <= ny) & (j + dj >= 0)
         first = np.flatnonzero(fits)
         pairs.append(np.stack([first, first + di * (ny + 1) + dj], axis=1))
-    share = np.where((i == 0) | (i == nx), 0.5, 1.0) * np.where((j == 0) | (j == ny), 0.5, 1.0)
-    masses = as_positive(mass, "mass", "kg") * share / (nx * ny)
+    weight = np.where((i == 0) | (i == nx), 0.5, 1.0) * np.where((j == 0) | (j == ny), 0.5, 1.0)
+    masses = as_positive(mass, "mass", "kg") * weight / (nx * ny)
     corner = np.flatnonzero((i < nx) & (j < ny))
     a, b, c, d = corner, corner + ny + 1, corner + ny + 2, corner + 1
     front = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
@@ -75,13 +76,13 @@ def cloth(
 
 
 def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float) -> FloatArray:
-    """One value for each spring of a `cloth`, (k,), such as its stiffness, by kind.
+    """Return a value, such as the stiffness, for each spring of a `cloth` by its kind, (k,).
 
     Args:
         mesh: made by `cloth`.
-        cells: as given to it.
-        values: tensile=, shear= and bend=, each of the kinds that the cloth has; 0 for none.
-    Raises: OptionError for an unknown kind or one that is missing; MeshError for a mesh of other cells.
+        cells: the same as for `cloth`.
+        values: tensile=, shear= and bend=, for each kind that the cloth has; 0 for none.
+    Raises: OptionError for an unknown or missing kind; MeshError for a mesh with other cells.
     Example:
         sheet = cloth((1.0, 1.0), (10, 10), mass=0.3)
         stiffness = cloth_constants(sheet, (10, 10), tensile=200, shear=100, bend=5)  # N/m
@@ -89,14 +90,14 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
     """
     unknown = set(values) - set(KINDS)
     if unknown:
-        raise OptionError(f"unknown spring kind {min(unknown)!r}: choose of {', '.join(map(repr, KINDS))}")
+        raise OptionError(f"unknown spring kind {min(unknown)!r}: choose from {', '.join(map(repr, KINDS))}")
     nx, ny = _as_cells(cells)
     kind = _kinds(mesh, nx, ny)
     chosen = np.zeros(len(mesh.edges))
     for number, name in enumerate(KINDS):
         if (kind == number).any():
             if name not in values:
-                raise OptionError(f"the cloth has {name} springs: give {name}= as well, 0 for none")
+                raise OptionError(f"the cloth has {name} springs: pass {name}= too, 0 for none")
             chosen[kind == number] = as_number(values[name], name, 0.0, np.inf, "a number of 0 or more")
     return chosen
 
@@ -108,12 +109,13 @@ def _as_cells(cells: Any) -> tuple[int, int]:
 
 
 def _kinds(mesh: ParticleMesh, nx: int, ny: int) -> NDArray[np.int64]:
-    """Which of `KINDS` each spring of a cloth is, (k,). Raises: MeshError if it is a cloth of other cells."""
+    """Index of each spring's kind in `KINDS`, (k,). Raises: MeshError if the cloth has other cells."""
     if not isinstance(mesh, ParticleMesh):
         raise MeshError(f"mesh must be a ParticleMesh made by cloth, got {type(mesh).__name__}")
     if len(mesh.vertices) != (nx + 1) * (ny + 1):
         raise MeshError(
-            f"a cloth of ({nx}, {ny}) cells has {(nx + 1) * (ny + 1)} vertices, not {len(mesh.vertices)}"
+            f"a cloth of ({nx}, {ny}) cells has {(nx + 1) * (ny + 1)} vertices, not {len(mesh.vertices)}: "
+            "pass the cells it was made with"
         )
     i, j = np.divmod(mesh.edges, ny + 1)
     step = np.stack([i[:, 1] - i[:, 0], j[:, 1] - j[:, 0]], axis=1)
@@ -123,18 +125,19 @@ def _kinds(mesh: ParticleMesh, nx: int, ny: int) -> NDArray[np.int64]:
     if kind.min() < 0:
         row = int(kind.argmin())
         raise MeshError(
-            f"edge {row} is no spring of a cloth of ({nx}, {ny}) cells: give the cells it was made with"
+            f"edge {row} is not a spring of a cloth of ({nx}, {ny}) cells: pass the cells it was made with"
         )
     return kind
 
 
 def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> ParticleMesh:
-    """The particles and edges of a solid without its tetrahedra, a quarter of whose masses each gets.
+    """Make particles and springs of a solid's edges; each vertex gets a quarter of its tetrahedra's masses.
 
     Args:
         density: [kg/m^3], one number or one per tetrahedron.
         mesh: tetrahedra, whose vertices become the particles.
-    Raises: MeshError for what is no TetMesh; OptionError for a density that is not positive or does not fit.
+    Raises: MeshError if `mesh` is not a TetMesh; OptionError for a density that is not positive or has
+        another shape.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")

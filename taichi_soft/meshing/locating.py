@@ -1,4 +1,4 @@
-"""Which tetrahedron of a mesh holds a point, or comes nearest to it."""
+"""Find the tetrahedron of a mesh that contains a point or is nearest to it."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 
 Ints = NDArray[np.int64]
 
-STEPS = 64
-"""From tetrahedron to tetrahedron towards a point, before it is looked for on the surface."""
+MAX_STEPS = 64
+"""Steps of a walk towards a point before the surface is searched."""
 
 INSIDE = -1e-9
-"""Barycentric coordinate from which on a point belongs to a tetrahedron."""
+"""Barycentric coordinate above which a point belongs to a tetrahedron."""
 
 CHUNK = 1 << 20
-"""Pairs of points and elements that are looked at together."""
+"""Pairs of points and elements that are processed at once."""
 
-FEW = 1 << 13
-"""Points that are looked at together."""
+BATCH = 1 << 13
+"""Points that are processed at once."""
 
 
 class Locator:
-    """Of one mesh at rest."""
+    """Point location in one mesh at rest."""
 
     def __init__(self, mesh: TetMesh) -> None:
-        """Prepare to look for points."""
+        """Build the neighbours and bins of the mesh."""
         self._corners = mesh.vertices[mesh.tets]
         self._inverses = edge_inverses(self._corners)
         self._neighbours = _neighbours(mesh.tets)
@@ -38,76 +38,77 @@ class Locator:
         self._on_tets, self._on_triangles = _Bins(self._corners), _Bins(self._triangles)
 
     def __call__(self, points: FloatArray, start: Ints | None = None) -> tuple[Ints, FloatArray]:
-        """Tetrahedron of each of `points` (k, 3), (k,), and barycentric coordinates of the point of it that
-        is nearest, (k, 4), none below 0.
+        """Locate points (k, 3).
 
-        Args: start: tetrahedron from which to walk, (k,), -1 where none is known.
+        Args: start: tetrahedron from which to walk, (k,), -1 if none is known.
+        Returns: the tetrahedron of each point, (k,), and the barycentric coordinates of its point nearest to
+            it, (k, 4), none below 0.
         """
         tet = np.full(len(points), -1) if start is None else start.copy()
         unknown = tet < 0
-        tet[unknown] = self._on_tets.any_at(points[unknown])
-        tet, shares = self._walk(points, tet)
-        outside = np.flatnonzero(shares.min(axis=1) < INSIDE)
-        for first in range(0, len(outside), FEW):
-            self._find_outside(points, outside[first : first + FEW], tet, shares)
-        shares = np.maximum(shares, 0.0)
-        return tet, shares / shares.sum(axis=1, keepdims=True)
+        tet[unknown] = self._on_tets.any_element(points[unknown])
+        tet, weights = self._walk(points, tet)
+        outside = np.flatnonzero(weights.min(axis=1) < INSIDE)
+        for first in range(0, len(outside), BATCH):
+            self._find_outside(points, outside[first : first + BATCH], tet, weights)
+        weights = np.maximum(weights, 0.0)
+        return tet, weights / weights.sum(axis=1, keepdims=True)
 
-    def _find_outside(self, points: FloatArray, rows: Ints, tet: Ints, shares: FloatArray) -> None:
-        """Put the nearest point of the mesh in the place of what a walk found for some points."""
+    def _find_outside(self, points: FloatArray, rows: Ints, tet: Ints, weights: FloatArray) -> None:
+        """For points outside, replace the result of the walk by the nearest point of the mesh."""
         triangle, nearest = self._on_surface(points[rows])
-        # A point that a walk did not reach round a notch may be inside behind the nearest triangle.
-        again, behind = self._walk(points[rows], self._tet[triangle])
-        is_in = behind.min(axis=1) >= INSIDE
-        tet[rows] = np.where(is_in, again, self._tet[triangle])
-        beside = self._shares(nearest, self._tet[triangle])
-        shares[rows] = np.where(is_in[:, None], behind, beside)
+        # A walk may end at a notch. The point can then be inside, behind the nearest triangle.
+        retried_tet, retried_weights = self._walk(points[rows], self._tet[triangle])
+        is_in = retried_weights.min(axis=1) >= INSIDE
+        tet[rows] = np.where(is_in, retried_tet, self._tet[triangle])
+        surface_weights = self._weights(nearest, self._tet[triangle])
+        weights[rows] = np.where(is_in[:, None], retried_weights, surface_weights)
 
-    def _shares(self, points: FloatArray, tet: Ints) -> FloatArray:
+    def _weights(self, points: FloatArray, tet: Ints) -> FloatArray:
         return shares_by(self._inverses[tet], points - self._corners[tet, 0])
 
     def _walk(self, points: FloatArray, start: Ints) -> tuple[Ints, FloatArray]:
-        """Through the face that a point is farthest beyond, until it is reached or there is no neighbour."""
+        """Walk through the face that a point is farthest beyond, to its tetrahedron or the mesh's end."""
         tet = start.copy()
-        shares = self._shares(points, tet)
-        going = np.arange(len(points))
-        for _ in range(STEPS):
-            least = shares[going].argmin(axis=1)
-            following = self._neighbours[tet[going], least]
-            goes = (shares[going, least] < INSIDE) & (following >= 0)
-            going = going[goes]
-            if len(going) == 0:
+        weights = self._weights(points, tet)
+        active = np.arange(len(points))
+        for _ in range(MAX_STEPS):
+            face = weights[active].argmin(axis=1)
+            next_tet = self._neighbours[tet[active], face]
+            continues = (weights[active, face] < INSIDE) & (next_tet >= 0)
+            active = active[continues]
+            if len(active) == 0:
                 break
-            tet[going] = following[goes]
-            shares[going] = self._shares(points[going], tet[going])
-        return tet, shares
+            tet[active] = next_tet[continues]
+            weights[active] = self._weights(points[active], tet[active])
+        return tet, weights
 
     def _on_surface(self, points: FloatArray) -> tuple[Ints, FloatArray]:
         """Nearest triangle of the surface, (k,), and the nearest point on it, (k, 3)."""
         triangle, nearest = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
-        point, candidate = self._on_triangles.near(points)
-        is_sure = np.zeros(len(points), dtype=np.bool_)
+        point, candidate = self._on_triangles.candidates(points)
+        is_final = np.zeros(len(points), dtype=np.bool_)
         if len(point):
-            found, best, at = self._nearest_of(points, point, candidate)
-            triangle[found], nearest[found] = best, at
-            is_sure[found] = np.linalg.norm(at - points[found], axis=1) <= self._on_triangles.sure
-        rest = np.flatnonzero(~is_sure)
+            found, best, place = self._nearest_of(points, point, candidate)
+            triangle[found], nearest[found] = best, place
+            is_final[found] = np.linalg.norm(place - points[found], axis=1) <= self._on_triangles.search_range
+        rest = np.flatnonzero(~is_final)
         rows = max(1, CHUNK // len(self._triangles))
         for start in range(0, len(rest), rows):
-            few = rest[start : start + rows]
+            batch = rest[start : start + rows]
             every = np.arange(len(self._triangles))
-            pairs = np.repeat(few, len(every)), np.tile(every, len(few))
-            found, best, at = self._nearest_of(points, *pairs)
-            triangle[found], nearest[found] = best, at
+            pairs = np.repeat(batch, len(every)), np.tile(every, len(batch))
+            found, best, place = self._nearest_of(points, *pairs)
+            triangle[found], nearest[found] = best, place
         return triangle, nearest
 
     def _nearest_of(self, points: FloatArray, point: Ints, triangle: Ints) -> tuple[Ints, Ints, FloatArray]:
-        """Points that occur in pairs with triangles, each one's nearest triangle, and the place on that."""
-        away = np.linalg.norm(points[point] - self._on_triangles.middles[triangle], axis=1)
-        least = np.full(len(points), np.inf)
-        np.minimum.at(least, point, away)  # the middle is on the triangle
-        may_be = away - self._on_triangles.radius <= least[point]
-        point, triangle = point[may_be], triangle[may_be]
+        """For each point that occurs in the pairs: point, nearest triangle, and nearest point on it."""
+        distance = np.linalg.norm(points[point] - self._on_triangles.centroids[triangle], axis=1)
+        bound = np.full(len(points), np.inf)
+        np.minimum.at(bound, point, distance)  # upper bound: the centroid is on the triangle
+        is_candidate = distance - self._on_triangles.radius <= bound[point]
+        point, triangle = point[is_candidate], triangle[is_candidate]
         nearest = nearest_points(points[point], self._triangles[triangle])
         distance2 = ((nearest - points[point]) ** 2).sum(axis=1)
         order = np.lexsort((triangle, distance2, point))
@@ -116,42 +117,42 @@ class Locator:
 
 
 class _Bins:
-    """Elements by where their middles are."""
+    """Elements sorted into bins by their centroids."""
 
     def __init__(self, corners: FloatArray) -> None:
-        """Args: corners: of each element, (m, c, 3)."""
-        self.middles = corners.mean(axis=1)
-        self.radius = float(np.linalg.norm(corners - self.middles[:, None], axis=2).max())
-        self.sure = self.radius  # an element as near as that is among those that `near` finds
+        """Args: corners: corners of each element, (m, c, 3)."""
+        self.centroids = corners.mean(axis=1)
+        self.radius = float(np.linalg.norm(corners - self.centroids[:, None], axis=2).max())
+        self.search_range = self.radius  # `candidates` finds all elements within this distance
         self._pitch = 2.0 * self.radius
-        self._low = np.floor(self.middles.min(axis=0) / self._pitch) - 1
-        self._shape = (np.floor(self.middles.max(axis=0) / self._pitch) - self._low + 2).astype(np.int64)
-        bins = self._bins(self.middles)
+        self._low = np.floor(self.centroids.min(axis=0) / self._pitch) - 1
+        self._shape = (np.floor(self.centroids.max(axis=0) / self._pitch) - self._low + 2).astype(np.int64)
+        bins = self._bins(self.centroids)
         self._order = np.argsort(bins, kind="stable")
         self._counts = np.bincount(bins, minlength=int(np.prod(self._shape)))
         self._begins = np.cumsum(self._counts) - self._counts
 
-    def near(self, points: FloatArray) -> tuple[Ints, Ints]:
-        """All pairs of a point and an element in its bin or one beside that."""
+    def candidates(self, points: FloatArray) -> tuple[Ints, Ints]:
+        """All pairs of a point and an element in its bin or an adjacent one."""
         places = np.floor(points / self._pitch) - self._low
         is_in = ((places >= 1) & (places < self._shape - 1)).all(axis=1)
-        inner, home = np.flatnonzero(is_in), self._bins(points[is_in])
+        inner, own_bin = np.flatnonzero(is_in), self._bins(points[is_in])
         ny, nz = self._shape[1:]
         steps = np.array([(i * ny + j) * nz + k for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)])
-        bins = home[:, None] + steps
+        bins = own_bin[:, None] + steps
         counts = self._counts[bins].ravel()
         point = np.repeat(np.repeat(inner, 27), counts)
         place = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
         return point, self._order[np.repeat(self._begins[bins].ravel(), counts) + place]
 
-    def any_at(self, points: FloatArray) -> Ints:
-        """An element in the bin of each point, or the first of all where there is none, (k,)."""
+    def any_element(self, points: FloatArray) -> Ints:
+        """An element in the bin of each point, or element 0 if the bin is empty, (k,)."""
         places = np.floor(points / self._pitch) - self._low
         found = np.zeros(len(points), dtype=np.int64)
         inner = np.flatnonzero(((places >= 0) & (places < self._shape)).all(axis=1))
         bins = self._bins(points[inner])
-        held = self._counts[bins] > 0
-        found[inner[held]] = self._order[self._begins[bins[held]]]
+        is_filled = self._counts[bins] > 0
+        found[inner[is_filled]] = self._order[self._begins[bins[is_filled]]]
         return found
 
     def _bins(self, points: FloatArray) -> Ints:
@@ -160,7 +161,7 @@ class _Bins:
 
 
 def _neighbours(tets: NDArray[np.integer]) -> Ints:
-    """The tetrahedron beyond each face, (m, 4), -1 where there is none."""
+    """Tetrahedron on the other side of each face, (m, 4), -1 if there is none."""
     one, other = shared_faces(tets).T
     neighbours = np.full(4 * len(tets), -1)
     neighbours[one], neighbours[other] = other // 4, one // 4
@@ -168,7 +169,7 @@ def _neighbours(tets: NDArray[np.integer]) -> Ints:
 
 
 def nearest_points(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """On triangles (k, 3, 3), to points (k, 3): (k, 3)."""
+    """Nearest points on triangles (k, 3, 3) to points (k, 3), (k, 3)."""
     a = triangles[:, 0]
     edges = np.stack([triangles[:, 1] - a, triangles[:, 2] - a], axis=1)
     gram = np.einsum("kix,kjx->kij", edges, edges)
@@ -181,10 +182,10 @@ def nearest_points(points: FloatArray, triangles: FloatArray) -> FloatArray:
     best = a + s[:, None] * edges[:, 0] + t[:, None] * edges[:, 1]
     least = np.where(is_inside, ((best - points) ** 2).sum(axis=1), np.inf)
     for i in range(3):
-        start, way = triangles[:, i], triangles[:, (i + 1) % 3] - triangles[:, i]
-        length2 = np.maximum((way**2).sum(axis=1), 1e-300)
-        part = np.clip(np.einsum("kx,kx->k", points - start, way) / length2, 0.0, 1.0)
-        on_side = start + part[:, None] * way
+        start, side = triangles[:, i], triangles[:, (i + 1) % 3] - triangles[:, i]
+        length2 = np.maximum((side**2).sum(axis=1), 1e-300)
+        fraction = np.clip(np.einsum("kx,kx->k", points - start, side) / length2, 0.0, 1.0)
+        on_side = start + fraction[:, None] * side
         distance2 = ((on_side - points) ** 2).sum(axis=1)
         nearer = distance2 < least
         best[nearer], least = on_side[nearer], np.minimum(least, distance2)

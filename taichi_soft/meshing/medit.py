@@ -1,4 +1,4 @@
-"""What a mesh is made of in Medit's text files (.mesh), whatever else they hold."""
+"""Medit text files (.mesh), reduced to vertices and cells."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ NODES = {
     b"Hexahedra": 8,
     b"Hexaedra": 8,
 }
-"""Of each kind of cell."""
+"""Number of vertices of each kind of cell."""
 
 KEYWORD = re.compile(rb"(?<![\w.+-])([A-Za-z]\w*)")
 
 
 def mesh_sections(path: Path, content: bytes) -> bytes:
-    """A Medit file of the same vertices and cells, laid out as meshio wants it; what marks them is left out.
+    """Return a Medit file of the same vertices and cells, laid out for meshio, without sections of marks.
 
-    Raises: MeshError for what is no such file, or a section of another length than it announces.
+    Raises: MeshError if the content is not such a file, or a section does not match its count.
     """
     _, *words = KEYWORD.split(re.sub(rb"#[^\n]*", b"", content))
     if not words or words[0] != b"MeshVersionFormatted":
         start = content[:20].decode("ascii", "replace")
         raise MeshError(
             f"{path.name}: not a Medit text file: it begins with {start!r}, not with MeshVersionFormatted. "
-            "Other programs give their files the same suffix: have them write .vtu"
+            "Other programs use the same suffix: save as .vtu instead"
         )
     found = list(zip(words[::2], (body.split() for body in words[1::2]), strict=True))
     dimension = next((body[0] for word, body in found if word == b"Dimension" and body), b"?")
@@ -47,7 +47,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
         count = int(body[0]) if body and body[0].isdigit() else -1
         if len(body) != 1 + count * columns:
             raise MeshError(
-                f"{path.name}: {word.decode()} announces {count} rows of {columns} and holds {len(body) - 1} "
+                f"{path.name}: {word.decode()} declares {count} rows of {columns} and has {len(body) - 1} "
                 "numbers: the file is cut short or damaged"
             )
         if count:

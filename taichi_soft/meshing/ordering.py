@@ -1,4 +1,4 @@
-"""Orders in which neighbours in space are neighbours in memory."""
+"""Orders that keep neighbours in space close in memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_soft.meshing.arrays import IntArray, as_indices, as_points
 
 # Bits per axis: three axes fill 63 of the 64 bits of one key.
 AXIS_BITS = 21
-# Steps that pull the bits of a 21-bit number apart, leaving two zeros after each.
+# Shifts and masks that spread the bits of a 21-bit number, leaving two zeros after each.
 SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -22,7 +22,7 @@ SPREAD = (
 
 
 def spatial_order(vertices: ArrayLike) -> IntArray:
-    """Order of points along a Morton curve (the bits of x, y and z interleaved).
+    """Order points along a Morton curve (the bits of x, y and z interleaved).
 
     Args:
         vertices: (n, 3) [m].
@@ -32,24 +32,24 @@ def spatial_order(vertices: ArrayLike) -> IntArray:
     """
     points = as_points(vertices)
     low = points.min(axis=0)
-    # One scale for all axes: cells of the curve are cubes whatever the body's proportions.
+    # One scale for all axes, so that cells of the curve are cubes for any proportions of the body.
     extent = float((points.max(axis=0) - low).max())
-    share = (points - low) / extent if extent > 0 else np.zeros_like(points)
-    cells = (share * (2**AXIS_BITS - 1)).astype(np.uint64)
+    fraction = (points - low) / extent if extent > 0 else np.zeros_like(points)
+    cells = (fraction * (2**AXIS_BITS - 1)).astype(np.uint64)
     keys = _spread(cells[:, 0]) << np.uint64(2) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2])
     return np.argsort(keys, kind="stable").astype(np.int32)
 
 
 def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
-    """Order of tetrahedra that walks through renumbered vertices from first to last.
+    """Order tetrahedra by their renumbered vertices.
 
     Args:
         tets: (m, 4) vertex indices in the old numbering.
-        vertex_order: (n,) permutation, as `spatial_order` returns it: entry i is the old index of the
-            vertex that comes i-th.
+        vertex_order: (n,) permutation, such as `spatial_order` returns: entry i is the old index of the i-th
+            vertex.
     Returns: int32 (m,), a permutation of the rows of `tets`, by their lowest new vertex, then the next.
-        The rows themselves stay in old numbers: `renumbered(vertex_order)[tets[order]]` is the new array.
-    Raises: MeshError if a tetrahedron names a vertex that is not there.
+        The rows themselves keep the old numbers: `renumbered(vertex_order)[tets[order]]` is the new array.
+    Raises: MeshError if a tetrahedron names a vertex that does not exist.
     """
     new_index = renumbered(vertex_order)
     rows = as_indices(tets, "tets", 4, len(new_index), "tetrahedron")
@@ -58,11 +58,11 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
 
 
 def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
-    """For each edge the end that shall own it, so that most vertices own a multiple of `group` edges.
+    """Choose which end owns each edge, so that most vertices own a multiple of `group` edges.
 
-    Greedy: first every vertex takes as many whole groups as its edges allow, then the one with most edges
-    left takes them all, again and again; then groups that others have room for are handed over. Groups come
-    out much fuller than if the lower number owned every edge.
+    Greedy: every vertex first takes as many full groups as its edges allow. Then the vertex with most unowned
+    edges takes them all, repeatedly. Finally, partly full groups move to vertices with free places. Groups
+    are much fuller than if the lower number owned every edge.
     Args:
         edges: (k, 2) vertex indices.
     Returns: int32 (k,).
@@ -72,7 +72,7 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     for number, pair in enumerate(ends):
         for vertex in pair:
             incident[vertex].append(number)
-    left = [len(numbers) for numbers in incident]
+    unowned = [len(numbers) for numbers in incident]
     owner = [-1] * len(ends)
 
     def take(vertex: int, count: int) -> None:
@@ -81,24 +81,26 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
                 owner[number] = vertex
                 count -= 1
                 for end in ends[number]:
-                    left[end] -= 1
+                    unowned[end] -= 1
 
     for vertex in range(vertex_count):
-        take(vertex, left[vertex] // group * group)
-    waiting = [(-count, vertex) for vertex, count in enumerate(left) if count > 0]
+        take(vertex, unowned[vertex] // group * group)
+    waiting = [(-count, vertex) for vertex, count in enumerate(unowned) if count > 0]
     heapq.heapify(waiting)
     while waiting:
         count, vertex = heapq.heappop(waiting)
-        if left[vertex] == -count:
-            take(vertex, left[vertex])
-        elif left[vertex] > 0:
-            heapq.heappush(waiting, (-left[vertex], vertex))
-    _hand_over(ends, incident, owner, group)
+        if unowned[vertex] == -count:
+            take(vertex, unowned[vertex])
+        elif unowned[vertex] > 0:
+            heapq.heappush(waiting, (-unowned[vertex], vertex))
+    _move_partial_groups(ends, incident, owner, group)
     return np.array(owner, dtype=np.int32)
 
 
-def _hand_over(ends: list[list[int]], incident: list[list[int]], owner: list[int], group: int) -> None:
-    """Empty the groups that are least full into free places of their edges' other ends."""
+def _move_partial_groups(
+    ends: list[list[int]], incident: list[list[int]], owner: list[int], group: int
+) -> None:
+    """Move the edges of the least full groups into free places at their other ends."""
     counts = np.bincount(owner, minlength=len(incident)).tolist()
     for _ in range(4):
         before = list(owner)
@@ -123,7 +125,7 @@ def _hand_over(ends: list[list[int]], incident: list[list[int]], owner: list[int
 
 
 def renumbered(order: ArrayLike) -> IntArray:
-    """The inverse permutation: new index of each old one, int32 (n,)."""
+    """Inverse permutation: new index of each old one, int32 (n,)."""
     old_index = np.asarray(order)
     new_index: IntArray = np.empty(len(old_index), dtype=np.int32)
     new_index[old_index] = np.arange(len(old_index), dtype=np.int32)

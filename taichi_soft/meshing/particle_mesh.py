@@ -23,19 +23,19 @@ from taichi_soft.meshing.body_mesh import BodyMesh
 
 @serialised("vertices", "edges", "masses", "surface")
 class ParticleMesh(BodyMesh):
-    """A body of particles and edges whose masses are given, not derived from a volume. Immutable.
+    """A body of particles and edges with given masses instead of a volume. Immutable.
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        edges: (k, 2) integer vertex indices, in any order and direction. They keep their order, in which
-            a `SpringMaterial` takes values per edge, and are stored with i < j.
-        masses: (n,) mass of each particle [kg], all positive; one number serves for all.
-        surface: (f, 3) triangles to draw, none by default. Triangles are seen from one side, so a sheet has
-            each twice.
+        edges: (k, 2) integer vertex indices, in any order and direction. They keep their order, in which a
+            `SpringMaterial` takes values per edge, and are stored with i < j.
+        masses: (n,) mass of each particle [kg], all positive; or one number for all.
+        surface: (f, 3) triangles to draw, none by default. Triangles are one-sided, so a sheet needs each of
+            its triangles twice.
 
     Raises: MeshError for wrong shapes or dtypes, numbers that are not finite, indices out of range, an edge
-        from a vertex to itself, an edge given twice or of zero length, a vertex of no edge, a mass that is
-        not positive, or no vertices or edges at all.
+        from a vertex to itself, an edge given twice or of zero length, a vertex without an edge, a mass that
+        is not positive, or no vertices or edges at all.
 
     The arrays are copied. `tets` is empty, (0, 4).
     """
@@ -58,17 +58,17 @@ class ParticleMesh(BodyMesh):
                 "remove one of them"
             )
         ends = points[pairs]
-        flat = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) <= 0
-        if flat.any():
-            row = int(np.argmax(flat))
+        is_zero = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) <= 0
+        if is_zero.any():
+            row = int(np.argmax(is_zero))
             raise MeshError(
-                f"edge {row} has zero length (vertices {name_vertices(pairs[row])} lie on the same spot): "
+                f"edge {row} has zero length (vertices {name_vertices(pairs[row])} coincide): "
                 "merge the two vertices or move them apart"
             )
-        alone = np.bincount(pairs.ravel(), minlength=len(points)) == 0
-        if alone.any():
+        isolated = np.bincount(pairs.ravel(), minlength=len(points)) == 0
+        if isolated.any():
             raise MeshError(
-                f"vertex {int(np.argmax(alone))} belongs to no edge: remove it, or join it to another"
+                f"vertex {int(np.argmax(isolated))} belongs to no edge: remove it, or connect it to another"
             )
         super().__init__(points, pairs, np.zeros((0, 4), dtype=np.int32))
         mass = masses if hasattr(masses, "__len__") else np.full(len(points), masses)
@@ -82,7 +82,7 @@ class ParticleMesh(BodyMesh):
         self.__dict__.update(masses=read_only(kilograms), surface=read_only(triangles))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Copying and unpickling rebuild the mesh, so that its arrays are locked again.
+        # Copying and unpickling rebuild the mesh, so that its arrays are read-only again.
         return (_rebuilt, (self.vertices, self.edges, self.masses, self.surface))
 
     def _with_vertices(self, vertices: FloatArray) -> ParticleMesh:

@@ -16,7 +16,7 @@ from taichi_soft.meshing.corners import Attribute, require_vertices, split
 from taichi_soft.meshing.surface import Surface, surface_of, vertex_normals
 from taichi_soft.meshing.text import decoded, numbers
 from taichi_soft.meshing.triangulation import triangulated
-from taichi_soft.meshing.visuals import Look, find_beside, read_picture, visual_of
+from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image, visual_of
 
 Ints = NDArray[np.int64]
 
@@ -29,15 +29,15 @@ TYPES = {
 }
 
 COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
-PLACES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("s0", "t0"))
-"""Names that programs give to texture coordinates."""
+TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("s0", "t0"))
+"""Names of texture coordinates in files of various programs."""
 
 
 @dataclass
 class _Property:
     name: str
-    kind: str  # of its numbers, as NumPy has it
-    count_kind: str = ""  # of a list: that of its length
+    kind: str  # NumPy's type of its numbers
+    count_kind: str = ""  # NumPy's type of a list's length; empty for a single number
 
 
 @dataclass
@@ -49,7 +49,7 @@ class _Element:
 
 @dataclass(frozen=True, eq=False)
 class _List:
-    """A list of each row: their numbers in turn, and how many each has."""
+    """A list in each row: the numbers of all lists in sequence, and the length of each list."""
 
     values: FloatArray
     counts: Ints
@@ -59,23 +59,23 @@ Columns = dict[str, Any]  # by name: (n,) or a _List
 
 
 def read_ply(path: Path) -> list[Surface]:
-    """The surface of a .ply file, in its own axes and units.
+    """Read the surface of a .ply file, in its own axes and units.
 
-    Raises: MeshError for a file that is cut short, or of another kind, and for numbers that are none.
+    Raises: MeshError if the file is cut short, of another kind, or has invalid numbers.
     """
     data = path.read_bytes()
     order, elements, textures, body = _header(data)
     read: dict[str, Columns] = {}
-    rest = _Text(body) if order == "" else _Binary(body, order)
+    reader = _Text(body) if order == "" else _Binary(body, order)
     for element in elements:
-        read[element.name] = rest.read(element)
+        read[element.name] = reader.read(element)
         if "vertex" in read and ("face" in read or "tristrips" in read):
-            break  # what is behind belongs to no triangle
+            break  # later elements belong to no triangle
     vertices, faces = read.get("vertex", {}), read.get("face", {})
     corners = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)
     strips = read.get("tristrips", {}).get("vertex_indices")
     if corners is None and isinstance(strips, _List):
-        corners, faces = _unwound(strips), {}
+        corners, faces = _strip_triangles(strips), {}
     if not isinstance(corners, _List) or len(corners.values) == 0:
         return []
     if not all(axis in vertices for axis in "xyz"):
@@ -89,48 +89,57 @@ def _surface(
     name: str, vertices: Columns, faces: Columns, corners: _List, look: Look | None, notes: tuple[str, ...]
 ) -> Surface:
     points = as_points(np.stack([vertices[axis] for axis in "xyz"], axis=1))
-    at = corners.values.astype(np.int64)
-    require_vertices(at, corners.counts, len(points))
-    triangles, face = triangulated(points[at], corners.counts)
+    vertex = corners.values.astype(np.int64)
+    require_vertices(vertex, corners.counts, len(points))
+    triangles, face = triangulated(points[vertex], corners.counts)
     attributes = []
-    uv, colors = _table(vertices, PLACES), _colors(vertices)
-    places, shades = faces.get("texcoord"), _colors(faces) if colors is None else None
-    has_places = False
-    if isinstance(places, _List) and np.array_equal(places.counts, 2 * corners.counts):
-        has_places = True
-        attributes.append(Attribute(places.values.reshape(-1, 2).astype(np.float64), triangles))
-    if shades is not None:
-        attributes.append(Attribute(shades, np.repeat(face[:, None], 3, axis=1)))
-    made = split(len(points), at[triangles], tuple(attributes), keep=True)
+    uv, colors = _table(vertices, TEXCOORDS), _colors(vertices)
+    texcoords, face_colors = faces.get("texcoord"), _colors(faces) if colors is None else None
+    has_texcoords = False
+    if isinstance(texcoords, _List) and np.array_equal(texcoords.counts, 2 * corners.counts):
+        has_texcoords = True
+        attributes.append(Attribute(texcoords.values.reshape(-1, 2).astype(np.float64), triangles))
+    if face_colors is not None:
+        attributes.append(Attribute(face_colors, np.repeat(face[:, None], 3, axis=1)))
+    result = split(len(points), vertex[triangles], tuple(attributes), keep=True)
     normals = _table(vertices, (("nx", "ny", "nz"),))
     if normals is None:
-        normals = vertex_normals(points, at[triangles])
-    uv = made.attributes[0] if has_places else None if uv is None else uv[made.vertex]
-    if shades is not None:
-        colors = np.nan_to_num(made.attributes[-1], nan=1.0)
+        normals = vertex_normals(points, vertex[triangles])
+    uv = result.attributes[0] if has_texcoords else None if uv is None else uv[result.vertex]
+    if face_colors is not None:
+        colors = np.nan_to_num(result.attributes[-1], nan=1.0)
     elif colors is not None:
-        colors = colors[made.vertex]
+        colors = colors[result.vertex]
     visual = visual_of(uv=uv, colors=colors, look=look)
     return surface_of(
-        name, points[made.vertex], made.triangles, normals=normals[made.vertex], visual=visual, notes=notes
+        name,
+        points[result.vertex],
+        result.triangles,
+        normals=normals[result.vertex],
+        visual=visual,
+        notes=notes,
     )
 
 
-def _unwound(strips: _List) -> _List:
-    """Triangles of strips: each vertex makes one with the two before it, of which every other one is turned
-    round. -1 ends a strip."""
+def _strip_triangles(strips: _List) -> _List:
+    """Triangles of strips. Each vertex makes one with the two before it, and every second one is reversed.
+
+    -1 ends a strip.
+    """
     ends = np.cumsum(strips.counts)
     values = np.insert(strips.values.astype(np.int64), ends[:-1], -1)
-    three = (
+    triangles = (
         np.stack([values[:-2], values[1:-1], values[2:]], axis=1)
         if len(values) > 2
         else np.zeros((0, 3), int)
     )
-    at = np.arange(len(values))
-    start = np.maximum.accumulate(np.where(values == -1, at + 1, 0))
-    is_odd = (at - start)[: len(three)] % 2 == 1
-    three[is_odd] = three[is_odd][:, [1, 0, 2]]
-    kept = three[(three >= 0).all(axis=1) & (np.diff(np.sort(three, axis=1), axis=1) > 0).all(axis=1)]
+    position = np.arange(len(values))
+    start = np.maximum.accumulate(np.where(values == -1, position + 1, 0))
+    is_odd = (position - start)[: len(triangles)] % 2 == 1
+    triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
+    kept = triangles[
+        (triangles >= 0).all(axis=1) & (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)
+    ]
     return _List(kept.ravel().astype(np.float64), np.full(len(kept), 3))
 
 
@@ -142,7 +151,7 @@ def _table(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> FloatArray
 
 
 def _colors(columns: Columns) -> FloatArray | None:
-    """From 0 to 1: whole numbers go up to the greatest of their kind."""
+    """Colours from 0 to 1: integers are divided by the largest value of their type."""
     for names in COLORS:
         if all(isinstance(columns.get(name), np.ndarray) for name in names):
             kind = columns[names[0]].dtype
@@ -156,21 +165,21 @@ def _colors(columns: Columns) -> FloatArray | None:
 def _look(path: Path, textures: list[str], notes: list[str]) -> Look | None:
     if not textures:
         return None
-    file = find_beside(path, textures[0])
+    file = find_referenced_file(path, textures[0])
     if file is None:
         notes.append(f"the texture {textures[0]} is not read: there is no such file beside it")
         return None
     if len(textures) > 1:
-        notes.append(f"of its {len(textures)} textures the first one lies on all of it")
+        notes.append(f"it has {len(textures)} textures: the first one covers all of it")
     try:
-        return Look("", None, read_picture(textures[0], file.read_bytes()))
+        return Look("", None, read_image(textures[0], file.read_bytes()))
     except (MeshError, OSError) as error:
         notes.append(str(error))
         return None
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
-    """Byte order ("" for text), elements, files of textures, and what is behind."""
+    """Byte order ("" for text), elements, texture files, and the data after the header."""
     start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
     end = (
         re.search(start[1] + rb"end_header[ \t]*" + (b"\r" if start[1] == b"\r" else b"\r?\n"), data)
@@ -178,7 +187,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
         else None
     )
     if start is None or end is None:
-        raise MeshError("it does not begin as a .ply file does: download or export it anew")
+        raise MeshError("it does not begin like a .ply file: download or export it again")
     order, elements, textures = None, list[_Element](), list[str]()
     for line in data[start.end() : end.start()].split(start[1]):
         words = line.split()
@@ -190,10 +199,10 @@ def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
             elements.append(_Element(decoded(words[1]), int(words[2])))
         elif words[:1] == [b"property"]:
             if not elements:
-                raise MeshError("a property stands before its element: the header is damaged")
+                raise MeshError("a property precedes its element: the header is damaged")
             elements[-1].properties.append(_property(words))
     if order is None:
-        raise MeshError(f"its format is none of {', '.join(map(decoded, ORDERS))}")
+        raise MeshError(f"its format is not one of {', '.join(map(decoded, ORDERS))}")
     return order, elements, textures, data[end.end() :]
 
 
@@ -201,12 +210,12 @@ def _property(words: list[bytes]) -> _Property:
     kinds = [TYPES.get(word.lower(), "") for word in words[1:-1] if word != b"list"]
     is_list = words[1:2] == [b"list"]
     if len(kinds) != 1 + is_list or not all(kinds):
-        raise MeshError(f"the header is damaged: '{decoded(b' '.join(words))[:60]}' is no property")
+        raise MeshError(f"the header is damaged: '{decoded(b' '.join(words))[:60]}' is not a property")
     return _Property(decoded(words[-1]), kinds[-1], kinds[0] if is_list else "")
 
 
 class _Text:
-    """Numbers of a text, element after element."""
+    """Numbers of a text file, element by element."""
 
     def __init__(self, body: bytes) -> None:
         self._values = numbers([[word] for word in body.split()], 1, "number")[:, 0]
@@ -239,7 +248,7 @@ class _Text:
 
 
 class _Binary:
-    """Numbers of bytes, element after element."""
+    """Numbers of a binary file, element by element."""
 
     def __init__(self, body: bytes, order: str) -> None:
         self._body, self._order, self._at = body, order, 0
@@ -278,7 +287,7 @@ class _Binary:
         return _gathered(element, found)
 
     def _first_lengths(self, element: _Element) -> list[int]:
-        """Of the lists of the first row."""
+        """Lengths of the lists in the first row."""
         start, lengths = self._at, []
         for each in element.properties:
             count = 1
@@ -310,4 +319,6 @@ def _gathered(element: _Element, found: dict[str, list[Any]]) -> Columns:
 
 
 def _cut_short() -> MeshError:
-    return MeshError("it is cut short: it has fewer numbers than its header says. Download or export it anew")
+    return MeshError(
+        "it is cut short: it has fewer numbers than its header says. Download or export it again"
+    )

@@ -1,4 +1,4 @@
-"""Shapes swept from a flat triangulation: layers of prisms, three tetrahedra in each."""
+"""Shapes swept from a flat triangulation, in layers of prisms of three tetrahedra each."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from taichi_soft.meshing.tet_mesh import TetMesh
 
 
 def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: float = 1.0) -> TetMesh:
-    """A flat triangulation drawn out along z, from -height/2 to height/2.
+    """Extrude a flat triangulation along z, from -height/2 to height/2.
 
     Args:
         points: (n, 2) points in the plane [m]; their bounding box is moved to the origin.
-        triangles: (t, 3) vertex indices, wound either way.
+        triangles: (t, 3) vertex indices, in either orientation.
         layers: number of layers of prisms.
         height: total height [m].
-    Raises: MeshError for arrays that do not make a mesh; OptionError for a count below 1 or a height that
-        is not positive.
+    Raises: MeshError if the arrays do not make a mesh; OptionError for a count below 1 or a height that is
+        not positive.
     """
     flat = as_points(points, "points", 2)
     corners = as_indices(triangles, "triangles", 3, len(flat), "triangle")
@@ -33,14 +33,14 @@ def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: fl
 
 
 def cylinder(radius: float = 0.5, height: float = 1.0, rings: int = 3, layers: int = 4) -> TetMesh:
-    """A cylinder about the origin with its axis along z.
+    """Make a cylinder along z, centred at the origin.
 
     Args:
-        radius: of the circle that the outer vertices lie on [m].
-        height: along z [m].
-        rings: concentric rings of 6, 12, 18, ... points round the axis, evenly spaced.
-        layers: number of layers; height / layers near radius / rings gives the best shape, with a smallest
-            dihedral angle of 35 to 41 degrees.
+        radius: radius of the circle through the outer vertices [m].
+        height: height along z [m].
+        rings: number of concentric rings of 6, 12, 18, ... points around the axis, evenly spaced.
+        layers: number of layers. Tetrahedra have the best shape if height / layers is close to radius /
+            rings, with a smallest dihedral angle of 35 to 41 degrees.
     Raises: OptionError for sizes that are not positive or counts below 1.
     """
     rings, layers = as_count(rings, "rings"), as_count(layers, "layers")
@@ -52,15 +52,17 @@ def cylinder(radius: float = 0.5, height: float = 1.0, rings: int = 3, layers: i
 def torus(
     major_radius: float = 1.0, minor_radius: float = 0.3, rings: int = 2, segments: int = 40
 ) -> TetMesh:
-    """A ring about the origin whose axis of symmetry is z.
+    """Make a torus around the z axis, centred at the origin.
 
     Args:
-        major_radius: of the circle in the plane z = 0 along which the tube runs [m].
-        minor_radius: of the tube [m], less than `major_radius`.
-        rings: concentric rings of points in the tube's cross-section, as in `cylinder`.
-        segments: pieces round the axis, 3 or more; 2 pi major_radius / segments near minor_radius / rings
-            gives the best shape, with a smallest dihedral angle of 31 degrees at the default proportions.
-    Raises: OptionError for sizes that are not positive, a tube too thick for its ring, or counts too low.
+        major_radius: radius of the circle in the plane z = 0 that the tube follows [m].
+        minor_radius: radius of the tube [m], less than `major_radius`.
+        rings: number of concentric rings of points in the tube's cross-section, as in `cylinder`.
+        segments: number of segments around the axis, 3 or more. Tetrahedra have the best shape if
+            2 pi major_radius / segments is close to minor_radius / rings, with a smallest dihedral angle of
+            31 degrees at the default proportions.
+    Raises: OptionError for sizes that are not positive, a minor radius that is not below the major one, or
+        counts too low.
     """
     major = as_positive(major_radius, "major_radius", "m")
     minor = as_positive(minor_radius, "minor_radius", "m")
@@ -76,7 +78,7 @@ def torus(
 
 
 def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
-    """The unit disc as a point and rings of 6k points, and the 6 * rings**2 triangles between them."""
+    """The unit disc: a centre and rings of 6 k points, and the 6 * rings**2 triangles between them."""
     angles = [np.arange(6 * k) * (np.pi / (3 * k)) for k in range(1, rings + 1)]
     points = [np.zeros((1, 2))]
     points += [np.column_stack([np.cos(a), np.sin(a)]) * (k + 1) / rings for k, a in enumerate(angles)]
@@ -84,7 +86,7 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
     for k in range(1, rings + 1):
         outer, inner = 3 * k * (k - 1) + 1, 3 * (k - 1) * (k - 2) + 1
         for sector in range(6):
-            # Ring k has k steps in each sixth, the ring inside it k - 1.
+            # In each sixth of the circle, ring k has k steps and the ring inside it k - 1.
             outside = outer + (sector * k + np.arange(k + 1)) % (6 * k)
             inside = inner + (sector * (k - 1) + np.arange(k)) % (6 * (k - 1)) if k > 1 else np.zeros(1, int)
             triangles.append(np.column_stack([outside[:-1], outside[1:], inside]))
@@ -93,10 +95,10 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 def _prism_tets(triangles: NDArray[np.integer], stride: int, layers: int, levels: int) -> NDArray[np.int64]:
-    """Three tetrahedra for every prism between level and next level (after the last comes the first).
+    """Three tetrahedra for every prism between a level and the next (the first level may follow the last).
 
     Vertex i of the triangulation is vertex i + level * stride. In each side face of a prism the diagonal
-    starts at the lower of the two numbers below, which both neighbours see alike, so the faces meet.
+    starts at the lower of the two vertex numbers below. Neighbours choose the same one, so their faces match.
     """
     a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
     level = np.arange(layers)[:, None] * stride

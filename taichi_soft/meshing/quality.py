@@ -1,4 +1,4 @@
-"""How well shaped the tetrahedra of a mesh are. Small angles make a simulation stiff and fragile."""
+"""Shape quality of the tetrahedra of a mesh. Small angles make a simulation stiff and fragile."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
 
-# A tetrahedron flatter than this (volume over longest edge cubed; 0.118 if regular) has lost its shape in
-# float32, in which it will be simulated (rounding 1.2e-7).
+# Volume over the cube of the longest edge (0.118 if regular) below which a tetrahedron degenerates in
+# float32, the precision of the simulation (rounding 1.2e-7).
 FLATTEST = 1e-7
 
 
@@ -20,7 +20,7 @@ class MeshQuality:
 
     Attributes:
         min_dihedral: float64 (m,), smallest of the six angles between faces [degrees]; 70.53 if regular.
-        max_dihedral: float64 (m,), largest of them [degrees].
+        max_dihedral: float64 (m,), largest of these angles [degrees].
         aspect_ratio: float64 (m,), 3 * inradius / circumradius; 1 if regular, towards 0 as it flattens.
         shortest_edge: shortest edge of the mesh [m].
         longest_edge: longest edge of the mesh [m].
@@ -33,7 +33,7 @@ class MeshQuality:
     longest_edge: float
 
     def summary(self) -> str:
-        """One line with the worst values, for logs and reports."""
+        """Summarise the worst values in one line, for logs and reports."""
         return (
             f"dihedral angles {self.min_dihedral.min():.1f} to {self.max_dihedral.max():.1f} deg, "
             f"aspect ratio {self.aspect_ratio.min():.3f} to {self.aspect_ratio.max():.3f}, "
@@ -42,7 +42,7 @@ class MeshQuality:
 
 
 def measure_quality(vertices: FloatArray, tets: IntArray) -> MeshQuality:
-    """Measure the tetrahedra `tets` (m, 4) of positive volume over `vertices` (n, 3) [m]."""
+    """Measure the tetrahedra `tets` (m, 4), which must have positive volume, over `vertices` (n, 3) [m]."""
     corners = vertices[tets]
     a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0

@@ -1,4 +1,4 @@
-"""What lies round each edge of a tetrahedral mesh: the tetrahedra that share it and their other vertices."""
+"""Rings of edges in a tetrahedral mesh: the tetrahedra that share an edge, and their other vertices."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from taichi_soft.meshing.topology import LOCAL_EDGES
 Ints = NDArray[np.int64]
 
 OPPOSITE = np.array([(2, 3), (3, 1), (1, 2), (0, 3), (2, 0), (0, 1)])
-"""The other two vertices of each of `LOCAL_EDGES`, counterclockwise when the edge points at the eye."""
+"""The other two vertices of each of `LOCAL_EDGES`, counterclockwise when the edge points at the viewer."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeRings:
-    """The tetrahedra round every edge, edge by edge.
+    """The tetrahedra around every edge, edge by edge.
 
     Attributes:
-        mesh: whose edges these are.
+        mesh: the mesh.
         edge: (r,) row of `mesh.edges`, ascending.
-        tet: (r,) the tetrahedron.
-        sides: (r, 2) its vertices off the edge, counterclockwise seen against the edge's direction i -> j.
+        tet: (r,) tetrahedron that contains the edge.
+        sides: (r, 2) its other two vertices, counterclockwise seen against the edge's direction i -> j.
     """
 
     mesh: TetMesh
@@ -36,7 +36,7 @@ class EdgeRings:
 
     @classmethod
     def of(cls, mesh: TetMesh) -> EdgeRings:
-        """The rings of a mesh."""
+        """Find the rings of a mesh."""
         ends, sides = mesh.tets[:, LOCAL_EDGES], mesh.tets[:, OPPOSITE]
         turned = ends[..., 0] > ends[..., 1]  # against the direction in which the edge is stored
         sides[turned] = sides[turned][:, ::-1]
@@ -67,23 +67,23 @@ class EdgeRings:
 
     @cached_property
     def edge_areas(self) -> FloatArray:
-        """Area of all subfaces of each edge, (k,) [m^2]."""
+        """Total area of the subfaces of each edge, (k,) [m^2]."""
         return self.sum(self.areas)
 
     def sum(self, rows: FloatArray) -> FloatArray:
-        """Sum of values per row, (r,) or (r, c), over each edge."""
+        """Sum values per row, (r,) or (r, c), over each edge."""
         start = np.searchsorted(self.edge, np.arange(len(self.mesh.edges)))
         return np.asarray(np.add.reduceat(rows, start, axis=0))
 
     def mean(self, per_tet: FloatArray) -> FloatArray:
-        """Mean of values per tetrahedron (m,) over each edge, weighed by the areas of its subfaces, (k,)."""
+        """Mean of values per tetrahedron (m,) around each edge, weighted by subface area, (k,)."""
         return self.sum(self.areas * per_tet[self.tet]) / self.edge_areas
 
     @cached_property
     def neighbours(self) -> tuple[Ints, Ints]:
-        """Vertices round each edge, each once: rows of edges (s,) ascending, and vertices (s,).
+        """Vertices around each edge, each once: rows of edges (s,) ascending, and vertices (s,).
 
-        Those of an edge follow each other counterclockwise seen against its direction (thesis 4.4.3).
+        The vertices of an edge run counterclockwise, seen against its direction (thesis 4.4.3).
         """
         pairs = np.unique(np.stack([np.repeat(self.edge, 2), self.sides.ravel()], axis=1), axis=0)
         edge, vertex = pairs.T
@@ -97,6 +97,6 @@ class EdgeRings:
         angle = np.arctan2(
             np.einsum("ka,ka->k", np.cross(axis, first), arm), np.einsum("ka,ka->k", first, arm)
         )
-        # Rounded, so that the first of an edge comes first: round-off may turn it to just below a full turn.
+        # Rounded, because round-off may turn the first vertex of an edge to just below a full turn.
         order = np.lexsort((np.round(angle, 9) % (2 * np.pi), edge))
         return edge[order], vertex[order]

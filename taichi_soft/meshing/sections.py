@@ -1,4 +1,4 @@
-"""Sections: the areas in which a plane cuts tetrahedra."""
+"""Areas of plane sections of tetrahedra."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from taichi_soft.meshing.arrays import FloatArray
 def section_areas(heights: FloatArray, volumes: FloatArray) -> FloatArray:
     """Areas of the sections of tetrahedra with the plane at height 0, (m,) [m^2].
 
-    Over the height the area of a tetrahedron's sections is its volume times the quadratic B-spline whose
-    knots are the heights of its corners and whose integral is 1 (Curry and Schoenberg 1966). A face that lies
-    in the plane belongs to the tetrahedron above it, so that a face between two is counted once.
+    As a function of height, the area of a tetrahedron's section is its volume times the quadratic B-spline
+    whose knots are the heights of its corners and whose integral is 1 (Curry and Schoenberg 1966). A face in
+    the plane belongs to the tetrahedron above it, so that a shared face is counted once.
     Args:
-        heights: of the corners over the plane, (m, 4) [m].
+        heights: heights of the corners above the plane, (m, 4) [m].
         volumes: (m,) [m^3], 0 or more.
     """
     knots = np.sort(heights, axis=1)
     spline = ((knots[:, :-1] <= 0) & (knots[:, 1:] > 0)).astype(np.float64)
     for degree in (1, 2):
         spans = knots[:, degree:] - knots[:, :-degree]
-        rising = _over(-knots[:, : -degree - 1], spans[:, :-1]) * spline[:, :-1]
-        falling = _over(knots[:, degree + 1 :], spans[:, 1:]) * spline[:, 1:]
+        rising = _divide(-knots[:, : -degree - 1], spans[:, :-1]) * spline[:, :-1]
+        falling = _divide(knots[:, degree + 1 :], spans[:, 1:]) * spline[:, 1:]
         spline = rising + falling
-    return np.asarray(3.0 * _over(volumes, knots[:, 3] - knots[:, 0]) * spline[:, 0])
+    return np.asarray(3.0 * _divide(volumes, knots[:, 3] - knots[:, 0]) * spline[:, 0])
 
 
-def _over(part: FloatArray, whole: FloatArray) -> NDArray[np.float64]:
-    """part / whole, 0 where that has no length."""
-    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+def _divide(numerator: FloatArray, denominator: FloatArray) -> NDArray[np.float64]:
+    """numerator / denominator, 0 where the denominator is 0."""
+    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)

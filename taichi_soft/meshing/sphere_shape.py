@@ -1,4 +1,4 @@
-"""A solid sphere of nearly equal tetrahedra, grown from an icosahedron."""
+"""A solid sphere of nearly equal tetrahedra, subdivided from an icosahedron."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 UNIT: NDArray[np.int64] = np.eye(4, dtype=np.int64)
-# The middle octahedron of a cut tetrahedron: its corners are the sums of two of the four directions.
-# Opposite corners use disjoint pairs; each of the three diagonals cuts it into four tetrahedra round itself.
+# The octahedron in the middle of a divided tetrahedron: its corners are the sums of two of the four
+# directions. Opposite corners use disjoint pairs; each of the three diagonals divides it into four tetrahedra
+# around itself.
 PAIRS = list(combinations(range(4), 2))
 OCTAHEDRON: NDArray[np.int64] = np.array([UNIT[i] + UNIT[j] for i, j in PAIRS])
 DIAGONALS = ((0, 5, (1, 2, 4, 3)), (1, 4, (0, 2, 5, 3)), (2, 3, (0, 1, 5, 4)))
 
 
 def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
-    """A ball about the origin.
+    """Make a ball centred at the origin.
 
-    Twenty tetrahedra from the centre to the faces of an icosahedron, each cut into resolution**3, the
-    shells between them moved out onto spheres.
+    Twenty tetrahedra run from the centre to the faces of an icosahedron. Each is divided into resolution**3,
+    and the layers between are projected onto spheres.
 
     Args:
-        radius: of the sphere that the outer vertices lie on [m]; the volume comes up to the ball's from
-            below with the square of the resolution.
-        resolution: pieces along each edge; 20 * resolution**3 tetrahedra. The smallest dihedral angle is
-            44 degrees at the default resolution and falls slowly, to 39.8 at 10.
+        radius: radius of the sphere through the outer vertices [m]. The volume is smaller than the ball's, by
+            an error that falls with the square of the resolution.
+        resolution: divisions of each edge; there are 20 * resolution**3 tetrahedra. The smallest dihedral
+            angle is 44 degrees at the default resolution and falls slowly, to 39.8 at 10.
     Raises: OptionError for a radius that is not positive or a resolution below 1.
     Example:
         apple = sphere(radius=0.04, resolution=3)
@@ -43,14 +44,14 @@ def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
     positions = np.concatenate([_shells(corners[face], lattice) for face in faces])
     offsets = (np.arange(len(faces)) * len(lattice))[:, None, None]
 
-    # The sectors share the points between them: bring equal ones together, far finer than any edge.
+    # The sectors share the points between them: merge equal points, with a tolerance far below any edge.
     rounded = np.round(positions * (1000 * resolution)).astype(np.int64)
     _, kept, merged = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     merged = merged.reshape(-1)
     vertices = positions[kept]
-    whole = merged[(cells + offsets).reshape(-1, 4)]
+    tetrahedra = merged[(cells + offsets).reshape(-1, 4)]
     split = _split(vertices, merged[(octahedra + offsets).reshape(-1, 6)])
-    return TetMesh(radius * vertices, np.concatenate([whole, split]), fix_orientation=True)
+    return TetMesh(radius * vertices, np.concatenate([tetrahedra, split]), fix_orientation=True)
 
 
 def _icosahedron() -> tuple[FloatArray, NDArray[np.int64]]:
@@ -58,32 +59,36 @@ def _icosahedron() -> tuple[FloatArray, NDArray[np.int64]]:
     golden = (1.0 + np.sqrt(5.0)) / 2.0
     signs = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
     corners = np.array([np.roll((0.0, s, t * golden), axis) for axis in range(3) for s, t in signs])
-    near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1  # edges are 2 long, the next distance 3.2
+    is_edge = (
+        np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1
+    )  # edges are 2 long, the next distance is 3.2
     faces = [
-        f for f in combinations(range(12), 3) if near[f[0], f[1]] and near[f[1], f[2]] and near[f[0], f[2]]
+        f
+        for f in combinations(range(12), 3)
+        if is_edge[f[0], f[1]] and is_edge[f[1], f[2]] and is_edge[f[0], f[2]]
     ]
     return corners / np.linalg.norm(corners[0]), np.array(faces)
 
 
 def _cut_tetrahedron(pieces: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Cut a tetrahedron into `pieces` along each edge.
+    """Divide a tetrahedron into `pieces` along each edge.
 
-    Returns: the points, four whole numbers each that add up to `pieces` (their distances from the faces);
-        the small tetrahedra (c, 4); the octahedra left between them (o, 6), corners in the order of PAIRS.
+    Returns: the points, as four integers each that add up to `pieces` (their distances from the faces); the
+        small tetrahedra (c, 4); the octahedra between them (o, 6), with corners in the order of PAIRS.
     """
     grid = np.indices((pieces + 1,) * 3).reshape(3, -1).T
     grid = grid[grid.sum(axis=1) <= pieces]
     lattice = np.column_stack([grid, pieces - grid.sum(axis=1)])
-    number = np.full((pieces + 1,) * 3, -1)
-    number[tuple(grid.T)] = np.arange(len(grid))
+    index_at = np.full((pieces + 1,) * 3, -1)
+    index_at[tuple(grid.T)] = np.arange(len(grid))
 
     def place(shape: NDArray[np.int64]) -> NDArray[np.int64]:
-        """One copy of `shape` wherever it fits: its corners are a point of a smaller lattice plus a row."""
+        """One copy of `shape` wherever it fits: its corners are points of a smaller lattice plus its rows."""
         size = pieces - int(shape[0].sum())
         low = np.indices((max(size, 0) + 1,) * 3).reshape(3, -1).T
         low = low[low.sum(axis=1) <= size]
         corners = low[:, None, :] + shape[:, :3]
-        placed: NDArray[np.int64] = number[tuple(np.moveaxis(corners, 2, 0))]
+        placed: NDArray[np.int64] = index_at[tuple(np.moveaxis(corners, 2, 0))]
         return placed
 
     tetrahedra = np.concatenate([place(UNIT), place(1 - UNIT)])
@@ -91,12 +96,12 @@ def _cut_tetrahedron(pieces: int) -> tuple[NDArray[np.int64], NDArray[np.int64],
 
 
 def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
-    """Put lattice points between the centre (weight 3) and a face (3, 3) of the unit sphere."""
+    """Place lattice points between the centre (weight 3) and a face (3, 3) of the unit sphere."""
     step = lattice[:, :3].sum(axis=1)
     angle = np.arccos(face[0] @ face[1])
-    # Sines of the parts of the angle, as along a great circle: even spacing, the same from both sides.
+    # Sines of fractions of the angle, as along a great circle: even spacing, the same from both sides.
     weights = np.sin(lattice[:, :3] / np.maximum(step, 1)[:, None] * angle)
-    direction = (weights[:, :, None] * face).sum(axis=1)  # in one order everywhere
+    direction = (weights[:, :, None] * face).sum(axis=1)  # in a fixed order on every machine
     length = np.linalg.norm(direction, axis=1)
     radius = step / lattice.sum(axis=1)
     points: FloatArray = direction * (radius / np.where(length > 0, length, 1.0))[:, None]
@@ -104,11 +109,11 @@ def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
 
 
 def _split(vertices: FloatArray, octahedra: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Four tetrahedra from each octahedron (o, 6), round its shortest diagonal."""
+    """Divide each octahedron (o, 6) into four tetrahedra around its shortest diagonal."""
     if len(octahedra) == 0:
         return np.zeros((0, 4), dtype=np.int64)
     ends = vertices[octahedra[:, [d[:2] for d in DIAGONALS]]]
-    # Rounded, so that equal diagonals compare equal and the first of them is taken on every machine.
+    # Rounded, so that every machine finds equal diagonals equal and takes the first.
     shortest = np.round(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2), 9).argmin(axis=1)
     rounds = [[(a, b, r, ring[(i + 1) % 4]) for i, r in enumerate(ring)] for a, b, ring in DIAGONALS]
     pieces = np.array(rounds)[shortest].reshape(len(octahedra), 16)

@@ -1,4 +1,4 @@
-"""Tetrahedra taken apart along their faces, by giving vertices copies (thesis chapter 7)."""
+"""Separate tetrahedra along their faces by duplicating vertices (thesis chapter 7)."""
 
 from __future__ import annotations
 
@@ -16,15 +16,13 @@ _FACES = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
 class InnerFaces(NamedTuple):
     """Faces between two tetrahedra."""
 
-    tets: NDArray[np.int64]  # (f, 2) that share each, the lower number first
-    corners: NDArray[
-        np.int64
-    ]  # (f, 2, 3) its vertices as corners of either, the same vertex in the same place
+    tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each, the lower number first
+    corners: NDArray[np.int64]  # (f, 2, 3) its vertices as corners of each of the two, in the same order
 
 
 def inner_faces(tets: IntArray) -> InnerFaces:
     """All faces that two tetrahedra share."""
-    # With the corners of each tetrahedron in ascending order, those of its faces are too.
+    # If the corners of each tetrahedron are in ascending order, those of its faces are too.
     corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
     rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
     pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)
@@ -34,14 +32,14 @@ def inner_faces(tets: IntArray) -> InnerFaces:
 def split_vertices(
     tets: IntArray, vertex_count: int, faces: InnerFaces, is_cut: NDArray[np.bool_]
 ) -> tuple[IntArray, NDArray[np.int64]]:
-    """Let go of each other what hangs together through cut faces only.
+    """Separate tetrahedra that are connected only through cut faces.
 
-    The tetrahedra round a vertex of a cut face fall into groups that faces still join. The group with the
-    lowest tetrahedron keeps the vertex, each other one gets a copy of it.
+    Around a vertex of a cut face, the tetrahedra form groups that are connected by other faces. The group
+    with the lowest tetrahedron keeps the vertex; every other group gets a copy of it.
     Args:
-        is_cut: (f,), of each of `faces`.
-    Returns: the tetrahedra with their new vertices, and the vertex that each is a copy of, (n,): itself for
-        the old ones, which keep their numbers.
+        is_cut: (f,), True for each of `faces` that is cut.
+    Returns: the tetrahedra with their new vertices, and the vertex that each vertex is a copy of, (n,). Old
+        vertices keep their numbers and are copies of themselves.
     """
     if not is_cut.any():
         return tets, np.arange(vertex_count)
@@ -58,21 +56,21 @@ def split_vertices(
     ]
     group = connected(len(loose), *links[:, links[0] >= 0])
 
-    owners, first = flat[loose], np.unique(group)  # a group is called by its lowest corner
+    owners, first = flat[loose], np.unique(group)  # a group is identified by its lowest corner
     by_vertex = first[np.lexsort((first, owners[first]))]
     is_copy = owners[by_vertex] == np.r_[-1, owners[by_vertex[:-1]]]
-    name = np.zeros(len(loose), dtype=np.int64)
-    name[by_vertex] = owners[by_vertex]
-    name[by_vertex[is_copy]] = vertex_count + np.arange(is_copy.sum())
+    new_index = np.zeros(len(loose), dtype=np.int64)
+    new_index[by_vertex] = owners[by_vertex]
+    new_index[by_vertex[is_copy]] = vertex_count + np.arange(is_copy.sum())
     split = flat.astype(np.int32)
-    split[loose] = name[group]
+    split[loose] = new_index[group]
     return split.reshape(-1, 4), np.r_[np.arange(vertex_count), owners[by_vertex[is_copy]]]
 
 
 def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
-    """Which part each tetrahedron belongs to, (m,), counted from 0 in the order of their first ones.
+    """Component of each tetrahedron, (m,), counted from 0 in the order of their first tetrahedra.
 
-    Parts have no vertex in common.
+    Components have no vertex in common.
     """
     label = connected(vertex_count, tets[:, :3].ravel(), tets[:, 1:].ravel())[tets[:, 0]]
     _, first, part = np.unique(label, return_index=True, return_inverse=True)
@@ -82,13 +80,13 @@ def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
 
 
 def connected(count: int, first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.int64]:
-    """The lowest number that links lead to from each of `count` numbers."""
+    """Lowest number connected to each of `count` numbers by the links (first, second)."""
     label = np.arange(count)
     while True:
         ends = label[first], label[second]
         low = np.minimum(*ends)
         before = label.copy()
-        for end in ends:  # not the number but what it is called by, so that ways shorten by half each time
+        for end in ends:  # labels, not numbers, so that paths halve in each pass
             np.minimum.at(label, end, low)
         label = label[label]
         if (label == before).all():

@@ -1,4 +1,4 @@
-"""STL: triangles with three vertices of their own. One surface for each solid of a text file."""
+"""STL files: triangles with their own three vertices each. A text file has one surface for each solid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taichi_soft.meshing.triangulation import triangulated
 from taichi_soft.meshing.visuals import visual_of
 
 HEADER = 84
-"""Bytes before the first triangle: a comment of 80, and how many triangles there are."""
+"""Bytes before the first triangle: a comment of 80 bytes and the number of triangles."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
 
@@ -23,9 +23,9 @@ VERTEX = rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)"
 
 
 def read_stl(path: Path) -> list[Surface]:
-    """Surfaces of a .stl file, in its own axes and units. Normals are those of the triangles.
+    """Read the surfaces of a .stl file, in its own axes and units. Normals are those of the triangles.
 
-    Raises: MeshError for a file that is cut short, and for numbers that are none.
+    Raises: MeshError if the file is cut short or has invalid numbers.
     """
     data = path.read_bytes()
     if len(data) >= HEADER and len(data) == HEADER + TRIANGLE.itemsize * _count(data):
@@ -43,9 +43,9 @@ def _count(data: bytes) -> int:
 
 
 def _binary(data: bytes, name: str) -> list[Surface]:
-    there = (len(data) - HEADER) // TRIANGLE.itemsize
-    if there < _count(data):
-        raise MeshError(f"it is cut short: it is to have {_count(data):,} triangles, and has {there:,}")
+    available = (len(data) - HEADER) // TRIANGLE.itemsize
+    if available < _count(data):
+        raise MeshError(f"it is cut short: it declares {_count(data):,} triangles and has {available:,}")
     rows = np.frombuffer(data, TRIANGLE, _count(data), HEADER)
     if len(rows) == 0:
         return []
@@ -56,22 +56,25 @@ def _binary(data: bytes, name: str) -> list[Surface]:
 
 
 def _colors(header: bytes, words: np.ndarray) -> FloatArray | None:  # type: ignore[type-arg]
-    """Of triangles, (m, 3) from 0 to 1, or None: 15 bits each, as VisCAM has them where bit 15 is set, or as
-    Materialise Magics has them where it is not, if the header names a colour for all."""
-    whole = header.find(b"COLOR=")
-    shades = np.stack([words >> 10 & 31, words >> 5 & 31, words & 31], axis=1) / 31.0
-    if whole >= 0 and whole + 10 <= len(header):
-        default = np.frombuffer(header[whole + 6 : whole + 9], np.uint8) / 255.0
-        return np.where((words >> 15 == 0)[:, None], shades[:, ::-1], default)
-    is_own = words >> 15 == 1
-    return np.where(is_own[:, None], shades, 1.0) if is_own.any() else None
+    """Colours of triangles, (m, 3) from 0 to 1, or None.
+
+    A colour has 15 bits. VisCAM marks colours by bit 15. Materialise Magics clears bit 15 for them, and names
+    a default colour in the header.
+    """
+    default_at = header.find(b"COLOR=")
+    colors = np.stack([words >> 10 & 31, words >> 5 & 31, words & 31], axis=1) / 31.0
+    if default_at >= 0 and default_at + 10 <= len(header):
+        default = np.frombuffer(header[default_at + 6 : default_at + 9], np.uint8) / 255.0
+        return np.where((words >> 15 == 0)[:, None], colors[:, ::-1], default)
+    has_color = words >> 15 == 1
+    return np.where(has_color[:, None], colors, 1.0) if has_color.any() else None
 
 
 def _text(text: bytes, name: str) -> list[Surface]:
     surfaces = []
     for solid in re.split(rb"^[ \t]*endsolid\b.*$", text, flags=re.MULTILINE | re.IGNORECASE):
         words = re.search(rb"^[ \t]*solid\b(.*)$", solid, flags=re.MULTILINE | re.IGNORECASE)
-        own = decoded(words[1].strip()) if words else ""
+        solid_name = decoded(words[1].strip()) if words else ""
         loops = re.split(rb"\bendloop\b", solid[words.end() if words else 0 :], flags=re.IGNORECASE)
         found = [re.findall(VERTEX, loop, re.IGNORECASE) for loop in loops]
         rows = [row for loop in found for row in loop]
@@ -81,5 +84,5 @@ def _text(text: bytes, name: str) -> list[Surface]:
         points = numbers(rows, 3, "vertex")
         triangles, _ = triangulated(points, counts)
         corners = points[triangles].reshape(-1, 3)
-        surfaces.append(surface_of(own or name, corners, np.arange(len(corners)).reshape(-1, 3)))
+        surfaces.append(surface_of(solid_name or name, corners, np.arange(len(corners)).reshape(-1, 3)))
     return surfaces

@@ -1,4 +1,4 @@
-"""A surface: triangles with what belongs to them, as a file or a program has them."""
+"""A triangle surface with its normals and appearance, read from a file or made by a program."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_poin
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """One mesh of a file, or what a program made."""
+    """One mesh of a file or of a program."""
 
     name: str
     vertices: FloatArray  # (n, 3) [m]
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
-    visual: Any = None  # trimesh's: texture coordinates, material, colours; None where there are none
-    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or left out
+    visual: Any = None  # trimesh's: texture coordinates, material, colours; None without any
+    notes: tuple[str, ...] = ()  # what the reader assumed, repaired or skipped, one sentence each
 
 
 def surface_of(
@@ -32,11 +32,11 @@ def surface_of(
     visual: Any = None,
     notes: tuple[str, ...] = (),
 ) -> Surface:
-    """A surface of checked copies.
+    """Make a surface from checked copies.
 
     Args:
-        normals: (n, 3), of any length; None, NaN and 0 take those of the triangles round each vertex.
-    Raises: MeshError for vertices or triangles that are none.
+        normals: (n, 3), of any length. Where None, NaN or 0, the triangles around the vertex decide.
+    Raises: MeshError for invalid vertices or triangles.
     """
     points = as_points(vertices)
     corners = as_indices(triangles, "triangles", 3, len(points), "triangle", may_repeat=True)
@@ -54,7 +54,7 @@ def surface_of(
 
 
 def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Vertices (n, 3) [m] and triangles (m, 3) of all of them, as of one."""
+    """Concatenate surfaces: vertices (n, 3) [m] and triangles (m, 3)."""
     starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
     triangles = [
         each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)
@@ -63,18 +63,18 @@ def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]
 
 
 def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
-    """Means of the normals of the triangles round each vertex, weighted by their angles there, (n, 3)."""
+    """Means of the normals of the triangles around each vertex, weighted by their angles there, (n, 3)."""
     corners = points[triangles]
-    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    across = np.cross(ahead, back)  # along the normal, at each corner
+    to_next, to_previous = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    across = np.cross(to_next, to_previous)  # along the normal, at each corner
     size = np.linalg.norm(across, axis=2)
-    angles = np.where(size > 0.0, np.arctan2(size, np.einsum("tcx,tcx->tc", ahead, back)), 0.0)
-    weighed = (angles[:, :, None] * unit(across)).reshape(-1, 3)
-    sums = [np.bincount(triangles.ravel(), weighed[:, k], len(points)) for k in range(3)]
+    angles = np.where(size > 0.0, np.arctan2(size, np.einsum("tcx,tcx->tc", to_next, to_previous)), 0.0)
+    weighted = (angles[:, :, None] * unit(across)).reshape(-1, 3)
+    sums = [np.bincount(triangles.ravel(), weighted[:, k], len(points)) for k in range(3)]
     return unit(np.stack(sums, axis=1))
 
 
 def unit(rows: NDArray[Any]) -> FloatArray:
-    """Rows divided by their length; (0, 0, 1) for those of no length."""
+    """Normalise rows. A row of length 0 becomes (0, 0, 1)."""
     lengths = np.linalg.norm(rows, axis=-1, keepdims=True)
     return np.where(lengths > 0, rows / np.where(lengths > 0, lengths, 1.0), [0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Surfaces as an artist makes them: triangles with whatever belongs to them, in the order of their file."""
+"""Surfaces from files and programs: triangles with their normals and appearance, in the order of the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.core.checks import as_path, as_positive
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray, read_only
 from taichi_soft.meshing.gltf import read_gltf
-from taichi_soft.meshing.io import SURFACES, refuse_stand_in
+from taichi_soft.meshing.io import SURFACES, reject_placeholder
 from taichi_soft.meshing.off import read_off
 from taichi_soft.meshing.ply import read_ply
 from taichi_soft.meshing.stl import read_stl
@@ -29,35 +29,35 @@ if TYPE_CHECKING:
 Up = Literal["y", "z"]
 
 UP: dict[str, Up] = {".glb": "y", ".gltf": "y", ".obj": "y", ".ply": "z", ".stl": "z", ".off": "z"}
-"""Axis that points up in files of each format. glTF defines it; for the others it is what programs write that
-say: Blender's exporters by default, and of .off files OpenSCAD and FreeCAD."""
+"""Axis that points up in files of each format. glTF defines it. For the others it is what common exporters
+write: Blender's defaults, and OpenSCAD and FreeCAD for .off files."""
 
 DEFINED = (".glb", ".gltf")
-"""Formats that say which axis it is."""
+"""Formats that define the axis."""
 
-FAR = 1e-4
-"""Of the size of a surface, which float32 can no longer tell apart as far from the origin as it lies."""
+MAX_SPACING = 1e-4
+"""Largest spacing of float32 numbers at a surface's distance from the origin, relative to its size."""
 
 
 def read_surfaces(
     source: Any, up: Up | None = None, *, center: bool = False, scale: float = 1.0
 ) -> tuple[Surface, ...]:
-    """The triangle meshes of a file or an object, none left out, each with its own vertices.
+    """Read all triangle meshes of a file or an object, each with its own vertices.
 
-    Vertices have the order of the file. In files that index texture coordinates, normals or colours by the
-    corner of a face (.obj, some .ply and .off), a vertex has copies where these differ: they come behind all
-    others, by vertex, and those of one vertex in the order of their first corners. The several meshes of an
-    .obj file, one for each material, have those of its vertices that they use.
+    Vertices have the order of the file. Some files (.obj, some .ply and .off) index texture coordinates,
+    normals or colours by the corner of a face. Where these differ, vertices are copied. Copies follow all
+    other vertices, ordered by vertex and then by their first corners. Each mesh of an .obj file, one for each
+    material, has only the vertices that it uses.
 
     Args:
         source: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh, a trimesh.Scene,
             (vertices (n, 3) [m], triangles (m, 3)), or several of these in a tuple.
-        up: axis that points up in it; None takes what `UP` has for a file, and "z" for all else. What comes
-            back has z up.
-        center: move the middle of the box round it to the origin.
-        scale: factor from its unit to metres, from 0.001 for millimetres.
-    Raises: MeshError for what has no triangles or cannot be read, with the file's name; OptionError for an
-        unknown axis, a scale that is not positive, and a path that names no file.
+        up: axis that points up in `source`; None: that of `UP` for a file, "z" for anything else. The result
+            has z up.
+        center: move the centre of its bounding box to the origin.
+        scale: factor from its unit to metres: 0.001 for millimetres.
+    Raises: MeshError, with the file's name, if a source has no triangles or cannot be read; OptionError for
+        an unknown axis, a scale that is not positive, or a path that does not name a file.
     """
     if up not in (None, "y", "z"):
         raise OptionError(f"up must be 'y', 'z' or None, got {up!r}")
@@ -67,19 +67,18 @@ def read_surfaces(
 
 
 def assumed_up(source: Any) -> str:
-    """A sentence on the axis that is taken as up in a file whose format does not say, and on the other one;
-    nothing for all else."""
+    """Say which axis is assumed to be up if a file's format does not define it; empty for other sources."""
     suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""
     other = "z" if UP[suffix] == "y" else "y"
     return (
-        f"{UP[suffix]} is taken as up, as in most {suffix} files: if it lies on its side, choose up={other!r}"
+        f"{UP[suffix]} is taken as up, as in most {suffix} files: if it lies on its side, pass up={other!r}"
     )
 
 
 def _all(source: Any, up: Up | None) -> Iterator[Surface]:
-    """Surfaces of all sources in turn, z up."""
+    """Yield the surfaces of all sources in order, z up."""
     if isinstance(source, Surface):
         yield source
     elif isinstance(source, (tuple, list)) and source and not _are_arrays(source):
@@ -88,9 +87,9 @@ def _all(source: Any, up: Up | None) -> Iterator[Surface]:
     elif isinstance(source, (str, os.PathLike)):
         path = as_path(source)
         found = _read(path)
-        yield from (_turned(_with_sound_normals(each), up or UP[path.suffix.lower()]) for each in found)
+        yield from (_with_z_up(_with_valid_normals(each), up or UP[path.suffix.lower()]) for each in found)
     else:
-        yield from (_turned(_with_sound_normals(each), up or "z") for each in _surfaces(source, ""))
+        yield from (_with_z_up(_with_valid_normals(each), up or "z") for each in _surfaces(source, ""))
 
 
 def _are_arrays(source: Any) -> bool:
@@ -98,9 +97,9 @@ def _are_arrays(source: Any) -> bool:
 
 
 def _read(path: Path) -> list[Surface]:
-    """Surfaces of a file, in its own axes and units.
+    """Read the surfaces of a file, in its own axes and units.
 
-    Raises: MeshError in one line that begins with the name of the file.
+    Raises: MeshError in one line that begins with the file's name.
     """
     suffix = path.suffix.lower()
     if suffix not in SURFACES:
@@ -108,12 +107,12 @@ def _read(path: Path) -> list[Surface]:
     if not path.is_file():
         raise MeshError(f"{path.name}: cannot be read (no such file)")
     try:
-        refuse_stand_in(path)
+        reject_placeholder(path)
         found = READERS[suffix](path)
     except MeshError as error:
         words = str(error).removeprefix(f"{path.name}: ")
         raise MeshError(f"{path.name}: {words}") from None
-    except Exception as error:  # damaged files: each format's reader raises something else
+    except Exception as error:  # readers raise many kinds on damaged files
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise MeshError(f"{path.name}: cannot be read ({reason})") from None
     if not found:
@@ -129,7 +128,7 @@ READERS: dict[str, Callable[[Path], list[Surface]]] = {
     ".ply": read_ply,
     ".stl": read_stl,
 }
-"""By format, what reads its surfaces, in the axes and the unit of the file."""
+"""Reader of each format, which returns surfaces in the axes and units of the file."""
 
 
 def _surfaces(source: Any, name: str) -> list[Surface]:
@@ -140,7 +139,7 @@ def _surfaces(source: Any, name: str) -> list[Surface]:
     if isinstance(source, (tuple, list)) and len(source) == 2:
         return [surface_of(name, source[0], source[1])]
     raise MeshError(
-        "a surface is the path of a file, a trimesh.Trimesh or Scene, or (vertices, triangles), got "
+        "a surface must be the path of a file, a trimesh.Trimesh or Scene, or (vertices, triangles), got "
         f"{type(source).__name__}"
     )
 
@@ -151,7 +150,7 @@ def _of_scene(scene: trimesh.Scene) -> list[Surface]:
         matrix, geometry = scene.graph[node]
         mesh = scene.geometry[geometry]
         if hasattr(mesh, "faces") and len(mesh.faces):
-            moved = mesh.copy(include_cache=True)  # with the normals of the file
+            moved = mesh.copy(include_cache=True)  # keeps the normals of the file
             moved.apply_transform(matrix)
             found.append(_surface(moved, str(node)))
     if not found:
@@ -162,7 +161,7 @@ def _of_scene(scene: trimesh.Scene) -> list[Surface]:
 def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
     if len(mesh.faces) == 0:
         raise MeshError("there are no triangles in it")
-    # Those that it was given, if any: copies of a vertex at a seam of the texture share them.
+    # The normals of the file, if any: copies of a vertex at a seam of the texture share them.
     with _silent(logging.getLogger("trimesh.util")):
         normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
     return surface_of(name, mesh.vertices, mesh.faces, normals=normals, visual=mesh.visual)
@@ -170,7 +169,7 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 @contextlib.contextmanager
 def _silent(log: logging.Logger) -> Iterator[None]:
-    """While normals are computed without scipy: trimesh writes a traceback, and does it in another way."""
+    """Silence a logger: without scipy, trimesh logs a traceback and computes normals in another way."""
     was, log.disabled = log.disabled, True
     try:
         yield
@@ -178,10 +177,11 @@ def _silent(log: logging.Logger) -> Iterator[None]:
         log.disabled = was
 
 
-def _with_sound_normals(surface: Surface) -> Surface:
-    """Normals that point away from all triangles round their vertex are computed from these.
+def _with_valid_normals(surface: Surface) -> Surface:
+    """Recompute normals that point away from all triangles around their vertex.
 
-    Not where it is the triangles that face inwards: most normals disagree, and the volume is negative.
+    Normals are kept if the triangles face inwards: most normals disagree with them, and the volume is
+    negative.
     """
     corners = surface.vertices[surface.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -196,16 +196,16 @@ def _with_sound_normals(surface: Surface) -> Surface:
     middle = corners - corners.mean(axis=(0, 1))
     volume = np.einsum("mx,mx->", middle[:, 0], np.cross(middle[:, 1], middle[:, 2]))
     if 2 * count > all_ and volume < 0.0:
-        told = f"its triangles face inwards, against {count:,} of its {all_:,} normals: the normals are kept"
-        return replace(surface, notes=(*surface.notes, told))
+        note = f"its triangles face inwards, against {count:,} of its {all_:,} normals: the normals are kept"
+        return replace(surface, notes=(*surface.notes, note))
     normals = surface.normals.copy()
     normals[is_wrong] = vertex_normals(surface.vertices, surface.triangles)[is_wrong]
-    told = f"{count:,} of its {all_:,} normals point away from all triangles round them: computed anew"
-    return replace(surface, normals=read_only(normals), notes=(*surface.notes, told))
+    note = f"{count:,} of its {all_:,} normals point away from all triangles around them: they are recomputed"
+    return replace(surface, normals=read_only(normals), notes=(*surface.notes, note))
 
 
-def _turned(surface: Surface, up: Up) -> Surface:
-    """With z up."""
+def _with_z_up(surface: Surface, up: Up) -> Surface:
+    """Rotate a surface from `up` to z up."""
     if up == "z":
         return surface
     vertices, normals = (
@@ -216,38 +216,39 @@ def _turned(surface: Surface, up: Up) -> Surface:
 
 
 def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[Surface, ...]:
-    """Moved to the origin and scaled, in float64; with a note where float32 will not do."""
+    """Move surfaces to the origin and scale them, in float64; note where float32 is too coarse."""
     if not surfaces:
         return surfaces
     low, high = _box(surfaces)
     middle = 0.5 * (low + high) if center else np.zeros(3)
-    place = scale * float(np.abs([low - middle, high - middle]).max())
-    apart = float(np.spacing(np.float32(place)))
+    distance = scale * float(np.abs([low - middle, high - middle]).max())
+    spacing = float(np.spacing(np.float32(distance)))
     notes: tuple[str, ...] = ()
     if center:
         words = ", ".join(f"{part:.10g}" for part in scale * middle)
-        notes = (f"its middle lay at ({words}) m, and is the origin now",)
-    elif apart > FAR * scale * (high - low).max():
+        notes = (f"its centre was at ({words}) m and is now the origin",)
+    elif spacing > MAX_SPACING * scale * (high - low).max():
         notes = (
-            f"it lies {place:.4g} m from the origin, where 32-bit numbers are {apart:.2g} m apart: "
+            f"it lies {distance:.4g} m from the origin, where 32-bit numbers are {spacing:.2g} m apart: "
             "center=True moves it to the origin",
         )
     if not center and scale == 1.0:
-        return tuple(_told(each, notes) for each in surfaces)
+        return tuple(_with_notes(each, notes) for each in surfaces)
     moved = (read_only(scale * (each.vertices - middle)) for each in surfaces)
     return tuple(
-        _told(replace(each, vertices=vertices), notes) for each, vertices in zip(surfaces, moved, strict=True)
+        _with_notes(replace(each, vertices=vertices), notes)
+        for each, vertices in zip(surfaces, moved, strict=True)
     )
 
 
-def _told(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """With those of the notes that it lacks."""
+def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
+    """Append those notes that the surface does not have."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 
 
 def _box(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner of the box round all vertices that triangles use, (3,) each."""
+    """Lowest and highest corner of the bounding box of all vertices in triangles, (3,) each."""
     corners = [each.vertices[each.triangles].reshape(-1, 3) for each in surfaces]
     low, high = (np.array([f(rows, axis=0) for rows in corners]) for f in (np.min, np.max))
     return low.min(axis=0), high.max(axis=0)

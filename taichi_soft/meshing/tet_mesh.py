@@ -1,4 +1,4 @@
-"""The usual body: particles, edges and tetrahedra that fill a volume."""
+"""Meshes of tetrahedra that fill a volume, with their particles and edges."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from taichi_soft.meshing.topology import LOCAL_EDGES, edges_of, first_duplicate,
 
 @serialised("vertices", "tets")
 class TetMesh(BodyMesh):
-    """A tetrahedral mesh, checked once and immutable from then on.
+    """A tetrahedral mesh, validated once and immutable.
 
     Args:
         vertices: (n, 3) positions at rest [m].
         tets: (m, 4) integer vertex indices. A tetrahedron has positive volume when
             det[x1-x0, x2-x0, x3-x0] > 0.
-        fix_orientation: turn tetrahedra of negative volume round by swapping their last two vertices.
+        fix_orientation: reverse tetrahedra of negative volume by swapping their last two vertices.
 
     Attributes:
         vertices: float64 (n, 3) [m].
@@ -36,14 +36,14 @@ class TetMesh(BodyMesh):
             (0,1), (0,2), (0,3), (1,2), (1,3), (2,3).
         surface: int32 (f, 3), boundary triangles, counterclockwise seen from outside.
         volumes: float64 (m,), volume of each tetrahedron, all positive [m^3].
-        fill: float64 (m,), part of each tetrahedron that is solid: 1, but in a `CageMesh`.
+        fill: float64 (m,), fraction of each tetrahedron that is solid: 1 except in a `CageMesh`.
 
     Raises: MeshError, naming the element, for wrong shapes or dtypes, numbers that are not finite, indices
         out of range, a vertex twice in a tetrahedron, the same tetrahedron twice, a tetrahedron of zero
-        volume (against its longest edge) or negative volume, a vertex of no tetrahedron, a face of more than
-        two tetrahedra, neighbours that overlap, or an empty mesh.
+        volume (relative to its longest edge) or negative volume, a vertex without a tetrahedron, a face of
+        more than two tetrahedra, neighbours that overlap, or an empty mesh.
 
-    The arrays are copied. A mesh may have several parts that do not touch.
+    The arrays are copied. A mesh can have several components that do not touch.
     """
 
     tet_edges: IntArray
@@ -62,10 +62,10 @@ class TetMesh(BodyMesh):
         volumes = _checked_volumes(points, corners, fix_orientation)
         turned = volumes < 0
         corners[turned] = corners[turned][:, [0, 1, 3, 2]]
-        _refuse_unused(len(points), corners)
-        self._fill(points, corners, np.abs(volumes))
+        _reject_unused(len(points), corners)
+        self._initialise(points, corners, np.abs(volumes))
 
-    def _fill(self, points: FloatArray, corners: IntArray, volumes: FloatArray) -> None:
+    def _initialise(self, points: FloatArray, corners: IntArray, volumes: FloatArray) -> None:
         surface = surface_of(corners)
         edges, tet_edges = edges_of(corners)
         super().__init__(points, edges, corners)
@@ -74,23 +74,23 @@ class TetMesh(BodyMesh):
         )
 
     def part(self, vertices: NDArray[Any], tets: IntArray, rows: NDArray[Any]) -> TetMesh:
-        """Some of the tetrahedra, with vertices of their own, as a cut leaves them: checked once is enough.
+        """Return some of the tetrahedra with their own vertices, as after a cut, without validating them.
 
         Args:
-            vertices: of this mesh, that each new one is or is a copy of, (n,).
-            tets: new vertices of each tetrahedron, (m, 4), every one in use.
-            rows: of this mesh, that each tetrahedron is, (m,).
+            vertices: vertex of this mesh that each new one copies, (n,).
+            tets: new vertices of each tetrahedron, (m, 4); every vertex is used.
+            rows: tetrahedron of this mesh that each new one is, (m,).
         """
         mesh = type(self).__new__(type(self))
-        mesh._fill(self.vertices[vertices], tets, self.volumes[rows])
+        mesh._initialise(self.vertices[vertices], tets, self.volumes[rows])
         mesh._inherit(self, vertices, rows)
         return mesh
 
-    def _inherit(self, whole: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        """Take over what a `part` has of the whole besides its places. Arguments as there."""
+    def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
+        """Copy what a `part` has of the original besides its geometry. Arguments as for `part`."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Copying and unpickling rebuild the mesh, so that its arrays are locked again.
+        # Copying and unpickling rebuild the mesh, so that its arrays are read-only again.
         return (TetMesh, (self.vertices, self.tets))
 
     def __repr__(self) -> str:
@@ -116,20 +116,20 @@ class TetMesh(BodyMesh):
     def improved(
         self, *, min_size: float | None = None, tolerance: float | None = None, return_source: bool = False
     ) -> TetMesh | tuple[TetMesh, IntArray]:
-        """The same body with the tetrahedra that ask for the smallest steps flipped, reshaped or collapsed.
+        """Return the same body without the tetrahedra that force the smallest time steps.
 
-        The size of a tetrahedron is the edge of the regular one with the same sum of squared gradients of
-        its shape functions: the stable step grows with the smallest size of the mesh. The result has no
-        smaller size than this mesh, the same parts and holes, and is the same on every run. Some small
-        tetrahedra may be left where the surface allows nothing else.
+        They are flipped, reshaped or collapsed. The size of a tetrahedron is the edge of the regular one with
+        the same sum of squared gradients of its shape functions: the stable step grows with the smallest size
+        of the mesh. The smallest size never decreases, components and holes stay, and the result is the same
+        on every run. Small tetrahedra remain where the surface allows no change.
         Args:
-            min_size: below which a tetrahedron is improved [m]; None takes 0.3 of the median.
-            tolerance: how far the surface may move [m]; None takes a quarter of the mean edge, at most 1 % of
-                the diagonal of the bounding box. The volume changes by at most 1 % in any case.
-            return_source: also give the tetrahedron of this mesh whose place each new one has, int32 (m,):
-                `values[source]` carries over what was given per tetrahedron. A border between materials may
-                shift by a few tetrahedra.
-        Returns: this mesh itself, if there was nothing to improve.
+            min_size: size below which a tetrahedron is improved [m]; None: 0.3 of the median.
+            tolerance: largest displacement of the surface [m]; None: a quarter of the mean edge, at most 1 %
+                of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
+            return_source: also return the tetrahedron of this mesh that each new one replaces, int32 (m,):
+                `values[source]` carries over values per tetrahedron. A border between materials can shift by
+                a few tetrahedra.
+        Returns: this mesh itself if there was nothing to improve.
         Raises: OptionError if min_size or tolerance is not positive.
         """
         if tolerance is None:
@@ -150,24 +150,24 @@ class TetMesh(BodyMesh):
 
     @property
     def volume(self) -> float:
-        """Volume of the whole mesh [m^3]."""
+        """Volume of the mesh [m^3]."""
         return float(self.volumes.sum())
 
     @cached_property
     def fill(self) -> FloatArray:
-        """Part of each tetrahedron that is solid, float64 (m,): 1, but in a `CageMesh`."""
+        """Fraction of each tetrahedron that is solid, float64 (m,): 1 except in a `CageMesh`."""
         return read_only(np.ones(len(self.tets)))
 
     @cached_property
     def vertex_volumes(self) -> FloatArray:
-        """Each particle's share, a quarter of every tetrahedron it belongs to, float64 (n,) [m^3]."""
-        shares = np.bincount(self.tets.ravel(), np.repeat(self.volumes / 4.0, 4), len(self.vertices))
-        volumes: FloatArray = read_only(shares)
+        """Volume of each particle: a quarter of each tetrahedron around it, float64 (n,) [m^3]."""
+        sums = np.bincount(self.tets.ravel(), np.repeat(self.volumes / 4.0, 4), len(self.vertices))
+        volumes: FloatArray = read_only(sums)
         return volumes
 
     @cached_property
     def edge_valence(self) -> IntArray:
-        """How many tetrahedra share each edge, int32 (k,)."""
+        """Number of tetrahedra that share each edge, int32 (k,)."""
         valence: IntArray = read_only(np.bincount(self.tet_edges.ravel()).astype(np.int32))
         return valence
 
@@ -184,13 +184,13 @@ class TetMesh(BodyMesh):
 
 
 def _checked_volumes(points: FloatArray, tets: IntArray, allow_negative: bool) -> FloatArray:
-    """Signed volumes (m,) [m^3], after refusing flat and, unless allowed, inverted tetrahedra."""
+    """Signed volumes (m,) [m^3]. Raises: MeshError for flat or, unless allowed, inverted tetrahedra."""
     corners = points[tets]
     a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
     volumes: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     ends = corners[:, LOCAL_EDGES]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    # Written so that 0 > 0, where everything has underflowed, counts as flat too.
+    # Negated so that 0 > 0, after everything has underflowed, counts as flat too.
     flat = ~(np.abs(volumes) > FLATTEST * longest**3)
     if flat.any():
         row = int(np.argmax(flat))
@@ -207,7 +207,7 @@ def _checked_volumes(points: FloatArray, tets: IntArray, allow_negative: bool) -
     return volumes
 
 
-def _refuse_unused(vertex_count: int, tets: IntArray) -> None:
+def _reject_unused(vertex_count: int, tets: IntArray) -> None:
     uses = np.bincount(tets.ravel(), minlength=vertex_count)
     if (uses == 0).any():
         unused = np.flatnonzero(uses == 0)

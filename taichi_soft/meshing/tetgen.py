@@ -1,4 +1,4 @@
-"""TetGen's mesh files: a `.node` file with the points beside an `.ele` file with the tetrahedra."""
+"""TetGen's mesh files: points in a `.node` file and tetrahedra in an `.ele` file."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from taichi_soft.meshing.tet_mesh import TetMesh
 
 
 def read_tetgen(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Points (n, 3) and vertex numbers (m, 4), counted from 0, of the pair of files that `path` is one of.
+    """Read points (n, 3) and vertex numbers (m, 4), counted from 0; `path` is either file of the pair.
 
-    Counting from 0 or from 1 is told by the number of the first point. Comments (#), attributes and boundary
-    markers are skipped; of second-order tetrahedra (10 nodes) the four corners are taken.
-    Raises: MeshError if either file is cut short or not what it should be; OSError if one is missing.
+    The number of the first point decides whether the file counts from 0 or 1. Comments (#), attributes and
+    boundary markers are skipped. Second-order tetrahedra (10 nodes) are reduced to their four corners.
+    Raises: MeshError if a file is cut short or invalid; OSError if one is missing.
     """
     node_path, element_path = path.with_suffix(".node"), path.with_suffix(".ele")
     header, table = _read_table(node_path, "points")
@@ -29,14 +29,14 @@ def read_tetgen(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
         raise MeshError(f"{node_path.name}: a point has {table.shape[1]} columns, number x y z are needed")
     first = table[0, 0]
     if first not in (0, 1) or (np.diff(table[:, 0]) != 1).any():
-        raise MeshError(f"{node_path.name}: points must be numbered one by one from 0 or 1")
+        raise MeshError(f"{node_path.name}: points must be numbered consecutively from 0 or 1")
 
     header, elements = _read_table(element_path, "tetrahedra")
     if len(header) < 2 or header[1] not in (4, 10) or elements.shape[1] < 5:
         raise MeshError(f"{element_path.name}: tetrahedra need 4 or 10 nodes each, the header is {header}")
     corners = elements[:, 1:5]
     if (corners != np.floor(corners)).any():
-        raise MeshError(f"{element_path.name}: a vertex number is not a whole number")
+        raise MeshError(f"{element_path.name}: a vertex number is not an integer")
     return table[:, 1:4], (corners - first).astype(np.int64)
 
 
@@ -56,8 +56,8 @@ def _write_lines(path: Path, header: str, rows: Iterable[str]) -> None:
     path.write_text("\n".join(["# taichi-soft", header, *rows]) + "\n", encoding="ascii")
 
 
-def _read_table(path: Path, what: str) -> tuple[list[int], FloatArray]:
-    """The header line's numbers and the rows under it."""
+def _read_table(path: Path, element: str) -> tuple[list[int], FloatArray]:
+    """Numbers of the header line, and the rows below it."""
     try:
         text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
@@ -71,11 +71,11 @@ def _read_table(path: Path, what: str) -> tuple[list[int], FloatArray]:
     except ValueError as error:
         raise MeshError(f"{path.name}: not a TetGen file ({error})") from None
     if not header or header[0] < 1:
-        raise MeshError(f"{path.name}: holds no {what}")
+        raise MeshError(f"{path.name}: contains no {element}")
     width = len(lines[1].split()) if len(lines) > 1 else 0
     if width == 0 or len(numbers) != header[0] * width:
         raise MeshError(
-            f"{path.name}: {header[0]} {what} announced, {len(numbers) / max(width, 1):g} found: "
+            f"{path.name}: declares {header[0]} {element} and has {len(numbers) / max(width, 1):g}: "
             "the file is cut short or damaged"
         )
     return header, numbers.reshape(header[0], width)

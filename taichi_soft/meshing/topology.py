@@ -1,4 +1,4 @@
-"""Edges and faces of a set of tetrahedra: index arrays in, index arrays out."""
+"""Edges and faces of tetrahedra: index arrays in, index arrays out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 
 
 
 def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
-    """Edges (k, 2), rows i < j in ascending order, and (m, 6) each tetrahedron's rows in them."""
+    """Edges (k, 2), rows i < j in ascending order, and the rows of each tetrahedron's edges (m, 6)."""
     pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
     stride = int(tets.max()) + 1
     keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
@@ -26,7 +26,7 @@ def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def surface_of(tets: IntArray) -> IntArray:
-    """Triangles (f, 3) that belong to one tetrahedron only, wound outwards, in the order of `tets`.
+    """Triangles (f, 3) that belong to only one tetrahedron, wound outwards, in the order of `tets`.
 
     The tetrahedra must have positive volume.
     Raises: MeshError if more than two of them share a face, or two lie on the same side of one.
@@ -42,8 +42,8 @@ def surface_of(tets: IntArray) -> IntArray:
             f"({', '.join(map(str, owners))}): at most two can meet in a face, repair the mesh"
         )
     first, second = order[starts[counts == 2]], order[starts[counts == 2] + 1]
-    # Neighbours see their common face from opposite sides, so they run through it in opposite directions.
-    folded = _turns(faces[first]) == _turns(faces[second])
+    # Neighbours see their common face from opposite sides, so they traverse it in opposite directions.
+    folded = _is_ascending(faces[first]) == _is_ascending(faces[second])
     if folded.any():
         pair = int(np.argmax(folded))
         raise MeshError(
@@ -54,9 +54,9 @@ def surface_of(tets: IntArray) -> IntArray:
 
 
 def shared_faces(tets: NDArray[Any]) -> NDArray[np.int64]:
-    """Pairs of faces that are one, (k, 2): face i of tetrahedron t has number 4 t + i.
+    """Pairs of coincident faces, (k, 2): face i of tetrahedron t has number 4 t + i.
 
-    No face may belong to more than two.
+    A face must not belong to more than two tetrahedra.
     """
     flat = np.sort(tets[:, LOCAL_FACES], axis=2).reshape(-1, 3)
     order = np.lexsort(flat.T)
@@ -65,7 +65,7 @@ def shared_faces(tets: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
-    """Two rows that name the same four vertices, lower row first; None if there are none."""
+    """First two rows with the same four vertices, lower row first; None if there are none."""
     order, starts, counts = groups(np.sort(tets, axis=1))
     if counts.max() == 1:
         return None
@@ -75,15 +75,15 @@ def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
 
 
 def groups(rows: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Equal rows brought together: the order that does it, where each group starts, how many it has."""
+    """Group equal rows. Returns the order that sorts them, and the start and size of each group."""
     order = np.lexsort(rows.T[::-1])
     in_order = rows[order]
     starts = np.flatnonzero(np.r_[True, (in_order[1:] != in_order[:-1]).any(axis=1)])
     return order, starts, np.diff(np.r_[starts, len(rows)])
 
 
-def _turns(faces: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether each triangle runs through its vertices in ascending cyclic order."""
+def _is_ascending(faces: NDArray[Any]) -> NDArray[np.bool_]:
+    """True for triangles whose vertices are in ascending cyclic order."""
     a, b, c = faces.T
-    turns: NDArray[np.bool_] = ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
-    return turns
+    is_ascending: NDArray[np.bool_] = ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
+    return is_ascending

@@ -1,4 +1,4 @@
-"""Polygons with three or more corners in space, cut into triangles within them."""
+"""Triangulation of polygons with three or more corners in space."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 FOLDED = 1e-9
-"""Part of a polygon's area below which a triangle that faces the other way counts as flat."""
+"""Fraction of a polygon's area below which a triangle that faces the other way counts as flat."""
 
 
 def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:
-    """Triangles of polygons: fans where these lie within the polygon, and ears cut off elsewhere.
+    """Triangulate polygons: by fans where these lie within the polygon, by ear clipping elsewhere.
 
     Args:
-        corners: of all polygons in turn, (k, 3).
+        corners: corners of all polygons in sequence, (k, 3).
         counts: number of corners of each polygon, (f,). One with fewer than three makes no triangle.
-    Returns: rows of `corners` (m, 3), in the order and the sense of the polygons, and the polygon of each
+    Returns: rows of `corners` (m, 3), in the order and orientation of the polygons, and the polygon of each
         triangle (m,).
     """
     starts, sizes = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
@@ -30,57 +30,59 @@ def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:
     triangles = np.stack([first, first + number + 1, first + number + 2], axis=1)
     a, b, c = np.moveaxis(corners[triangles], 1, 0)
     areas = np.cross(b - a, c - a)
-    whole = np.stack([np.bincount(polygon, areas[:, k], len(counts)) for k in range(3)], axis=1)
-    along = np.einsum("mx,mx->m", areas, whole[polygon])
+    polygon_area = np.stack([np.bincount(polygon, areas[:, k], len(counts)) for k in range(3)], axis=1)
+    along = np.einsum("mx,mx->m", areas, polygon_area[polygon])
     is_folded = np.zeros(len(counts), dtype=np.bool_)
-    is_folded[polygon[along < -FOLDED * np.einsum("mx,mx->m", whole, whole)[polygon]]] = True
+    is_folded[polygon[along < -FOLDED * np.einsum("mx,mx->m", polygon_area, polygon_area)[polygon]]] = True
     for each in np.flatnonzero(is_folded):
         start, count = starts[each], counts[each]
-        its = slice(ends[each] - sizes[each], ends[each])
-        triangles[its] = start + _ears(_flattened(corners[start : start + count], whole[each]))
+        rows = slice(ends[each] - sizes[each], ends[each])
+        triangles[rows] = start + _ears(_flattened(corners[start : start + count], polygon_area[each]))
     return triangles, polygon
 
 
 def _flattened(points: FloatArray, normal: FloatArray) -> FloatArray:
-    """Points (n, 2) in the plane of two axes that lies most squarely to the normal, counterclockwise."""
+    """Project points onto the coordinate plane most perpendicular to `normal`, (n, 2), counterclockwise."""
     axis = int(np.abs(normal).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     return points[:, axes if normal[axis] > 0.0 else axes[::-1]]
 
 
 def _ears(points: FloatArray) -> Ints:
-    """Triangles (n - 2, 3) of a polygon in the plane, counterclockwise: ear clipping (Meisters, 1975)."""
-    left, found = list(range(len(points))), []
-    at = misses = 0
-    while len(left) > 3:
-        at %= len(left)
-        if misses == len(left):  # it crosses itself or is flat: the corner that turns least goes
-            turns = [abs(_turn(*points[_ear(left, i)])) for i in range(len(left))]
-            at, misses = int(np.argmin(turns)), 0
-        elif not _is_ear(points, left, at):
-            at, misses = at + 1, misses + 1
+    """Triangles (n - 2, 3) of a counterclockwise polygon in the plane, by ear clipping (Meisters, 1975)."""
+    remaining, found = list(range(len(points))), []
+    index = misses = 0
+    while len(remaining) > 3:
+        index %= len(remaining)
+        if misses == len(remaining):  # self-intersecting or flat: cut off the corner that turns least
+            turns = [abs(_turn(*points[_ear(remaining, i)])) for i in range(len(remaining))]
+            index, misses = int(np.argmin(turns)), 0
+        elif not _is_ear(points, remaining, index):
+            index, misses = index + 1, misses + 1
             continue
-        found.append(_ear(left, at))
-        del left[at]
-        at, misses = at + 1, 0  # the next corner but one: fewer slivers than from one corner on
-    return np.array([*found, left], dtype=np.int64)
+        found.append(_ear(remaining, index))
+        del remaining[index]
+        index, misses = index + 1, 0  # skipping a corner gives fewer slivers
+    return np.array([*found, remaining], dtype=np.int64)
 
 
-def _ear(left: list[int], at: int) -> list[int]:
-    return [left[at - 1], left[at], left[(at + 1) % len(left)]]
+def _ear(remaining: list[int], index: int) -> list[int]:
+    return [remaining[index - 1], remaining[index], remaining[(index + 1) % len(remaining)]]
 
 
-def _is_ear(points: FloatArray, left: list[int], at: int) -> bool:
-    """Whether the corner is convex, and no other lies in the triangle with its neighbours."""
-    corners = points[_ear(left, at)]
+def _is_ear(points: FloatArray, remaining: list[int], index: int) -> bool:
+    """True if the corner is convex and no other corner lies in the triangle with its neighbours."""
+    corners = points[_ear(remaining, index)]
     if _turn(*corners) <= 0.0:
         return False
-    others = points[left]
-    is_corner = (others[:, None] == corners).all(axis=2).any(axis=1)  # a hole joined by a cut has copies
+    others = points[remaining]
+    is_corner = (
+        (others[:, None] == corners).all(axis=2).any(axis=1)
+    )  # a cut to a hole has copies of its corners
     sides = [_turn(corners[k], corners[(k + 1) % 3], others.T) for k in range(3)]
     return not bool(((np.min(sides, axis=0) >= 0.0) & ~is_corner).any())
 
 
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Twice the area of a triangle in the plane, positive where it is counterclockwise."""
+    """Twice the area of a triangle in the plane, positive if it is counterclockwise."""
     return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

@@ -1,4 +1,4 @@
-"""How a surface looks, as trimesh keeps it: colours, or texture coordinates with a material."""
+"""Appearance of a surface as a trimesh visual: colours, or texture coordinates with a material."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from taichi_soft.meshing.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Look:
-    """A material: its colour from 0 to 1, red, green, blue, opacity, and Pillow's image that covers it."""
+    """A material: its red, green, blue and opacity from 0 to 1, and its texture as a Pillow image."""
 
     name: str
     color: tuple[float, float, float, float] | None = None
-    picture: Any = None
+    image: Any = None
 
 
 def visual_of(
     *, uv: FloatArray | None = None, colors: FloatArray | None = None, look: Look | None = None
 ) -> Any:
-    """trimesh's visual of vertices: of a picture, else of colours, else of a material; None without any.
+    """Return trimesh's visual of vertices: by a texture, else colours, else a material; None without any.
 
     Args:
-        uv: (n, 2), from the lower left corner; NaN where a vertex has none.
-        colors: of vertices, (n, 3) or (n, 4), from 0 to 1, or up to 255.
+        uv: (n, 2), from the lower left corner; NaN for vertices without.
+        colors: colours of vertices, (n, 3) or (n, 4), from 0 to 1, or up to 255.
     """
-    from trimesh.visual import ColorVisuals, TextureVisuals  # half a second that a game need not wait for
+    from trimesh.visual import ColorVisuals, TextureVisuals  # slow to import, and games do not need it
     from trimesh.visual.material import PBRMaterial
 
-    has_picture = look is not None and look.picture is not None
-    if colors is not None and not has_picture:
+    has_image = look is not None and look.image is not None
+    if colors is not None and not has_image:
         colors = np.nan_to_num(colors)
         scale = 255.0 if colors.max(initial=0.0) <= 1.0 else 1.0
         return ColorVisuals(vertex_colors=np.clip(np.round(scale * colors), 0, 255).astype(np.uint8))
@@ -48,27 +48,27 @@ def visual_of(
     else:
         uv = np.nan_to_num(uv)
     look = look or Look("")
-    # Without one of its own trimesh would make a material with Pillow, which may be missing.
+    # By default trimesh makes a material with Pillow, which can be missing.
     material = PBRMaterial(
         name=look.name or None,
-        baseColorFactor=None if has_picture else look.color,
-        baseColorTexture=look.picture,
+        baseColorFactor=None if has_image else look.color,
+        baseColorTexture=look.image,
         metallicFactor=0.0,
         roughnessFactor=0.6,
     )
     return TextureVisuals(uv=uv, material=material)
 
 
-def read_picture(name: str, content: bytes) -> Any:
-    """Pillow's image.
+def read_image(name: str, content: bytes) -> Any:
+    """Decode an image with Pillow.
 
     Args:
-        name: of its file, for errors.
-    Raises: MeshError where it cannot be read, or Pillow is not installed.
+        name: name of its file, for errors.
+    Raises: MeshError if it cannot be read or Pillow is not installed.
     """
     if missing_packages("film", "PIL"):
         raise MeshError(
-            f"the texture {name} is not read: it takes pillow, not installed here: run pip install "
+            f"the texture {name} is not read: it needs pillow, which is not installed here: run pip install "
             "'taichi-soft[film]'"
         )
     from PIL import Image
@@ -78,28 +78,28 @@ def read_picture(name: str, content: bytes) -> Any:
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(content))
             image.load()
-    except Exception as error:  # each format's reader raises something else
+    except Exception as error:  # Pillow's readers raise many kinds
         raise MeshError(f"the texture {name} is not read: {type(error).__name__}: {error}") from None
     return image
 
 
-def find_beside(path: Path, name: str, folder: Path | None = None) -> Path | None:
-    """The file that another one names, or None.
+def find_referenced_file(path: Path, name: str, folder: Path | None = None) -> Path | None:
+    """Find the file that another file names; None if there is none.
 
-    It is looked for by its path from `folder` and from the folder of the file, then by its name in that
-    folder, whatever its case; never outside of the folder above, as visitors of a server send such files.
+    The search uses its path from `folder` and from the folder of `path`, then its name in that folder,
+    ignoring case. It stays within the parent of that folder, because visitors of a server send such files.
     """
     parts = [part for part in name.strip().strip('"').replace("\\", "/").split("/") if part not in ("", ".")]
     if not parts:
         return None
     allowed = path.resolve().parent.parent
-    alike = (each for each in sorted(path.parent.iterdir()) if each.name.lower() == parts[-1].lower())
+    same_name = (each for each in sorted(path.parent.iterdir()) if each.name.lower() == parts[-1].lower())
     folders = (path.parent if folder is None else folder, path.parent)
-    for candidate in (*(each.joinpath(*parts) for each in folders), *alike):
+    for candidate in (*(each.joinpath(*parts) for each in folders), *same_name):
         try:
             found = candidate.resolve()
             if found.is_file() and found.is_relative_to(allowed):
                 return found
-        except (OSError, ValueError):  # such as for a name too long to exist
+        except (OSError, ValueError):  # for example for a name that is too long
             continue
     return None

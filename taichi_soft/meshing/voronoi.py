@@ -17,25 +17,26 @@ from taichi_soft.meshing.topology import LOCAL_FACES
 
 Ints = NDArray[np.int64]
 
-NUDGE = 1e-9
-"""By which part of an edge faces are moved at random: in regular meshes they would lie in the sides of
+PERTURBATION = 1e-9
+"""Random shift of the faces, relative to an edge: in regular meshes faces would coincide with the sides of
 tetrahedra, and belong to both or to neither."""
 
 SMALLEST_FACE = 1e-7
-"""Area over the square of the edge below which a face is taken for an effect of `NUDGE`."""
+"""Area relative to the squared edge below which a face is an artefact of `PERTURBATION`."""
 
 
 @dataclass(frozen=True, eq=False)
 class VoronoiGraph:
-    """Faces between the particles of each edge, and the cells round the particles, inside the body.
+    """Voronoi faces of the edges and Voronoi cells of the particles, clipped by the surface of the body.
 
     Attributes:
-        areas: (k,) of the face of each edge [m^2]; 0 where it is clipped away, or was none.
-        corner_edge: (c,) the edge of each corner, ascending; corners run round the edge's direction i -> j,
+        areas: (k,) area of each edge's face [m^2]; 0 if it is clipped away or does not exist.
+        corner_edge: (c,) edge of each corner, ascending; corners run around the edge's direction i -> j, and
             the first is repeated at the end.
-        corner_tet: (c,) a tetrahedron that holds the corner at rest.
-        corner_weights: (c, 4) where in it: barycentric coordinates.
-        cell_tet, cell_vertex, cell_volume: (s,) what part of a tetrahedron lies nearest to a vertex [m^3].
+        corner_tet: (c,) a tetrahedron that contains the corner at rest.
+        corner_weights: (c, 4) barycentric coordinates of the corner in that tetrahedron.
+        cell_tet, cell_vertex, cell_volume: (s,) volume of the part of a tetrahedron nearest to a vertex
+            [m^3].
     """
 
     mesh: TetMesh
@@ -48,30 +49,30 @@ class VoronoiGraph:
     cell_volume: FloatArray
 
     def masses(self, density: FloatArray) -> FloatArray:
-        """Mass of the cell of each particle, (n,) [kg], for a density per tetrahedron (m,) [kg/m^3]."""
+        """Mass of each particle's cell, (n,) [kg], for a density per tetrahedron (m,) [kg/m^3]."""
         parts = self.cell_volume * density[self.cell_tet]
         return np.bincount(self.cell_vertex, parts, len(self.mesh.vertices)).astype(np.float64)
 
     def corners(self) -> FloatArray:
-        """Where the corners are at rest, (c, 3) [m]."""
+        """Positions of the corners at rest, (c, 3) [m]."""
         tets = self.mesh.vertices[self.mesh.tets[self.corner_tet]]
         return np.asarray(np.einsum("ci,cia->ca", self.corner_weights, tets))
 
 
 def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
-    """The clipped Voronoi graph: made once for a mesh, in about a second for 1,000 tetrahedra.
+    """Return the clipped Voronoi graph of a mesh, computed once per mesh (about 1 s for 1,000 tetrahedra).
 
     Args:
-        mesh: Delaunay tetrahedra, as of `delaunay_mesh`.
+        mesh: Delaunay tetrahedra, such as those of `delaunay_mesh`.
     Raises: MeshError if the mesh is not Delaunay; OptionError without scipy.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"a Voronoi graph needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
-    kept = mesh.__dict__
-    if "_voronoi_graph" not in kept:
-        # About its middle: far from the origin the digits would run out.
-        kept["_voronoi_graph"] = _graph_of(mesh, mesh.translated(-mesh.bounds.mean(axis=0)))
-    graph: VoronoiGraph = kept["_voronoi_graph"]
+    cache = mesh.__dict__
+    if "_voronoi_graph" not in cache:
+        # Centred at the origin: far from it, float64 has too few digits.
+        cache["_voronoi_graph"] = _graph_of(mesh, mesh.translated(-mesh.bounds.mean(axis=0)))
+    graph: VoronoiGraph = cache["_voronoi_graph"]
     return graph
 
 
@@ -81,8 +82,8 @@ def _graph_of(original: TetMesh, mesh: TetMesh) -> VoronoiGraph:
     faces = _faces(mesh, neighbours)
     pieces, face, tet = _split(mesh, faces)
     size = np.linalg.norm(pieces.area_vectors(), axis=1)
-    real = size > SMALLEST_FACE**2 * neighbours.length[face] ** 2
-    pieces, face, tet, size = pieces[real], face[real], tet[real], size[real]
+    is_real = size > SMALLEST_FACE**2 * neighbours.length[face] ** 2
+    pieces, face, tet, size = pieces[is_real], face[is_real], tet[is_real], size[is_real]
     row = neighbours.edge_rows()
     areas = np.bincount(face, size, len(neighbours.pairs))
     areas[areas < SMALLEST_FACE * neighbours.length**2] = 0.0
@@ -95,7 +96,7 @@ def _graph_of(original: TetMesh, mesh: TetMesh) -> VoronoiGraph:
 
 
 class _Neighbours:
-    """Pairs of vertices whose cells may touch, and per vertex its neighbours."""
+    """Pairs of vertices whose cells may touch, and the neighbours of each vertex."""
 
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
@@ -112,66 +113,66 @@ class _Neighbours:
         self.pairs = both[both[:, 0] < both[:, 1]]
         ends = mesh.vertices[self.pairs]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        # Weights, as in a power diagram: cells stay a partition, and faces perpendicular to their edges.
-        scale = NUDGE * float(self.length.min()) ** 2
+        # Weights as in a power diagram: cells stay a partition, and faces stay perpendicular to their edges.
+        scale = PERTURBATION * float(self.length.min()) ** 2
         self.weight = np.random.default_rng(0).uniform(-scale, scale, len(mesh.vertices))
 
         self._power = (mesh.vertices**2).sum(axis=1) - self.weight
 
     @property
     def distance(self) -> FloatArray:
-        """Of the face of each pair from its first vertex [m]."""
+        """Distance of each pair's face from its first vertex [m]."""
         first, second = self.weight[self.pairs].T
         return np.asarray(0.5 * (self.length + (first - second) / self.length))
 
     def edge_rows(self) -> Ints:
-        """Row of `mesh.edges` of each pair, -1 where it is no edge of the mesh."""
+        """Row of `mesh.edges` for each pair, -1 if the pair is not an edge of the mesh."""
         n = len(self.mesh.vertices)
         keys = self.mesh.edges[:, 0].astype(np.int64) * n + self.mesh.edges[:, 1]
         wanted = self.pairs[:, 0] * n + self.pairs[:, 1]
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        return np.where(keys[place] == wanted, place, -1)
+        index = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[index] == wanted, index, -1)
 
-    def cut_to_cells(self, polygons: Polygons, vertex: Ints, other: Ints) -> None:
-        """Keep of each polygon what is nearest to its `vertex`; planes against `other` are left out."""
+    def clip_to_cells(self, polygons: Polygons, vertex: Ints, other: Ints) -> None:
+        """Clip each polygon to the cell of its `vertex`, ignoring the plane against `other`."""
         x = self.mesh.vertices
         for column in self.of.T:
-            rival = column[vertex]
-            rows = (rival >= 0) & (rival != other)
-            normal = x[rival] - x[vertex]
-            offset = 0.5 * (self._power[rival] - self._power[vertex])
-            polygons.cut(normal, offset, rival, rows)
+            neighbour = column[vertex]
+            rows = (neighbour >= 0) & (neighbour != other)
+            normal = x[neighbour] - x[vertex]
+            offset = 0.5 * (self._power[neighbour] - self._power[vertex])
+            polygons.clip(normal, offset, neighbour, rows)
 
 
 def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
-    """The whole Voronoi face of each pair, right-handed about its direction; sides are labelled by vertex."""
+    """Unclipped Voronoi face of each pair, right-handed about its direction; sides are labelled by vertex."""
     ends = mesh.vertices[neighbours.pairs]
     axis = (ends[:, 1] - ends[:, 0]) / neighbours.length[:, None]
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
     u = np.cross(axis, helper)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(axis, u)
-    reach = 2.0 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    radius = 2.0 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
     center = ends[:, 0] + neighbours.distance[:, None] * axis
     square = np.stack(
-        [center + reach * (a * u + b * v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1
+        [center + radius * (a * u + b * v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1
     )
     count = np.full(len(square), 4)
     faces = Polygons(square, np.full((len(square), 4), len(mesh.vertices)), count)
-    neighbours.cut_to_cells(faces, neighbours.pairs[:, 0], neighbours.pairs[:, 1])
+    neighbours.clip_to_cells(faces, neighbours.pairs[:, 0], neighbours.pairs[:, 1])
     return faces
 
 
 def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
-    """Each face cut up by the tetrahedra: the pieces, their faces and their tetrahedra.
+    """Split each face by the tetrahedra. Returns the pieces, their faces and their tetrahedra.
 
     Sides along the k-th face of a tetrahedron are labelled -1 - k.
     """
     boxes = mesh.vertices[mesh.tets]
     low, high = boxes.min(axis=1), boxes.max(axis=1)
-    there = (np.arange(faces.corners.shape[1]) < faces.count[:, None])[..., None]
-    face_low = np.where(there, faces.corners, np.inf).min(axis=1)
-    face_high = np.where(there, faces.corners, -np.inf).max(axis=1)
+    is_corner = (np.arange(faces.corners.shape[1]) < faces.count[:, None])[..., None]
+    face_low = np.where(is_corner, faces.corners, np.inf).min(axis=1)
+    face_high = np.where(is_corner, faces.corners, -np.inf).max(axis=1)
     found = []
     for start in range(0, len(faces.count), 256):
         rows = slice(start, start + 256)
@@ -180,20 +181,20 @@ def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
         found.append(np.stack([face + start, tet]))
     face, tet = np.concatenate(found, axis=1)
     pieces = faces[face]
-    everywhere = np.ones(len(face), dtype=bool)
+    all_rows = np.ones(len(face), dtype=bool)
     for k, corners in enumerate(LOCAL_FACES):
         a, b, c = (boxes[:, i] for i in corners)
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        pieces.cut(normal[tet], np.einsum("ma,ma->m", normal, a)[tet], -1 - k, everywhere)
-    left = pieces.count > 0
-    return pieces[left], face[left], tet[left]
+        pieces.clip(normal[tet], np.einsum("ma,ma->m", normal, a)[tet], -1 - k, all_rows)
+    remaining = pieces.count > 0
+    return pieces[remaining], face[remaining], tet[remaining]
 
 
 def _outlines(
     mesh: TetMesh, pieces: Polygons, edge: Ints, tet: Ints, areas: FloatArray
 ) -> tuple[Ints, Ints, FloatArray]:
-    """Corners of the faces of all edges: the pieces put together again, without the sides between them."""
+    """Outline of each edge's face: its pieces joined, without the sides between them."""
     outer = _is_surface(mesh)
     order = np.argsort(edge, kind="stable")
     bounds = np.searchsorted(edge[order], np.arange(len(mesh.edges) + 1))
@@ -207,8 +208,7 @@ def _outlines(
                 label = int(pieces.labels[row, i])
                 if label < 0 and not outer[t, -1 - label]:
                     continue
-                # A side of the whole face runs through several tetrahedra, one on the surface through its
-                # own.
+                # A side of the unclipped face spans several tetrahedra, a side on the surface only one.
                 key = (label, -1) if label >= 0 else (label, t)
                 sides.setdefault(key, []).append((pieces.corners[row, i], following[row, i], t))
         path = _closed_path(
@@ -226,43 +226,46 @@ Side = tuple[FloatArray, FloatArray, int, int]
 
 
 def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> list[Side]:
-    """Stretches of one straight side, each from one tetrahedron to another, end to end where they touch."""
+    """Join collinear segments end to end where they touch; each has a first and a last tetrahedron."""
     direction = max((b - a for a, b, _ in parts), key=lambda d: float((d * d).sum()))
     parts = sorted(parts, key=lambda part: float((part[0] * direction).sum()))
-    made: list[Side] = []
+    joined: list[Side] = []
     for a, b, t in parts:
-        if made and np.abs(made[-1][1] - a).max() < 1e-6 * scale:
-            made[-1] = (made[-1][0], b, made[-1][2], t)
+        if joined and np.abs(joined[-1][1] - a).max() < 1e-6 * scale:
+            joined[-1] = (joined[-1][0], b, joined[-1][2], t)
         else:
-            made.append((a, b, t, t))
-    return made
+            joined.append((a, b, t, t))
+    return joined
 
 
 def _closed_path(sides: list[Side]) -> list[tuple[FloatArray, int]]:
-    """Corners and their tetrahedra along all sides, each loop closed; further loops are reached by a bridge
-    from the first corner of all and left the same way, so that bridges enclose nothing."""
-    waiting = list(sides)
+    """Order sides into one path of corners and their tetrahedra, in which every loop is closed.
+
+    The path reaches further loops by a bridge from its first corner and returns on it, so that bridges
+    enclose no area.
+    """
+    remaining = list(sides)
     path: list[tuple[FloatArray, int]] = []
-    home = (waiting[0][0], waiting[0][2])
-    while waiting:
-        a, b, t, _ = waiting.pop(0)
-        begin = (a, t)
-        path.append(begin)
-        while waiting:
-            gaps = [float(((side[0] - b) ** 2).sum()) for side in waiting]
+    first_corner = (remaining[0][0], remaining[0][2])
+    while remaining:
+        a, b, t, _ = remaining.pop(0)
+        loop_start = (a, t)
+        path.append(loop_start)
+        while remaining:
+            gaps = [float(((side[0] - b) ** 2).sum()) for side in remaining]
             nearest = int(np.argmin(gaps))
-            if gaps[nearest] > float(((begin[0] - b) ** 2).sum()):
+            if gaps[nearest] > float(((loop_start[0] - b) ** 2).sum()):
                 break
-            a, b, t, _ = waiting.pop(nearest)
+            a, b, t, _ = remaining.pop(nearest)
             path.append((a, t))
-        path.append(begin)
-        if begin[0] is not home[0]:
-            path.append(home)
+        path.append(loop_start)
+        if loop_start[0] is not first_corner[0]:
+            path.append(first_corner)
     return path
 
 
 def _is_surface(mesh: TetMesh) -> NDArray[np.bool_]:
-    """Which faces of each tetrahedron lie on the surface, (m, 4)."""
+    """True for the faces of each tetrahedron that lie on the surface, (m, 4)."""
     n = len(mesh.vertices)
 
     def keys(triangles: NDArray[np.int32]) -> Ints:
@@ -277,22 +280,22 @@ def _cells(
 ) -> tuple[Ints, Ints, FloatArray]:
     """Volume of the part of each tetrahedron that is nearest to each vertex.
 
-    A pyramid from the vertex to each piece of the part's boundary, which is made of Voronoi faces and of the
-    tetrahedron's own.
+    It is the sum of the pyramids from the vertex to each piece of the part's boundary, which consists of
+    Voronoi faces and of the tetrahedron's own faces.
     """
     n = len(mesh.vertices)
     ends = neighbours.pairs[face]
     keys = np.unique(np.concatenate([tet * n + ends[:, i] for i in (0, 1)]))
     cell_tet, cell_vertex = np.divmod(keys, n)
     volume = np.zeros(len(keys))
-    near = neighbours.distance[face]
-    for i, height in enumerate((near, neighbours.length[face] - near)):
+    distance = neighbours.distance[face]
+    for i, height in enumerate((distance, neighbours.length[face] - distance)):
         pyramid = size * height / 3.0
         volume += np.bincount(np.searchsorted(keys, tet * n + ends[:, i]), pyramid, len(keys))
     for corners in LOCAL_FACES:
         triangles = mesh.vertices[mesh.tets[cell_tet][:, corners]]
         parts = Polygons(triangles.copy(), np.zeros((len(keys), 3), np.int64), np.full(len(keys), 3))
-        neighbours.cut_to_cells(parts, cell_vertex, np.full(len(keys), -1))
-        arm = triangles[:, 0] - mesh.vertices[cell_vertex]
-        volume += np.einsum("sa,sa->s", parts.area_vectors(), arm) / 3.0
+        neighbours.clip_to_cells(parts, cell_vertex, np.full(len(keys), -1))
+        offset = triangles[:, 0] - mesh.vertices[cell_vertex]
+        volume += np.einsum("sa,sa->s", parts.area_vectors(), offset) / 3.0
     return cell_tet, cell_vertex, volume

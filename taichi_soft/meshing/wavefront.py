@@ -1,7 +1,7 @@
-"""Wavefront .obj: polygons whose corners have a vertex, a texture coordinate and a normal of their own.
+"""Wavefront .obj files: each corner of a polygon has its own vertex, texture coordinate and normal.
 
-One surface for each material, in the order in which faces first use them. Objects and groups are not told
-apart.
+There is one surface for each material, in the order in which faces first use them. Objects and groups are
+merged.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray, as_points
-from taichi_soft.meshing.corners import BEYOND, NONE, Attribute, require_vertices, split
+from taichi_soft.meshing.corners import BEFORE_FIRST, NONE, Attribute, require_vertices, split
 from taichi_soft.meshing.surface import Surface, surface_of, vertex_normals
 from taichi_soft.meshing.text import as_ascii, decoded, numbers
 from taichi_soft.meshing.triangulation import triangulated
@@ -24,93 +24,95 @@ from taichi_soft.meshing.wavefront_materials import read_materials
 
 Ints = NDArray[np.int64]
 
-LEFT_OUT = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
-"""Statements that make no triangles."""
+SKIPPED = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
+"""Statements without triangles."""
 
 
 @dataclass
 class _Content:
-    """What the statements of a file say."""
+    """Statements of a file."""
 
     vertices: list[list[bytes]] = field(default_factory=list)
-    places: list[list[bytes]] = field(default_factory=list)  # on a texture
+    texcoords: list[list[bytes]] = field(default_factory=list)
     normals: list[list[bytes]] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows of these, NONE where not said
+    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows of these, NONE if missing
     counts: list[int] = field(default_factory=list)  # corners of each face
     material: list[int] = field(default_factory=list)  # of each face
     materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # numbers by name
     libraries: list[bytes] = field(default_factory=list)
     objects: set[str] = field(default_factory=set)
-    left_out: dict[str, int] = field(default_factory=dict)
+    skipped: dict[str, int] = field(default_factory=dict)
 
-    def name_of(self, material: str, is_one: bool) -> str:
-        """Name of the surface of a material: the object's, if it is the only one of the file."""
-        if not is_one:
+    def name_of(self, material: str, is_single: bool) -> str:
+        """Name of the surface of a material; that of the object if the file has one of each."""
+        if not is_single:
             return material
         return next(iter(self.objects)) if len(self.objects) == 1 else ""
 
 
 def read_obj(path: Path) -> list[Surface]:
-    """Surfaces of a .obj file, in its own axes and units.
+    """Read the surfaces of a .obj file, in its own axes and units.
 
-    Raises: MeshError for numbers that are none, and for faces of vertices that are not there.
+    Raises: MeshError for invalid numbers, and for faces of vertices that do not exist.
     """
-    said = _statements(path.read_bytes())
-    if not said.counts:
+    content = _statements(path.read_bytes())
+    if not content.counts:
         return []
-    points, colors = _points(said.vertices)
-    places = numbers([[*row, b"0"][:2] for row in said.places], 2, "texture coordinate", may_lack=True)
-    normals = numbers(said.normals, 3, "normal", may_lack=True)
-    rows, counts = np.array(said.corners, dtype=np.int64), np.array(said.counts, dtype=np.int64)
+    points, colors = _points(content.vertices)
+    texcoords = numbers(
+        [[*row, b"0"][:2] for row in content.texcoords], 2, "texture coordinate", allow_missing=True
+    )
+    normals = numbers(content.normals, 3, "normal", allow_missing=True)
+    rows, counts = np.array(content.corners, dtype=np.int64), np.array(content.counts, dtype=np.int64)
     require_vertices(rows[:, 0], counts, len(points))
     points = as_points(points)
-    looks, notes = read_materials(path, said.libraries, set(said.materials) - {""})
-    notes += [f"{count:,} {what} are left out" for what, count in said.left_out.items()]
-    notes += _without_missing(rows, len(places), len(normals))
+    looks, notes = read_materials(path, content.libraries, set(content.materials) - {""})
+    notes += [f"{count:,} {name} are skipped" for name, count in content.skipped.items()]
+    notes += _remove_missing(rows, len(texcoords), len(normals))
     triangles, face = triangulated(points[rows[:, 0]], counts)
-    corners, material = rows[triangles], np.array(said.material)[face]
+    corners, material = rows[triangles], np.array(content.material)[face]
     smooth = vertex_normals(points, corners[..., 0])
     used, first = np.unique(material, return_index=True)
     surfaces = []
     for number in used[np.argsort(first)]:
-        vertex, place, normal = np.moveaxis(corners[material == number], 2, 0)
-        attributes = Attribute(places, place), Attribute(normals, normal)
-        made = split(len(points), vertex, attributes, keep=len(used) == 1)
-        uv, own = made.attributes
-        name = list(said.materials)[number]
-        shades = None if colors is None else colors[made.vertex]
+        vertex, texcoord, normal = np.moveaxis(corners[material == number], 2, 0)
+        attributes = Attribute(texcoords, texcoord), Attribute(normals, normal)
+        result = split(len(points), vertex, attributes, keep=len(used) == 1)
+        uv, file_normals = result.attributes
+        name = list(content.materials)[number]
+        vertex_colors = None if colors is None else colors[result.vertex]
         surfaces.append(
             surface_of(
-                said.name_of(name, len(used) == 1) or path.name,
-                points[made.vertex],
-                made.triangles,
-                normals=np.where(np.isnan(own), smooth[made.vertex], own),
-                visual=visual_of(uv=uv, colors=shades, look=looks.get(name)),
+                content.name_of(name, len(used) == 1) or path.name,
+                points[result.vertex],
+                result.triangles,
+                normals=np.where(np.isnan(file_normals), smooth[result.vertex], file_normals),
+                visual=visual_of(uv=uv, colors=vertex_colors, look=looks.get(name)),
                 notes=tuple(notes),
             )
         )
     return surfaces
 
 
-def _without_missing(rows: Ints, places: int, normals: int) -> list[str]:
-    """Take texture coordinates and normals that are not there from corners (k, 3), and say how many.
+def _remove_missing(rows: Ints, texcoords: int, normals: int) -> list[str]:
+    """Remove missing texture coordinates and normals from corners (k, 3), and report how many.
 
     Args:
-        places, normals: how many there are.
+        texcoords, normals: number of them in the file.
     """
     notes = []
-    for column, length, what in ((1, places, "texture coordinates"), (2, normals, "normals")):
+    for column, length, kind in ((1, texcoords, "texture coordinates"), (2, normals, "normals")):
         is_missing = rows[:, column] >= length
         rows[is_missing, column] = NONE
         count = int(is_missing.sum())
         if count:
-            who = "1 corner of a face names" if count == 1 else f"{count:,} corners of faces name"
-            notes.append(f"{who} {what} that are not there")
+            subject = "1 corner of a face refers" if count == 1 else f"{count:,} corners of faces refer"
+            notes.append(f"{subject} to {kind} that do not exist")
     return notes
 
 
 def _statements(data: bytes) -> _Content:
-    said = _Content()
+    content = _Content()
     current = 0
     for line in re.sub(rb"\\[ \t]*\n", b" ", as_ascii(data)).split(b"\n"):
         words = line.split()
@@ -118,26 +120,26 @@ def _statements(data: bytes) -> _Content:
             continue
         head = words[0]
         if head == b"v":
-            said.vertices.append(_plain(words))
+            content.vertices.append(_arguments(words))
         elif head == b"vt":
-            said.places.append(_plain(words))
+            content.texcoords.append(_arguments(words))
         elif head == b"vn":
-            said.normals.append(_plain(words))
+            content.normals.append(_arguments(words))
         elif head in (b"f", b"fo"):
-            _add_face(said, _plain(words), current)
+            _add_face(content, _arguments(words), current)
         elif head == b"usemtl":
-            current = said.materials.setdefault(_name(line), len(said.materials))
+            current = content.materials.setdefault(_name(line), len(content.materials))
         elif head == b"mtllib":
-            said.libraries.append(line.split(None, 1)[-1].strip())
+            content.libraries.append(line.split(None, 1)[-1].strip())
         elif head == b"o":
-            said.objects.add(_name(line))
-        elif head in LEFT_OUT:
-            said.left_out[LEFT_OUT[head]] = said.left_out.get(LEFT_OUT[head], 0) + 1
-    return said
+            content.objects.add(_name(line))
+        elif head in SKIPPED:
+            content.skipped[SKIPPED[head]] = content.skipped.get(SKIPPED[head], 0) + 1
+    return content
 
 
-def _plain(words: list[bytes]) -> list[bytes]:
-    """Words behind the first one, up to a comment."""
+def _arguments(words: list[bytes]) -> list[bytes]:
+    """Words after the first one, up to a comment."""
     for number, word in enumerate(words):
         if word.startswith(b"#"):
             return words[1:number]
@@ -148,43 +150,43 @@ def _name(line: bytes) -> str:
     return decoded(b" ".join(line.split()[1:]))
 
 
-def _add_face(said: _Content, words: list[bytes], material: int) -> None:
-    """Raises: MeshError for a corner that is no index."""
+def _add_face(content: _Content, words: list[bytes], material: int) -> None:
+    """Add a face. Raises: MeshError for a corner that is not an index."""
     if len(words) < 3:
         return
-    vertices, places, normals = len(said.vertices), len(said.places), len(said.normals)
+    vertices, texcoords, normals = len(content.vertices), len(content.texcoords), len(content.normals)
     try:
         for word in words:
             vertex, _, others = word.partition(b"/")
-            place, _, normal = others.partition(b"/")
-            said.corners.append(
+            texcoord, _, normal = others.partition(b"/")
+            content.corners.append(
                 (
                     _row(vertex, vertices),
-                    _row(place, places) if place else NONE,
+                    _row(texcoord, texcoords) if texcoord else NONE,
                     _row(normal, normals) if normal else NONE,
                 )
             )
     except ValueError:
         raise MeshError(
-            f"face {len(said.counts)} is '{decoded(b' '.join(words))[:60]}': wanted are whole numbers from "
+            f"face {len(content.counts)} is '{decoded(b' '.join(words))[:60]}': expected whole numbers from "
             "1, or backwards from -1, as in 3/1/2"
         ) from None
-    said.counts.append(len(words))
-    said.material.append(material)
+    content.counts.append(len(words))
+    content.material.append(material)
 
 
 def _row(index: bytes, length: int) -> int:
-    """Row that an index means which counts from 1, or backwards from the last of `length` rows so far."""
+    """Row of an index that counts from 1, or backwards from the last of `length` rows so far."""
     number = int(index)
     if number == 0:
         raise ValueError
     if number > 0:
         return number - 1
-    return length + number if length + number >= 0 else BEYOND
+    return length + number if length + number >= 0 else BEFORE_FIRST
 
 
 def _points(rows: list[list[bytes]]) -> tuple[FloatArray, FloatArray | None]:
-    """Vertices (n, 3), and their colours (n, 3) where all have some behind."""
+    """Vertices (n, 3), and their colours (n, 3) if all have one."""
     points = numbers(rows, 3, "vertex")
     if rows and all(len(row) >= 6 for row in rows):
         return points, numbers([row[3:6] for row in rows], 3, "colour of vertex")

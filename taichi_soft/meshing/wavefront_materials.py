@@ -1,4 +1,4 @@
-"""Libraries of materials (.mtl) that an .obj file names: colour and texture."""
+"""Material libraries (.mtl) of .obj files: colours and textures."""
 
 from __future__ import annotations
 
@@ -6,59 +6,59 @@ from pathlib import Path
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.text import as_ascii, decoded, is_number
-from taichi_soft.meshing.visuals import Look, find_beside, read_picture
+from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image
 
-MOST_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
-"""Of the options of a texture; others have one."""
+MAX_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
+"""Most arguments of an option of a texture; other options have one."""
 
 
-def read_materials(path: Path, libraries: list[bytes], wanted: set[str]) -> tuple[dict[str, Look], list[str]]:
-    """Materials by name, and sentences on what is not there.
+def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[dict[str, Look], list[str]]:
+    """Read materials by name. Returns them and sentences on what is missing.
 
     Args:
-        path: of the .obj file.
-        libraries: what its statements `mtllib` say.
-        wanted: names of the materials that it uses.
+        path: path of the .obj file.
+        libraries: arguments of its `mtllib` statements.
+        used: names of the materials that it uses.
     """
     looks: dict[str, Look] = {}
     notes: list[str] = []
-    pictures: dict[Path, object] = {}
+    images: dict[Path, object] = {}
     for library in dict.fromkeys(libraries):
-        found = find_beside(path, decoded(library))
-        files = [found] if found else [find_beside(path, decoded(name)) for name in library.split()]
+        found = find_referenced_file(path, decoded(library))
+        files = [found] if found else [find_referenced_file(path, decoded(name)) for name in library.split()]
         if not any(files):
             notes.append(f"its materials are not read: there is no file {decoded(library)!r} beside it")
         for file in filter(None, files):
             for name, (color, texture) in _materials(file.read_bytes()).items():
-                if name in wanted and name not in looks:
-                    picture = _picture(path, file, texture, pictures, notes) if texture else None
-                    looks[name] = Look(name, color, picture)
-    lost = sorted(wanted - set(looks))
-    if lost and looks:
-        names = ", ".join(lost[:5]) + (", ..." if len(lost) > 5 else "")
+                if name in used and name not in looks:
+                    image = _texture_image(path, file, texture, images, notes) if texture else None
+                    looks[name] = Look(name, color, image)
+    missing = sorted(used - set(looks))
+    if missing and looks:
+        names = ", ".join(missing[:5]) + (", ..." if len(missing) > 5 else "")
         notes.append(f"its libraries have no material {names}")
     return looks, notes
 
 
-def _picture(
-    path: Path, library: Path, texture: bytes, pictures: dict[Path, object], notes: list[str]
+def _texture_image(
+    path: Path, library: Path, texture: bytes, images: dict[Path, object], notes: list[str]
 ) -> object:
     name = decoded(texture)
-    file = find_beside(path, name, library.parent)
+    file = find_referenced_file(path, name, library.parent)
     if file is None:
         notes.append(f"the texture {name} is not read: there is no such file beside it")
         return None
-    if file not in pictures:
-        pictures[file] = None
+    if file not in images:
+        images[file] = None
         try:
-            pictures[file] = read_picture(name, file.read_bytes())
+            images[file] = read_image(name, file.read_bytes())
         except (MeshError, OSError) as error:
             notes.append(str(error))
-    return pictures[file]
+    return images[file]
 
 
 def _materials(data: bytes) -> dict[str, tuple[tuple[float, float, float, float] | None, bytes]]:
-    """Colour and file of the texture of each material."""
+    """Colour and texture file of each material."""
     found: dict[str, dict[bytes, list[bytes]]] = {}
     current: dict[bytes, list[bytes]] = {}
     for line in as_ascii(data).split(b"\n"):
@@ -71,17 +71,17 @@ def _materials(data: bytes) -> dict[str, tuple[tuple[float, float, float, float]
                 current[head] = [_file(line)]
             else:
                 current[head] = words[1:]
-    return {name: (_color(said), said.get(b"map_kd", [b""])[0]) for name, said in found.items()}
+    return {name: (_color(values), values.get(b"map_kd", [b""])[0]) for name, values in found.items()}
 
 
-def _color(said: dict[bytes, list[bytes]]) -> tuple[float, float, float, float] | None:
+def _color(values: dict[bytes, list[bytes]]) -> tuple[float, float, float, float] | None:
     try:
-        rows = [float(word) for word in said[b"kd"][:3]]
+        rows = [float(word) for word in values[b"kd"][:3]]
         opacity = 1.0
-        if b"d" in said:
-            opacity = float(said[b"d"][-1])
-        elif b"tr" in said:
-            opacity = 1.0 - float(said[b"tr"][-1])
+        if b"d" in values:
+            opacity = float(values[b"d"][-1])
+        elif b"tr" in values:
+            opacity = 1.0 - float(values[b"tr"][-1])
     except (KeyError, ValueError):  # no colour, or a spectrum
         return None
     red, green, blue = (rows * 3)[:3] if len(rows) == 1 else (rows + rows[-1:] * 2)[:3]
@@ -90,13 +90,13 @@ def _color(said: dict[bytes, list[bytes]]) -> tuple[float, float, float, float] 
 
 
 def _file(line: bytes) -> bytes:
-    """The name behind the options of a texture. It may have spaces."""
+    """File name after the options of a texture; it can contain spaces."""
     rest = line.split(None, 1)[1].strip()
     while rest.startswith(b"-") and b" " in rest:
         option, rest = rest.split(None, 1)
-        for _ in range(MOST_ARGUMENTS.get(option.lower(), 1)):
-            word, _, behind = rest.partition(b" ")
+        for _ in range(MAX_ARGUMENTS.get(option.lower(), 1)):
+            word, _, remainder = rest.partition(b" ")
             if option.lower() in (b"-o", b"-s", b"-t") and not is_number(word):
                 break
-            rest = behind.lstrip()
+            rest = remainder.lstrip()
     return rest

@@ -1,1 +1,1 @@
-"""State as bytes: snapshots, and recordings of calls."""
+"""Snapshots of a world as bytes, and recordings of calls."""

@@ -1,4 +1,4 @@
-"""What Python knows of a world's state, as plain data and back: time, who lives where, what slices add."""
+"""The part of a world's state outside its fields, as plain data: time, bodies by slot, entries of slices."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from taichi_soft.elements.laws import fit_model
 from taichi_soft.fracture.cutting import require_room
 from taichi_soft.solver.context import WorldContext
 
-_MOST = 1 << 53
-"""No count of steps or handles, and no time [s], is larger."""
+_MAX_COUNT = 1 << 53
+"""Upper limit of counts of steps or handles, and of times [s]."""
 
 
 def write_manifest(context: WorldContext) -> dict[str, Any]:
-    """What Python knows of a world's state, as plain data."""
+    """The state of a world outside its fields, as plain data."""
     return {
         "steps": context.clock.steps,
         "time": context.clock.time,
@@ -42,13 +42,13 @@ def write_manifest(context: WorldContext) -> dict[str, Any]:
 def _body_entry(body: SoftBody) -> list[Any]:
     record = record_of(body)
     failed, part = record.frozen_in, record.part
-    is_own = record.description is not present_asset(body).description
+    has_own_material = record.description is not present_asset(body).description
     return [
         serial_of(body),
         record.first_step,
         None if failed is None else [failed.step, failed.time, failed.substeps, failed.h, failed.is_braked],
-        as_plain(record.description.material) if is_own else None,
-        None if part is None else part.note,
+        as_plain(record.description.material) if has_own_material else None,
+        None if part is None else part.summary,
         record.level,
         None if record.held is None or record.level == 0 else record.held.tolist(),
         record.friction,
@@ -57,22 +57,22 @@ def _body_entry(body: SoftBody) -> list[Any]:
 
 @dataclass
 class BodyEntry:
-    """Who is to live in a slot."""
+    """The body that a slot will hold."""
 
     serial: int
     first_step: int
     failed: FailedStep | None
     part: CutMesh | None
-    level: int  # of detail
+    level: int  # level of detail
     held: NDArray[np.int64] | None  # see `BodyRecord`
-    friction: float | None  # where it is not its asset's
+    friction: float | None  # None for the friction of the asset
     description: BodyDescription
-    arrays: BodyArrays | None  # of a part
+    arrays: BodyArrays | None  # of a cut body
 
 
 @dataclass
 class Manifest:
-    """What was written, checked against a world in every respect."""
+    """A manifest that was read and fully checked against a world."""
 
     steps: int
     time: float
@@ -81,12 +81,13 @@ class Manifest:
     friction: float  # of the floor
     handles: int
     bodies: list[BodyEntry | None]
-    slices: dict[str, Any]  # what each has read
+    slices: dict[str, Any]  # result of `read` of each slice
 
 
 def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]) -> dict[int, CutMesh]:
-    """What cuts have left of bodies, by slot, from the entries of these and the rows of all parts one by one.
+    """Read the meshes of cut bodies, by slot.
 
+    Args: bodies: entries of the manifest. rows: words of all cut meshes, one after another.
     Raises: as `read_manifest`.
     """
     parts: dict[int, CutMesh] = {}
@@ -95,9 +96,9 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
             n, m = (below(count, len(rows) + 1) for count in entry[4][:2])
             size = 2 * n + 5 * m
             parts[slot] = CutMesh.of_rows(rows[:size], n, m)
-            parts[slot].require_of(context.slots.assets[slot])
+            parts[slot].require_part_of(context.slots.assets[slot])
             if parts[slot].digest != entry[4][2]:
-                raise ValueError(f"what was cut off body {slot} has another name")
+                raise ValueError(f"the cut mesh of body {slot} has another digest")
             rows = rows[size:]
     if len(rows):
         raise ValueError(f"it has {len(rows)} words too many")
@@ -105,9 +106,9 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
 
 
 def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int, CutMesh]) -> Manifest:
-    """What `write_manifest` wrote.
+    """Read and check the data of `write_manifest`.
 
-    Raises: SnapshotError, or what Python raises where it is not in order.
+    Raises: SnapshotError, or what Python raises for invalid data.
     """
     if len(plain["bodies"]) != len(context.slots.slots):
         raise ValueError("it has another number of bodies")
@@ -118,25 +119,25 @@ def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int,
     for each in context.slices:
         read[each.name] = each.read(plain["slices"][each.name], vertex_counts, read)
     return Manifest(
-        as_count(plain["steps"], "steps", 0, _MOST),
-        as_number(plain["time"], "time", 0.0, _MOST),
-        as_number(plain["last_dt"], "last_dt", 0.0, _MOST),
+        as_count(plain["steps"], "steps", 0, _MAX_COUNT),
+        as_number(plain["time"], "time", 0.0, _MAX_COUNT),
+        as_number(plain["last_dt"], "last_dt", 0.0, _MAX_COUNT),
         as_gravity(plain["gravity"]),
         as_friction(plain["friction"]),
-        as_count(plain["handles"], "handles", 1, _MOST),
+        as_count(plain["handles"], "handles", 1, _MAX_COUNT),
         bodies,
         read,
     )
 
 
 def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
-    """Raises: ValueError where two handles have the same number, or one that the next could have."""
+    """Check the serial numbers of handles. Raises: ValueError for duplicates and numbers out of range."""
     numbers = [entry[0] for entry in plain["bodies"] if entry is not None]
     for each in context.slices:
         numbers += each.serials(plain["slices"][each.name])
-    serials = {as_count(number, "a handle", 1, _MOST) for number in numbers}
+    serials = {as_count(number, "a handle", 1, _MAX_COUNT) for number in numbers}
     if len(serials) < len(numbers) or max(serials, default=0) >= plain["handles"]:
-        raise ValueError("two handles have the same number")
+        raise ValueError("the serial numbers of its handles are not unique")
 
 
 def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | None) -> BodyEntry | None:
@@ -145,31 +146,29 @@ def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | Non
     serial, first_step, failed, material, _, number, held, friction = entry
     levels, present = context.slots.assets[slot].levels, context.slots.slots[slot]
     level = below(number, len(levels))
-    asset, whole = levels[level], levels[level].description
+    asset, base = levels[level], levels[level].description
     if present is not None and (
         serial_of(present) != serial
         or name_of(record_of(present).part) != name_of(part)
         or record_of(present).level != level
     ):
         present = None
-    own = None if present is None else record_of(present).description
-    if own is whole:
-        own = None
-    description, arrays = whole, None
+    current = None if present is None else record_of(present).description
+    if current is base:
+        current = None
+    description, arrays = base, None
     if part is not None:
-        description = own or part.describe(asset, whole.material)
+        description = current or part.describe(asset, base.material)
     if material is not None:
         try:
-            made = from_plain(material)
-            fit_model(description.model, description.mesh, made)
+            own_material = from_plain(material)
+            fit_model(description.model, description.mesh, own_material)
         except TaichiSoftError as error:
-            raise SnapshotError(
-                f"this snapshot gives body {slot} a material that it cannot have: {error}"
-            ) from None
-        if type(made) is not type(description.material):
-            raise ValueError(f"body {slot} is of another kind of material")
-        is_same = own is not None and as_plain(made) == as_plain(own.material)
-        description = own if own and is_same else replace(description, material=made)
+            raise SnapshotError(f"this snapshot gives body {slot} an invalid material: {error}") from None
+        if type(own_material) is not type(description.material):
+            raise ValueError(f"body {slot} has a material of another type")
+        is_same = current is not None and as_plain(own_material) == as_plain(current.material)
+        description = current if current and is_same else replace(description, material=own_material)
     elif part is not None:
         raise ValueError(f"body {slot} was cut and has no material")
     if part is not None and present is None:

@@ -1,8 +1,8 @@
-"""The flight recorder: the calls and steps of the last ticks, and the snapshot before them.
+"""Flight recorder: the calls and steps of the last ticks, and the snapshot before them.
 
-A recording holds at least as many ticks as were asked for, and less than twice as many: a snapshot is taken
-every so many ticks, and the last two stretches are kept. Ticks that `restore` has undone are not in it. It is
-plain data, with the assets and shapes that it needs, so that `replay` can build the world again anywhere.
+A recording holds at least the requested number of ticks, and less than twice as many: the recorder takes a
+snapshot once per that number, and keeps the last two segments. Ticks that `restore` undid are removed. A
+recording is plain data that contains its assets and shapes, so that `replay` can rebuild the world anywhere.
 """
 
 from __future__ import annotations
@@ -32,32 +32,32 @@ from taichi_soft.solver.context import WorldContext
 
 MARK, VERSION = b"TSOFTREC", 1
 
-MOST_CONTENT = 1 << 28
-"""Bytes of a recording beside its snapshot, before they are compressed, which may make a thousandth of them:
-without a limit a file of some MB could fill the memory."""
+MAX_CONTENT = 1 << 28
+"""Largest uncompressed size of a recording without its snapshot [bytes]. Compressed data can be a thousand
+times smaller, so without this limit a small file could fill the memory."""
 
-Pushes = list[tuple[int, NDArray[np.float32]]]
-"""Of a force field in one step: bodies by their serial numbers, accelerations (n, 3) [m/s^2]."""
+FieldAccelerations = list[tuple[int, NDArray[np.float32]]]
+"""Accelerations of a force field in one step: serial number of each body, (n, 3) [m/s^2]."""
 
 
 @dataclass
-class _Stretch:
-    """A snapshot, and what was done since."""
+class _Segment:
+    """A snapshot and the calls and steps after it."""
 
     snapshot: bytes
     entries: list[list[Any]] = field(default_factory=list)  # calls and steps
-    marks: dict[bytes, int] = field(default_factory=dict)  # entries before a snapshot of each name was taken
+    marks: dict[bytes, int] = field(default_factory=dict)  # entries before each snapshot, by its name
     steps: int = 0
 
     def __post_init__(self) -> None:
         self.mark(self.snapshot)
 
     def mark(self, snapshot: bytes) -> None:
-        """It is possible to go back to here."""
+        """Mark a snapshot as a state to which `rewind` can return."""
         self.marks[name_of_sealed(snapshot)] = len(self.entries)
 
-    def go_back(self, name: bytes) -> None:
-        """What was done after the snapshot of that name was not."""
+    def rewind(self, name: bytes) -> None:
+        """Remove the entries after the snapshot of that name."""
         end = self.marks[name]
         del self.entries[end:]
         self.marks = {name: at for name, at in self.marks.items() if at <= end}
@@ -65,47 +65,50 @@ class _Stretch:
 
 
 class Recorder:
-    """Takes notes of what is done to one world."""
+    """Records the calls and steps of one world."""
 
     def __init__(self, context: WorldContext, ticks: int, path: Path) -> None:
-        """Begins now, with a built world. `path`: where it writes where a body freezes."""
+        """Start recording a built world. Args: path: file that is written when a body freezes."""
         self._ticks, self._path = ticks, path
-        self._before: _Stretch | None = None
-        self._present = _Stretch(take_snapshot(context))
+        self._before: _Segment | None = None
+        self._present = _Segment(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
-        self.pushes: Pushes = []  # of a force field in the coming step
+        self.field_accelerations: FieldAccelerations = []  # of a force field in the coming step
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call and note it, unless it is refused or another one makes it."""
+        """Make a call and record it, unless it is refused or nested in another recorded call."""
         if self._is_inside:
             return method(handle, *arguments, **options)
-        kept = [[_kept(each) for each in arguments], {name: _kept(each) for name, each in options.items()}]
+        copied = [
+            [_copied(each) for each in arguments],
+            {name: _copied(each) for name, each in options.items()},
+        ]
         self._is_inside = True
         try:
             found = method(handle, *arguments, **options)
         finally:
             self._is_inside = False
-        self._present.entries.append(["call", serial_of(handle), method.__name__, *kept])
+        self._present.entries.append(["call", serial_of(handle), method.__name__, *copied])
         return found
 
-    def note_step(
-        self, context: WorldContext, seconds: float, substeps: int, *, is_broken: bool
+    def record_step(
+        self, context: WorldContext, seconds: float, substeps: int, *, has_failure: bool
     ) -> list[str]:
-        """Note a step that was made, and the name of the state after it; write all where a body froze in it.
+        """Record a step and the hash of the state after it. Write the recording if a body froze in it.
 
-        Returns: what to tell the user.
+        Returns: lines for the user.
         """
-        pushes = [[serial, rows] for serial, rows in self.pushes]
-        self.pushes = []
-        self._present.entries.append(["step", seconds, substeps, state_hash(context), pushes])
+        field_accelerations = [[serial, rows] for serial, rows in self.field_accelerations]
+        self.field_accelerations = []
+        self._present.entries.append(["step", seconds, substeps, state_hash(context), field_accelerations])
         self._present.steps += 1
-        told = [self._write(context)] if is_broken and not self._has_written else []
+        reports = [self._write(context)] if has_failure and not self._has_written else []
         if self._present.steps >= self._ticks:
-            self._before, self._present = self._present, _Stretch(take_snapshot(context))
-        return told
+            self._before, self._present = self._present, _Segment(take_snapshot(context))
+        return reports
 
     def _write(self, context: WorldContext) -> str:
         self._has_written = True
@@ -113,26 +116,26 @@ class Recorder:
             file = self.save(context, self._path)
         except SnapshotError as error:
             return f"no recording: {error}"
-        return f"`taichi-soft replay {file}` shows how it came to that"
+        return f"`taichi-soft replay {file}` replays the steps before it"
 
-    def note_snapshot(self, snapshot: bytes) -> None:
-        """Note that one was taken now."""
+    def record_snapshot(self, snapshot: bytes) -> None:
+        """Record that a snapshot was taken now."""
         self._present.mark(snapshot)
 
-    def go_back(self, context: WorldContext, snapshot: bytes) -> None:
-        """Note that `World.restore` has undone what was done since; begin again where that was not here."""
+    def rewind(self, context: WorldContext, snapshot: bytes) -> None:
+        """Remove what `World.restore` undid; restart the recording if the snapshot was not taken in it."""
         name = name_of_sealed(snapshot)
-        self.pushes = []
+        self.field_accelerations = []
         if name in self._present.marks:
-            self._present.go_back(name)
+            self._present.rewind(name)
         elif self._before is not None and name in self._before.marks:
-            self._before.go_back(name)
+            self._before.rewind(name)
             self._present, self._before = self._before, None
         else:
-            self._before, self._present = None, _Stretch(take_snapshot(context))
+            self._before, self._present = None, _Segment(take_snapshot(context))
 
     def content(self, context: WorldContext) -> bytes:
-        """The recording as it stands."""
+        """The recording up to now, as bytes."""
         first = self._before or self._present
         entries = [*(self._before.entries if self._before else []), *self._present.entries]
         shapes = {name: plain_of(shape) for name, shape in context.colliders.shapes.items()}
@@ -146,15 +149,15 @@ class Recorder:
             "entries": [[as_plain(each) for each in entry[:3]] + _plain(entry[3:]) for entry in entries],
         }
         plain = to_json(made_of)
-        if len(plain) > MOST_CONTENT:
+        if len(plain) > MAX_CONTENT:
             raise SnapshotError(
-                f"the recording takes {len(plain) >> 20} MB, and no more than {MOST_CONTENT >> 20} are kept: "
+                f"the recording takes {len(plain) >> 20} MB, more than the limit of {MAX_CONTENT >> 20} MB: "
                 "make the world with a smaller record"
             )
         return seal(MARK, VERSION, [zlib.compress(plain, 1), first.snapshot])
 
     def save(self, context: WorldContext, path: Any) -> Path:
-        """As `World.save_recording`."""
+        """See `World.save_recording`."""
         file = as_path(path)
         content = self.content(context)
         try:
@@ -166,7 +169,7 @@ class Recorder:
 
 
 def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
-    """What the world was made of and what was done, and the snapshot before. Raises: SnapshotError."""
+    """Read a recording. Returns: assets, options and entries; the snapshot before. Raises: SnapshotError."""
     file = as_path(path)
     try:
         data = file.read_bytes()
@@ -178,7 +181,7 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read what a page saved: a recording, and what the visitor did in place of its steps."""
+    """Read a file saved by a web page: a recording, with the visitor's entries in place of its steps."""
     try:
         played = json.loads(data)
         made_of, snapshot = _read_sealed(base64.b64decode(played["start"], validate=True))
@@ -188,27 +191,27 @@ def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
         if isinstance(error, TaichiSoftError):
             raise
         raise SnapshotError(
-            f"this is no file that a page saved, or it is cut off or damaged ({error!r}): save it again there"
+            f"this file was not saved by a page, or it is damaged ({error!r}): save it again there"
         ) from None
 
 
 def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read what `Recorder.save` wrote."""
+    """Read the data of `Recorder.save`."""
     parts = unseal(data, MARK, VERSION, "recording")
     try:
         content, snapshot = parts
         inflating = zlib.decompressobj()
-        plain = inflating.decompress(content, MOST_CONTENT)
+        plain = inflating.decompress(content, MAX_CONTENT)
         if not inflating.eof:
-            raise SnapshotError(f"it is cut off, or takes more than {MOST_CONTENT >> 20} MB")
+            raise SnapshotError(f"it is truncated, or takes more than {MAX_CONTENT >> 20} MB")
         made_of = from_json(plain)
     except (ValueError, zlib.error) as error:
-        raise SnapshotError(f"this recording is not in order: {error}") from None
+        raise SnapshotError(f"this recording is invalid: {error}") from None
     return made_of, bytes(snapshot)
 
 
 def _world_options(context: WorldContext) -> dict[str, Any]:
-    """Arguments of `World`, beside what the snapshot holds."""
+    """Arguments of `World` that are not in the snapshot."""
     chosen = context.settings
     names = (
         "restitution",
@@ -246,17 +249,17 @@ def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
     }
 
 
-def _kept(value: Any) -> Any:
-    """A copy of an argument that nobody changes any more."""
+def _copied(value: Any) -> Any:
+    """Copy of an argument, independent of later changes by the caller."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if isinstance(value, (list, tuple)):
-        return [_kept(each) for each in value]
+        return [_copied(each) for each in value]
     return value
 
 
 def _plain(value: Any) -> Any:
-    """An argument as plain data; handles by number, assets and shapes by their digests."""
+    """An argument as plain data; handles by serial number, assets and shapes by digest."""
     if isinstance(value, Handle):
         return {"handle": serial_of(value)}
     if isinstance(value, SoftBodyAsset):

@@ -1,4 +1,4 @@
-"""Bodies put back to an earlier manifest: handles that callers hold, and new ones where nobody holds any."""
+"""Restore the bodies of a manifest: reuse handles that callers hold, and create the others."""
 
 from __future__ import annotations
 
@@ -17,80 +17,80 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
 
-def put_back(context: WorldContext, manifest: Manifest) -> None:
-    """Let time and bodies be as a manifest says, but for what fields and slices hold. Refuses nothing."""
+def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
+    """Set time and bodies to those of a manifest, except for the fields and slices. Cannot fail."""
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings
     if (manifest.gravity != settings.gravity).any() or manifest.friction != settings.friction:
-        context.become(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
-    for slot, wanted in enumerate(manifest.bodies):
-        _put_back_body(context, simulation.state, slot, wanted)
+        context.apply_settings(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
+    for slot, entry in enumerate(manifest.bodies):
+        _restore_body(context, simulation.state, slot, entry)
     simulation.was_restored()
     context.substeps.forget()
 
 
-def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyEntry | None) -> None:
-    """Put the right body into a slot, of the right material."""
+def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEntry | None) -> None:
+    """Fill a slot with the body of an entry, with its material."""
     present = context.slots.slots[slot]
-    if present is not None and (wanted is None or serial_of(present) != wanted.serial):
-        _take_out(context, state, present)
+    if present is not None and (entry is None or serial_of(present) != entry.serial):
+        _remove(context, state, present)
         present = None
-    if wanted is None:
+    if entry is None:
         return
-    if present is not None and _fills(present) != (name_of(wanted.part), wanted.level):
-        refill_slot(context, state, slot, wanted.level, wanted.arrays)
-        record_of(present).friction = None  # of its asset now
+    if present is not None and _content_of(present) != (name_of(entry.part), entry.level):
+        refill_slot(context, state, slot, entry.level, entry.arrays)
+        record_of(present).friction = None  # the asset's, since the refill
     if present is None:
-        present = _put_in(context, state, slot, wanted)
+        present = _insert(context, state, slot, entry)
     record = record_of(present)
-    if _fills(present) != (name_of(wanted.part), wanted.level):
-        record.become(wanted.part, wanted.level)
-        record.description = _before_material(present, wanted)
-    record.first_step, record.frozen_in, record.failure = wanted.first_step, wanted.failed, None
-    record.held = wanted.held
-    if as_plain(record.description.material) != as_plain(wanted.description.material):
-        write_constants(state, present, wanted.description)
-    record.description = wanted.description
-    if record.friction != wanted.friction:
-        give_friction(state, present, wanted.friction)
+    if _content_of(present) != (name_of(entry.part), entry.level):
+        record.set_topology(entry.part, entry.level)
+        record.description = _description_in_slot(present, entry)
+    record.first_step, record.frozen_in, record.failure = entry.first_step, entry.failed, None
+    record.held = entry.held
+    if as_plain(record.description.material) != as_plain(entry.description.material):
+        write_constants(state, present, entry.description)
+    record.description = entry.description
+    if record.friction != entry.friction:
+        give_friction(state, present, entry.friction)
 
 
-def _fills(body: SoftBody) -> tuple[str, int]:
-    """What of its asset is in its slot."""
+def _content_of(body: SoftBody) -> tuple[str, int]:
+    """Name of the cut mesh and level of detail in a body's slot."""
     record = record_of(body)
     return name_of(record.part), record.level
 
 
-def _take_out(context: WorldContext, state: State, body: SoftBody) -> None:
-    record, whole = record_of(body), present_asset(body).description
-    if record.description is not whole and not body.is_cut:
-        write_constants(state, body, whole)
-        record.description = whole
+def _remove(context: WorldContext, state: State, body: SoftBody) -> None:
+    record, original = record_of(body), present_asset(body).description
+    if record.description is not original and not body.is_cut:
+        write_constants(state, body, original)
+        record.description = original
     if record.friction is not None:
         give_friction(state, body, None)
     context.slots.leave(body)
     record.removed_in = context.clock.steps
 
 
-def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -> SoftBody:
-    """The handle that somebody holds of who lived there, or a new one."""
+def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) -> SoftBody:
+    """Insert a body into a free slot, with the handle that a caller holds or a new one."""
     asset = context.slots.assets[slot]
-    if wanted.part is not None or context.layout.bodies[slot] is not asset.levels[wanted.level].arrays:
-        refill_slot(context, state, slot, wanted.level, wanted.arrays)
-    body = context.handles.find(wanted.serial, SoftBody)
+    if entry.part is not None or context.layout.bodies[slot] is not asset.levels[entry.level].arrays:
+        refill_slot(context, state, slot, entry.level, entry.arrays)
+    body = context.handles.find(entry.serial, SoftBody)
     if body is None or body.index != slot or body.asset is not asset:
         body = context.make_body(context, slot, asset)
-        context.handles.enlist(body, wanted.serial)
+        context.handles.enlist(body, entry.serial)
     record = record_of(body)
     record.removed_in = None
-    if _fills(body) != (name_of(wanted.part), wanted.level):
-        record.become(wanted.part, wanted.level)
-    record.description = _before_material(body, wanted)
+    if _content_of(body) != (name_of(entry.part), entry.level):
+        record.set_topology(entry.part, entry.level)
+    record.description = _description_in_slot(body, entry)
     context.slots.enter_at(body)
     return body
 
 
-def _before_material(body: SoftBody, wanted: BodyEntry) -> BodyDescription:
-    """What a slot was filled with, before it is given another material."""
-    return present_asset(body).description if wanted.part is None else wanted.description
+def _description_in_slot(body: SoftBody, entry: BodyEntry) -> BodyDescription:
+    """Description of the body in a slot before it gets its own material."""
+    return present_asset(body).description if entry.part is None else entry.description

@@ -1,10 +1,10 @@
-"""The state of a world between two steps, as bytes and back.
+"""Convert the state of a world between two steps to bytes and back.
 
-A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
-refuses it. The *manifest* is what Python knows: time, gravity, who lives in which slot, and what each
-slice enters (colliders, frames, joints ...). The *words* are what the fields hold, bit by bit (see
-`persistence.kernels.packing`), and what cuts have left of meshes (see `bodies.cut_mesh`). The last part is
-what events go on with (see `events.event_state`).
+A snapshot has four parts. The *structure* describes how the world was built; a world of another structure
+refuses the snapshot. The *manifest* holds the state outside the fields: time, gravity, the body in each slot,
+and the entries of each slice (colliders, frames, joints ...). The *words* hold the contents of the fields,
+bit by bit (see `persistence.kernels.packing`), and the meshes of cut bodies (see `bodies.cut_mesh`). The last
+part is the state of the events (see `events.event_state`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from taichi_soft.core.container import seal, unseal
 from taichi_soft.core.errors import SnapshotError, StateError
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.serialisation import from_json, to_json
-from taichi_soft.events import Known, Memory
+from taichi_soft.events import EventState, HandleLookup
 from taichi_soft.persistence.kernels.packing import (
     BODY,
     PARTICLE,
@@ -37,7 +37,7 @@ from taichi_soft.persistence.kernels.packing import (
     row_table,
 )
 from taichi_soft.persistence.manifest import Manifest, read_manifest, read_parts, write_manifest
-from taichi_soft.persistence.restoring import put_back
+from taichi_soft.persistence.restoring import restore_bodies
 from taichi_soft.persistence.world_structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
@@ -48,40 +48,40 @@ Words = NDArray[np.int32]
 
 
 def take_snapshot(context: WorldContext) -> bytes:
-    """As `World.snapshot`."""
+    """See `World.snapshot`."""
     state = context.built.state
     manifest = write_manifest(context)
     table = _table(context, manifest["slices"])
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
-    parts = [record_of(body).part for body in context.slots.living]
+    parts = [record_of(body).part for body in context.slots.occupants]
     words = np.concatenate([words, *(part.rows for part in parts if part is not None)])
-    memory = to_json(context.built.events.remember().plain)
-    content = [to_json(manifest), words.astype("<i4").tobytes(), memory]
+    event_part = to_json(context.built.events.save().plain)
+    content = [to_json(manifest), words.astype("<i4").tobytes(), event_part]
     return seal(MARK, VERSION, [_structure(context), *content])
 
 
 def _structure(context: WorldContext) -> bytes:
-    """What a snapshot's world must be built of: as `structure_of`, worked out once."""
+    """Structure of a world, from `structure_of`, cached."""
     if not context.structure:
         context.structure = structure_of(context)
     return context.structure
 
 
 def state_hash(context: WorldContext) -> str:
-    """As `World.state_hash`."""
+    """See `World.state_hash`."""
     code = int(hash_bodies(context.built.state, len(context.slots.slots)))
     return blake2b(to_json([code, write_manifest(context)]), digest_size=8).hexdigest()
 
 
 def bodies_hash(context: WorldContext) -> str:
-    """As `World.bodies_hash`."""
+    """See `World.bodies_hash`."""
     code = int(hash_bodies(context.built.state, len(context.slots.slots)))
     return f"{code % 2**64:016x}"
 
 
 def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
-    """Where the words of each group of fields are, by what slices have entered in a manifest."""
+    """Layout of the words of each group of fields, for the entries of the slices in a manifest."""
     state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
     of_slices = {each.name: each for each in context.slices}
     counts = [count for name in state.carried for count in of_slices[name].row_counts(entries[name])]
@@ -89,35 +89,35 @@ def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
 
 
 def carried_rows(context: WorldContext) -> list[int]:
-    """How many rows of each group of fields a snapshot has: of its `owners`, in their order."""
+    """Number of rows of each group of fields in a snapshot, in the order of `owners`."""
     rows: list[int] = _table(context, write_manifest(context)["slices"])[:-1, 0].tolist()
     return rows
 
 
 def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = False) -> None:
-    """As `World.restore`.
+    """See `World.restore`.
 
-    Args: keeps_events: no step was made since, so the events that wait are not undone.
+    Args: keeps_events: True if no step was made since, so that the queued events stay.
     """
     state = context.built.state
-    structure, content, rows, remembered = _four(unseal(data, MARK, VERSION, "snapshot"))
+    structure, content, rows, event_part = _four_parts(unseal(data, MARK, VERSION, "snapshot"))
     require_structure(bytes(structure), _structure(context))
     plain = from_json(content)
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
         table = _table(context, plain["slices"])
         if len(words) < table[-1, 2]:
-            raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
+            raise ValueError(f"it has {len(words)} words, but this world needs {table[-1, 2]}")
         parts = read_parts(context, plain["bodies"], words[table[-1, 2] :])
         words = words[: table[-1, 2]]
         manifest = read_manifest(context, plain, parts)
-        memory = Memory.of(from_json(remembered), len(context.slots.slots))
+        event_state = EventState.of(from_json(event_part), len(context.slots.slots))
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
-        raise SnapshotError(f"this snapshot is not in order: {error}") from None
+        raise SnapshotError(f"this snapshot is invalid: {error}") from None
     _require_words(context, manifest, table, words)
-    put_back(context, manifest)
+    restore_bodies(context, manifest)
     for each in context.slices:
         each.clear()
     copy_state(state, table, words, False)
@@ -125,20 +125,20 @@ def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = F
         each.restore(manifest.slices[each.name])
     context.handles.count = manifest.handles
     find = context.handles.find
-    known = Known(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
+    lookup = HandleLookup(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
     if not keeps_events:
-        context.built.events.forget_since(manifest.steps)
-    context.built.events.recall(memory, manifest.steps, known)
+        context.built.events.drop_since(manifest.steps)
+    context.built.events.restore(event_state, manifest.steps, lookup)
 
 
-def _four(parts: list[memoryview]) -> list[memoryview]:
+def _four_parts(parts: list[memoryview]) -> list[memoryview]:
     if len(parts) != 4:
-        raise SnapshotError(f"this snapshot has {len(parts)} parts instead of 4")
+        raise SnapshotError(f"this snapshot is invalid: it has {len(parts)} parts instead of 4")
     return parts
 
 
 def _require_words(context: WorldContext, manifest: Manifest, table: Words, words: Words) -> None:
-    """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
+    """Check the fields. Raises: SnapshotError for indices out of range and for values that are not finite."""
     state = context.built.state
     limits: list[tuple[int, Any, int]] = [
         (BODY, state.body_status, ABSENT + 1),
@@ -148,9 +148,7 @@ def _require_words(context: WorldContext, manifest: Manifest, table: Words, word
     for owner, field, limit in limits:
         rows = _rows(table, words, state, owner, field)
         if rows.size and not (rows.min() >= 0 and rows.max() < limit):
-            raise SnapshotError(
-                "this snapshot is not in order: it names particles or bodies that there are not"
-            )
+            raise SnapshotError("this snapshot is invalid: it names particles or bodies that do not exist")
     bounds: list[tuple[Any, float]] = [
         (state.particle_position, POSITION_LIMIT),
         (state.particle_velocity, VELOCITY_LIMIT),
@@ -158,22 +156,22 @@ def _require_words(context: WorldContext, manifest: Manifest, table: Words, word
     for field, highest in bounds:
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
-            raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")
-    for owner, field in steering(state):
+            raise SnapshotError("this snapshot is invalid: particles are out of range, or not finite")
+    for owner, field in finite_fields(state):
         if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
-            raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
+            raise SnapshotError("this snapshot is invalid: velocities, forces or masses are not finite")
     for each in context.slices:
         try:
             each.require(manifest.slices[each.name], partial(_field_rows, table, words, state))
         except ValueError as error:
-            raise SnapshotError(f"this snapshot is not in order: {error}") from None
-    lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
-    if lives.tolist() != [body is not None for body in manifest.bodies]:
-        raise SnapshotError("this snapshot is not in order: it is not sure who lives")
+            raise SnapshotError(f"this snapshot is invalid: {error}") from None
+    is_present = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
+    if is_present.tolist() != [body is not None for body in manifest.bodies]:
+        raise SnapshotError("this snapshot is invalid: its fields and its manifest name different bodies")
 
 
-def steering(state: State) -> list[tuple[int, Any]]:
-    """Fields of real numbers that the next step begins with, beside positions and velocities."""
+def finite_fields(state: State) -> list[tuple[int, Any]]:
+    """Fields of floats that the next step reads, except positions and velocities; they must be finite."""
     particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
     particle += [state.particle_target, state.particle_push]
     body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping, state.body_sound_speed]
@@ -184,17 +182,17 @@ def steering(state: State) -> list[tuple[int, Any]]:
 
 
 def _field_rows(table: Words, words: Words, state: State, field: Any) -> NDArray[Any]:
-    """What a snapshot holds for a field of a slice, (rows, width), in the field's type."""
+    """Values of a slice's field in a snapshot, (rows, width), in the field's type."""
     owner = next(each for each in owners(state) if any(f is field for f, _, _ in carried(state, each)))
     rows = _rows(table, words, state, owner, field)
     return rows if field.dtype == ti.i32 else rows.view(np.float32)
 
 
-def _rows(table: Words, words: Words, state: State, owner: int, wanted: Any) -> Words:
-    """What a snapshot holds for a field, (rows, width)."""
+def _rows(table: Words, words: Words, state: State, owner: int, requested: Any) -> Words:
+    """Words of a field in a snapshot, (rows, width)."""
     count, width, begin = table[owner].tolist()
     rows = words[begin : begin + count * width].reshape(count, width)
     for field, column, size in carried(state, owner):
-        if field is wanted:
+        if field is requested:
             return np.ascontiguousarray(rows[:, column : column + size])
     raise KeyError(owner)

@@ -1,4 +1,4 @@
-"""What a world was built of, as plain data: a snapshot fits worlds of the same structure only."""
+"""Structure of a world as plain data: a snapshot fits only worlds of the same structure."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from taichi_soft.solver.context import WorldContext
 
 
 def structure_of(context: WorldContext) -> bytes:
-    """What a snapshot's world must be built of, as JSON."""
-    # Gravity and the floor's friction may be set, and are in the manifest.
+    """Structure of a world, as JSON."""
+    # Gravity and the floor's friction can change, and are in the manifest.
     settings = {
         name: as_plain(value)
         for name, value in asdict(context.settings).items()
@@ -27,7 +27,7 @@ def structure_of(context: WorldContext) -> bytes:
         {
             "package": _package_version(),
             "slices": [each.name for each in context.slices],
-            # The rooms may be another world's, and follow from the bodies.
+            # The sizes of the fields follow from the bodies, and can be larger in a reused set of fields.
             "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
             "soft_contact": context.contact.soft,
             "sleep_speed": context.contact.sleep_speed,
@@ -45,7 +45,7 @@ def _package_version() -> str:
 
 
 def asset_digest(asset: SoftBodyAsset) -> str:
-    """A name of what an asset is made of."""
+    """Digest of an asset's mesh, material and options."""
     described = asset.description
     model = described.model
     parts = [model.law.name, model.strain, model.flips, model.damping_model]
@@ -60,15 +60,15 @@ def asset_digest(asset: SoftBodyAsset) -> str:
     return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
 
 
-def require_structure(theirs: bytes, ours: bytes) -> None:
-    """Raises: SnapshotError with the first thing that differs."""
-    if theirs == ours:
+def require_structure(saved_bytes: bytes, expected_bytes: bytes) -> None:
+    """Check that two structures are equal. Raises: SnapshotError with the first difference."""
+    if saved_bytes == expected_bytes:
         return
-    made_of, mine = from_json(theirs), from_json(ours)
-    if not isinstance(made_of, dict):
-        raise SnapshotError("this snapshot does not say what its world was built of")
-    for name, value in mine.items():
-        other = made_of.get(name)
+    saved, expected = from_json(saved_bytes), from_json(expected_bytes)
+    if not isinstance(saved, dict):
+        raise SnapshotError("this snapshot is invalid: it has no structure of its world")
+    for name, value in expected.items():
+        other = saved.get(name)
         if other == value:
             continue
         if name == "bodies" and isinstance(other, list) and len(other) == len(value):
@@ -80,7 +80,7 @@ def require_structure(theirs: bytes, ours: bytes) -> None:
         if name == "bodies" and isinstance(other, list):
             value, other = len(value), len(other)
         raise SnapshotError(
-            f"this snapshot is of another world: its {name} is {str(other)[:200]}, here it is "
+            f"this snapshot is of another world: its {name} is {str(other)[:200]}, but this world has "
             f"{str(value)[:200]}"
         )
     raise SnapshotError("this snapshot is of another world")

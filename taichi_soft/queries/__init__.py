@@ -1,4 +1,4 @@
-"""Questions to bodies, as they are after the last step. Nothing is changed."""
+"""Queries on bodies in their state after the last step. Queries change nothing."""
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
 from taichi_soft.queries.closest import ClosestPoint, find_closest_point

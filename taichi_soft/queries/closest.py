@@ -1,4 +1,4 @@
-"""The point of the deformed surfaces that is nearest to a given one."""
+"""Closest point on the deformed surfaces."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_vector
 from taichi_soft.queries.kernels import find_closest
-from taichi_soft.queries.query import as_chosen, as_reach, just_beyond, read_answer
+from taichi_soft.queries.query import as_body_indices, as_max_distance, next_above, unpack_result
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoint:
-    """The point of all surfaces that is nearest to a given one."""
+    """The point of all surfaces that is closest to a given point."""
 
-    body: SoftBody  # that has the point
+    body: SoftBody  # body that has the point
     triangle: int | None  # row of body.surface; None for a body without triangles
-    vertices: NDArray[np.int32]  # (3,) of that triangle, or the nearest vertex three times
+    vertices: NDArray[np.int32]  # (3,) corners of that triangle, or the nearest vertex three times
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
     distance: float  # [m], never negative
     point: Floats  # (3,) [m]
-    normal: Floats  # (3,) of the triangle, unit length, outward; of one without area, towards the given point
-    is_inside: bool  # whether the given point lies inside this body
+    normal: Floats  # (3,) outward unit normal; for a triangle without area, towards the given point
+    is_inside: bool  # True if the given point lies inside this body
 
 
 def find_closest_point(
@@ -38,16 +38,16 @@ def find_closest_point(
     max_distance: float,
     bodies: Iterable[SoftBody] | None,
 ) -> ClosestPoint | None:
-    """The nearest point of all surfaces. Raises: OptionError, see `World.closest_point`."""
-    asked = np.empty(4, dtype=np.float32)
-    asked[:3] = as_vector(point, "point", "m")
-    reach = as_reach(max_distance)
-    asked[3] = just_beyond(reach * reach)
+    """Find the closest point of all surfaces. Raises: OptionError, see `World.closest_point`."""
+    query = np.empty(4, dtype=np.float32)
+    query[:3] = as_vector(point, "point", "m")
+    limit = as_max_distance(max_distance)
+    query[3] = next_above(limit * limit)
     found = np.full((1, 13), -1.0, dtype=np.float32)
-    chosen = as_chosen(bodies, handles)
+    chosen = as_body_indices(bodies, handles)
     if len(chosen):
-        find_closest(state, chosen, asked, found)
-    index, face, distance, weights, nearest, normal = read_answer(found[0])
+        find_closest(state, chosen, query, found)
+    index, face, distance, weights, nearest, normal = unpack_result(found[0])
     if index < 0:
         return None
     body = handles[index]

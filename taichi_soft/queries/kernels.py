@@ -1,10 +1,10 @@
-"""What the surfaces of bodies are asked between steps: rays, nearest points, overlaps. Nothing is changed.
+"""Kernels for queries between steps: rays, closest points, overlaps. They change nothing.
 
-Bodies are asked in ascending order and only a nearer answer replaces one: of equals the first body's first
-face counts, whatever the number of threads.
+Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. So the first
+face of the first body wins a tie, for any number of threads.
 """
 
-from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_place
+from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_result
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle, pierce_triangle, triangle_touches_box
@@ -13,7 +13,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def axes_across(d):
-    """Two axes that form a right-handed frame with a unit vector. Duff et al. 2017."""
+    """Two axes that complete a unit vector to a right-handed frame, by Duff et al. 2017."""
     sign = ti.select(d.z < 0.0, -1.0, 1.0)
     s = -1.0 / (sign + d.z)
     right = ti.Vector([1.0 + sign * d.x * d.x * s, sign * d.x * d.y * s, -sign * d.x])
@@ -22,7 +22,7 @@ def axes_across(d):
 
 @ti.func
 def entry_of(lower, upper, inv_direction):
-    """How far along a ray from the origin a box begins [m]; farther than any ray goes where it is missed."""
+    """Distance along a ray from the origin to a box [m]; larger than any ray's limit if it misses."""
     slack = 2e-6 * ti.max(ti.abs(lower).max(), ti.abs(upper).max())
     one, other = (lower - slack) * inv_direction, (upper + slack) * inv_direction
     near, far = ti.min(one, other).max(), ti.max(one, other).min()
@@ -37,12 +37,12 @@ def find_hits(
     rays: ti.types.ndarray(dtype=ti.f32, ndim=2),
     hits: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """The nearest hit of each ray.
+    """Find the nearest hit of each ray.
 
     Args:
-        bodies: that can be hit, ascending.
-        rays: (n, 8): origin [m], unit direction, farthest distance [m] and 1 to pass through back faces.
-        hits: (n, 12), see `write_place`; a ray that hits nothing leaves its row alone.
+        bodies: bodies to test, ascending.
+        rays: (n, 8): origin [m], unit direction, largest distance [m], 1 to ignore back faces.
+        hits: (n, 12), see `write_result`; the row of a ray that hits nothing stays unchanged.
     """
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
@@ -73,27 +73,27 @@ def find_hits(
                         best, best_body, best_face, weights = distance, body, face, w
                     face = row_behind(face)
         if best_body >= 0:
-            write_place(state, r, hits, best_body, best_face, weights, best, d)
+            write_result(state, r, hits, best_body, best_face, weights, best, d)
 
 
 @ti.kernel
 def find_closest(
     state: ti.template(),
     bodies: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    asked: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    query: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """The nearest point of all surfaces.
+    """Find the closest point of all surfaces.
 
     Args:
-        bodies: that are asked, ascending.
-        asked: (4,): point [m] and square of the farthest distance [m^2].
-        found: (1, 13), see `write_place`, and 1 for inside; left alone where nothing is near enough.
+        bodies: bodies to test, ascending.
+        query: (4,): point [m] and square of the largest distance [m^2].
+        found: (1, 13), see `write_result`, then 1 if the point is inside; unchanged if nothing is in range.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        x = ti.Vector([asked[0], asked[1], asked[2]])
-        best, best_body, best_face = asked[3], -1, -1
+        x = ti.Vector([query[0], query[1], query[2]])
+        best, best_body, best_face = query[3], -1, -1
         weights, away = ti.Vector.zero(state.real, 3), ti.Vector.zero(state.real, 3)
         is_in_box = False
         for i in range(bodies.shape[0]):
@@ -109,7 +109,7 @@ def find_closest(
                         best, best_body, best_face, weights, away = gap.dot(gap), body, face, w, -gap
                         is_in_box = beyond.max() == 0.0
         if best_body >= 0:
-            write_place(state, 0, found, best_body, best_face, weights, ti.sqrt(best), away)
+            write_result(state, 0, found, best_body, best_face, weights, ti.sqrt(best), away)
             found[0, 12] = 0.0
             if is_in_box and is_inside(state, best_body, x):
                 found[0, 12] = 1.0
@@ -117,7 +117,7 @@ def find_closest(
 
 @ti.func
 def shape_contains(size, is_box, x):
-    """Whether a point, as seen from a shape's centre along its axes, lies in it or on its surface."""
+    """True if a point, in the shape's own axes about its centre, lies in the shape or on its surface."""
     beyond = (ti.abs(x) - 0.5 * size).max()
     if is_box == 0:
         beyond = x.dot(x) - size.x * size.x
@@ -126,7 +126,7 @@ def shape_contains(size, is_box, x):
 
 @ti.func
 def shape_touches(size, is_box, a, b, c):
-    """Whether a triangle, as seen from a shape's centre along its axes, touches it."""
+    """True if a triangle, in the shape's own axes about its centre, touches the shape."""
     touches = False
     if is_box != 0:
         touches = triangle_touches_box(a, b, c, 0.5 * size)
@@ -146,13 +146,13 @@ def find_overlaps(
     first_vertex: ti.types.ndarray(dtype=ti.i32, ndim=1),
     inside: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Which of some bodies touch a sphere or a box, or enclose it.
+    """Find the bodies that touch or enclose a sphere or a box.
 
     Args:
-        bodies: to ask, by number.
-        shape: (5, 3): centre [m]; the box's axes, one a row; its size, or the sphere's radius thrice [m].
-        first_vertex: of each body that does, its place in `inside`; left alone for others.
-        inside: 1 for each vertex, in the caller's order, that lies in the shape; left alone for others.
+        bodies: indices of the bodies to test.
+        shape: (5, 3): centre [m]; axes of the box in rows; its size, or the sphere's radius three times [m].
+        first_vertex: start in `inside` of each body that overlaps; unchanged for others.
+        inside: 1 for each vertex, in the caller's order, that lies in the shape; unchanged for others.
     """
     ti.loop_config(serialize=True)
     for row in range(bodies.shape[0]):
@@ -160,11 +160,11 @@ def find_overlaps(
         center = ti.Vector([shape[0, k] for k in range(3)])
         axes = ti.Matrix([[shape[1 + j, k] for k in range(3)] for j in range(3)])
         size = ti.Vector([shape[4, k] for k in range(3)])
-        reach = ti.abs(axes.transpose()) @ (ti.select(is_box != 0, 0.5, 1.0) * size)
+        half_extent = ti.abs(axes.transpose()) @ (ti.select(is_box != 0, 0.5, 1.0) * size)
         lower, upper = box_around(state, body)
-        is_near = ti.min(upper - center + reach, reach - lower + center).min() >= 0.0
+        boxes_overlap = ti.min(upper - center + half_extent, half_extent - lower + center).min() >= 0.0
         touches = 0
-        if is_near and state.body_status[body] != ABSENT:
+        if boxes_overlap and state.body_status[body] != ABSENT:
             particles = state.body_particles[body]
             for i in range(particles[0], particles[1]):
                 x = axes @ (state.particle_position[state.particle_of_vertex[i]] - center)

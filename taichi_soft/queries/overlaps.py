@@ -15,19 +15,19 @@ from taichi_soft.core.checks import as_number, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.kernels import find_overlaps
-from taichi_soft.queries.query import as_chosen
+from taichi_soft.queries.query import as_body_indices
 
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
     """A body that touches a shape."""
 
-    body: SoftBody  # that touches the shape
-    vertices: NDArray[np.int32]  # that lie in the shape, ascending; none where a face or the whole body does
+    body: SoftBody  # the body that overlaps the shape
+    vertices: NDArray[np.int32]  # inside the shape, ascending; empty if only a face or the interior overlaps
 
 
-SMALLEST = 1e-9
-"""Least size of a shape [m]: squares of smaller lengths run out of float32's range."""
+MIN_SIZE = 1e-9
+"""Smallest size of a shape [m]: squares of smaller lengths underflow in float32."""
 
 
 def find_in_sphere(
@@ -37,11 +37,11 @@ def find_in_sphere(
     radius: float,
     bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
-    """Bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
+    """Find the bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = np.eye(3)
-    shape[4] = as_number(radius, "radius", SMALLEST, POSITION_LIMIT, "a length above 0 m")
+    shape[4] = as_number(radius, "radius", MIN_SIZE, POSITION_LIMIT, "a length above 0 m")
     return _overlaps(state, handles, False, shape, bodies)
 
 
@@ -53,12 +53,12 @@ def find_in_box(
     rotation: Any,
     bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
-    """Bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
+    """Find the bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = as_rotation(rotation).T
     lengths = as_vector(size, "size", "m")
-    if not (lengths >= SMALLEST).all():
+    if not (lengths >= MIN_SIZE).all():
         raise OptionError(f"size must be three lengths above 0 m, got {lengths.tolist()}")
     shape[4] = lengths
     return _overlaps(state, handles, True, shape, bodies)
@@ -73,7 +73,7 @@ def _overlaps(
 ) -> tuple[Overlap, ...]:
     first_vertex = np.full(len(handles), -1, dtype=np.int32)
     inside = np.zeros(state.capacity.particles, dtype=np.int32)
-    chosen = as_chosen(bodies, handles)
+    chosen = as_body_indices(bodies, handles)
     if len(chosen):
         find_overlaps(state, int(is_box), chosen, shape, first_vertex, inside)
     overlaps = []

@@ -1,4 +1,4 @@
-"""What all queries share: limits of distance, the bodies asked, and how kernels write an answer."""
+"""Helpers that all queries share: checks of arguments, and the layout of results."""
 
 from __future__ import annotations
 
@@ -14,38 +14,40 @@ from taichi_soft.core.errors import OptionError
 
 Floats = NDArray[np.float64]
 
-_ENDLESS = 3e38
-"""Stands for no limit [m or m^2]: kernels need not know infinity."""
+_UNLIMITED = 3e38
+"""Stands for no limit [m or m^2], because the kernels do not handle infinity."""
 
 
-def as_reach(max_distance: float) -> float:
-    """A distance above 0; infinity stays what it is. Raises: OptionError."""
+def as_max_distance(max_distance: float) -> float:
+    """Check a largest distance [m]: above 0, or infinity. Raises: OptionError."""
     if isinstance(max_distance, (float, np.floating)) and max_distance == math.inf:
         return math.inf
-    reach = as_number(max_distance, "max_distance", 0.0, math.inf, "a number above 0 m, or infinity")
-    if reach == 0.0:
+    limit = as_number(max_distance, "max_distance", 0.0, math.inf, "a number above 0 m, or infinity")
+    if limit == 0.0:
         raise OptionError("max_distance must be a number above 0 m, or infinity, got 0")
-    return reach
+    return limit
 
 
-def just_beyond(limit: float) -> float:
-    """The least float32 above: kernels take what is nearer, and the limit itself still counts."""
-    return float(np.nextafter(np.float32(min(limit, _ENDLESS)), np.float32(np.inf)))
+def next_above(limit: float) -> float:
+    """Next float32 above a limit: kernels accept smaller distances only, and the limit itself must count."""
+    return float(np.nextafter(np.float32(min(limit, _UNLIMITED)), np.float32(np.inf)))
 
 
-def as_chosen(bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None]) -> NDArray[np.int32]:
-    """Indices of the bodies asked, ascending; all for None. Raises: OptionError.
+def as_body_indices(
+    bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None]
+) -> NDArray[np.int32]:
+    """Indices of the bodies to test, ascending; all bodies for None. Raises: OptionError.
 
-    `handles`: the body in each slot, None where there is none.
+    Args: handles: the body in each slot, None for an empty slot.
     """
     if bodies is None:
         return np.array([body.index for body in handles if body is not None], dtype=np.int32)
     try:
-        asked = list(bodies)
+        requested = list(bodies)
     except TypeError:
         raise OptionError(f"bodies must be a list of this world's bodies or None, got {bodies!r}") from None
     chosen = set()
-    for body in asked:
+    for body in requested:
         index = getattr(body, "index", None)
         if not isinstance(index, int) or not 0 <= index < len(handles) or handles[index] is not body:
             raise OptionError(f"bodies must be a list of this world's bodies or None, but one is {body!r}")
@@ -53,7 +55,7 @@ def as_chosen(bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | No
     return np.array(sorted(chosen), dtype=np.int32)
 
 
-def read_answer(row: NDArray[np.float32]) -> tuple[int, int, float, Floats, Floats, Floats]:
-    """SoftBody, face, distance, weights, point and normal."""
+def unpack_result(row: NDArray[np.float32]) -> tuple[int, int, float, Floats, Floats, Floats]:
+    """Unpack body, face, distance, weights, point and normal from a row of `write_result`."""
     real = row.astype(np.float64)
     return int(real[10]), int(real[11]), float(real[0]), real[1:4], real[4:7], real[7:10]

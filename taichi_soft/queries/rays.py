@@ -1,4 +1,4 @@
-"""Rays against the deformed surfaces."""
+"""Ray casts against the deformed surfaces."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.kernels import find_hits
-from taichi_soft.queries.query import as_chosen, as_reach, just_beyond, read_answer
+from taichi_soft.queries.query import as_body_indices, as_max_distance, next_above, unpack_result
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class RayHit:
-    """Where a ray meets a surface first."""
+    """First intersection of a ray with a surface."""
 
-    body: SoftBody  # that is hit
+    body: SoftBody  # the body that was hit
     triangle: int  # row of body.surface
     vertices: NDArray[np.int32]  # (3,) of that triangle
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
@@ -34,10 +34,10 @@ class RayHit:
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
-    """Where each of n rays meets a surface first.
+    """First intersections of n rays with the surfaces.
 
-    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the rest. `body` numbers
-    slots: another body may take one once this is despawned, so look handles up before the next change.
+    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the other arrays. `body`
+    contains slots, and a slot can be reused after a despawn. Look up the bodies before the next change.
     """
 
     body: NDArray[np.int32]  # (n,) body.index
@@ -57,12 +57,12 @@ def cast_ray(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHit | None:
-    """The first hit of one ray. Raises: OptionError, see `World.raycast`."""
+    """Find the first hit of one ray. Raises: OptionError, see `World.raycast`."""
     rays = np.empty((1, 8), dtype=np.float32)
     rays[0, :3] = as_vector(origin, "origin", "m")
-    rays[0, 3:6] = _as_directions(as_array(direction, "direction", (3,))[None], "direction")
+    rays[0, 3:6] = _unit_directions(as_array(direction, "direction", (3,))[None], "direction")
     hits = _hits(state, handles, rays, max_distance, bodies, cull_back)
-    body, face, distance, weights, point, normal = read_answer(hits[0])
+    body, face, distance, weights, point, normal = unpack_result(hits[0])
     if body < 0:
         return None
     hit = handles[body]
@@ -79,14 +79,14 @@ def cast_rays(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHits:
-    """The first hit of each ray. Raises: OptionError, see `World.raycasts`."""
+    """Find the first hit of each ray. Raises: OptionError, see `World.raycasts`."""
     starts = as_array(origins, "origins", (None, 3), "m")
-    ways = as_array(directions, "directions", (len(starts), 3))
+    vectors = as_array(directions, "directions", (len(starts), 3))
     if len(starts) and not np.abs(starts).max() < POSITION_LIMIT:
         raise OptionError(f"origins must lie within {POSITION_LIMIT:g} m of zero")
     rays = np.empty((len(starts), 8), dtype=np.float32)
     rays[:, :3] = starts
-    rays[:, 3:6] = _as_directions(ways, "directions")
+    rays[:, 3:6] = _unit_directions(vectors, "directions")
     hits = _hits(state, handles, rays, max_distance, bodies, cull_back).astype(np.float64)
     missed = hits[:, 10] < 0
     hits[missed, 0], hits[missed, 1:10] = np.inf, np.nan
@@ -102,27 +102,27 @@ def _hits(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> NDArray[np.float32]:
-    """One row for each ray, see `write_place`; body -1 where it hits nothing."""
+    """Results of `write_result`, one row for each ray; body -1 for a ray that hits nothing."""
     if not isinstance(cull_back, (bool, np.bool_)):
         raise OptionError(f"cull_back must be True or False, got {cull_back!r}")
-    rays[:, 6] = just_beyond(as_reach(max_distance))
+    rays[:, 6] = next_above(as_max_distance(max_distance))
     rays[:, 7] = cull_back
     hits = np.full((len(rays), 12), -1.0, dtype=np.float32)
-    chosen = as_chosen(bodies, handles)
+    chosen = as_body_indices(bodies, handles)
     if len(rays) and len(chosen):
-        find_hits(state, len(rays) < _FEWEST_SHARED, chosen, rays, hits)
+        find_hits(state, len(rays) < _MIN_PARALLEL_RAYS, chosen, rays, hits)
     return hits
 
 
-_FEWEST_SHARED = 32
-"""Rays from which on threads share them: waking them costs as much as some rays."""
+_MIN_PARALLEL_RAYS = 32
+"""Fewest rays for which several threads are used: waking the threads costs as much as about 30 rays."""
 
 
-def _as_directions(rows: Floats, name: str) -> Floats:
-    """Rows of length 1. Raises: OptionError for one of zero length."""
+def _unit_directions(rows: Floats, name: str) -> Floats:
+    """Scale rows to length 1. Raises: OptionError for a row of length zero."""
     largest = np.abs(rows).max(axis=1, initial=0.0)
     if not largest.all():
         which = f" {int(largest.argmin())}" if len(rows) > 1 else ""
-        raise OptionError(f"{name}{which} has zero length: a ray needs a direction")
-    scaled = rows / largest[:, None]  # whose squares neither vanish nor overflow
+        raise OptionError(f"{name}{which} has zero length: pass a direction of any other length")
+    scaled = rows / largest[:, None]  # so that the squares neither underflow nor overflow
     return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.core.checks import as_array, to_array
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
-from taichi_soft.meshing.creases import ROUND, split_at_creases
+from taichi_soft.meshing.creases import DEFAULT_CREASE, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
@@ -64,7 +64,7 @@ class Surface:
         self.looks = codes
         # Only vertices on the surface are projected and lit, those on sharp edges once per side.
         if normals is None:
-            self._used, self.triangles = split_at_creases(first, corners, ROUND)
+            self._used, self.triangles = split_at_creases(first, corners, DEFAULT_CREASE)
         else:
             self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
             if self.look is Look.CLOTH:  # whose back has vertices of its own, with normals the other way

@@ -99,7 +99,7 @@ class Simulation:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False
         for body, pieces in self.tears.tear():
-            self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
+            self.events.record_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
 
     def trial_step(self, seconds: float) -> None:
@@ -121,13 +121,13 @@ class Simulation:
         if self.settings.is_implicit:
             finer, is_braked = MOST_PIECES, False
         status = self.state.body_status.to_numpy()
-        for body in self.pools.living:
+        for body in self.pools.occupants:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
             record_of(body).frozen_in = FailedStep(
                 clock.steps, clock.time, finer * substeps, h / finer, is_braked
             )
-            self.events.note_frozen(body)
+            self.events.record_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
                 f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"
@@ -148,7 +148,7 @@ class Simulation:
     def check_shapes(self) -> None:
         """Warn of bodies that keep tetrahedra inside out, once of each."""
         patience = self.state.body_patience.to_numpy()
-        for body in self.pools.living:
+        for body in self.pools.occupants:
             index = body.index
             if patience[index] < REPORTED or index in self._inverted or body.is_frozen:
                 continue
@@ -165,7 +165,7 @@ class Simulation:
         if not self.settings.is_implicit:
             return
         residuals = self.state.body_residual.to_numpy()
-        for body in self.pools.living:
+        for body in self.pools.occupants:
             index = body.index
             is_exact = residuals[index] <= self.settings.tolerance
             if is_exact or index in self._warned or body.is_frozen:
@@ -182,7 +182,7 @@ class Simulation:
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
         """Let a body begin in an empty slot, as `rows` say (see `SoftBodyAsset.placed`)."""
         spawn_body(self.state, slot, rows)
-        self.has_changed()
+        self.mark_changed()
 
     def empty(self, slot: int) -> None:
         """Take the body in a slot out of the fields."""
@@ -196,7 +196,7 @@ class Simulation:
         if slots:
             skip_bodies(self.state, np.array(slots, dtype=np.int32))
             self._skips = True
-            self.has_changed()
+            self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
         """Bodies that the last step moved together, by slot; who came since then is alone."""
@@ -204,7 +204,7 @@ class Simulation:
         if self.program.has_contact:
             read_islands(self.state, numbers)
         found: dict[int, list[SoftBody]] = {}
-        for body in self.pools.living:
+        for body in self.pools.occupants:
             is_new = record_of(body).first_step == self.clock.steps
             found.setdefault(-1 - body.index if is_new else int(numbers[body.index]), []).append(body)
         return [tuple(bodies) for bodies in found.values()]
@@ -243,17 +243,17 @@ class Simulation:
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, *arguments) that changes a body, or all for -1: the way of all control."""
         found = self.attempt(kernel, *arguments)
-        self.rouse(slot)
+        self.mark_modified(slot)
         return found
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until `rouse` is called."""
+        """Call a kernel (state, *arguments) that can refuse. Bodies stay asleep until `mark_modified`."""
         return kernel(self.state, *arguments)
 
-    def rouse(self, slot: int) -> None:
+    def mark_modified(self, slot: int) -> None:
         """Take note that control has changed a body, or all for -1."""
         self.wake(slot)
-        self.has_changed()
+        self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
@@ -263,8 +263,8 @@ class Simulation:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         left = self.box_of(body)
         write_motion(self.state, body.index, x, v)
-        self.was_placed(body)
-        self.rouse(body.index)
+        self.on_placed(body)
+        self.mark_modified(body.index)
         self.wake_near(*left)
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
@@ -292,31 +292,31 @@ class Simulation:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
             require_clear(others, present_asset(body), points, f"body {body.index}")
 
-    def joints_have_changed(self) -> None:
+    def mark_joints_changed(self) -> None:
         """Let bodies that are joined be stepped together, where no step finds out by itself."""
         if self.program.has_contact and not self.program.has_soft_contact:
             list_joined_islands(self.state, len(self.pools.slots))
 
-    def become(self, settings: Settings) -> None:
+    def apply_settings(self, settings: Settings) -> None:
         """Have other gravity, or another friction of the floor."""
         self.settings = self.readout.settings = settings
         self.state.write_surroundings(settings)
 
-    def was_placed(self, body: SoftBody) -> None:
+    def on_placed(self, body: SoftBody) -> None:
         """Look for bodies that a body overlaps, in the next step."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
 
-    def was_cut(self, body: SoftBody) -> None:
+    def on_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
         self.events.renew_watches(body)
 
     def was_restored(self) -> None:
         """Take note that the fields are those of a snapshot."""
         self._skips = True
-        self.has_changed()
+        self.mark_changed()
 
-    def has_changed(self) -> None:
+    def mark_changed(self) -> None:
         """Take note that the fields were written to."""
         self._is_still = False
         self.readout.has_moved()

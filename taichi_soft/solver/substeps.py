@@ -81,7 +81,7 @@ class Substeps:
         if self._is_implicit:
             return (0.999, SOFT_CONTACT_STEP) if self._soft_contact else (1.0, math.inf)
         longest = min(each.stable_step.recommended for asset in self._pools.kinds for each in asset.levels)
-        for body in self._pools.living:
+        for body in self._pools.occupants:
             if record_of(body).description is not present_asset(body).description:
                 longest = min(longest, self.stable_step(body).recommended)
         return 1.0, longest
@@ -117,7 +117,7 @@ class Substeps:
     def _stiffest(self) -> tuple[int, StableStep]:
         """The slot that needs the shortest substeps, and these."""
         found = [(asset.stable_step, slot) for slot, asset in enumerate(self._pools.assets)]
-        found += [(self.stable_step(body), body.index) for body in self._pools.living]
+        found += [(self.stable_step(body), body.index) for body in self._pools.occupants]
         step, slot = min(found, key=lambda each: each[0].limit)
         return slot, step
 
@@ -164,7 +164,7 @@ class Substeps:
 
     def renew(self) -> None:
         """Take note that a body is made of something else."""
-        used = {record_of(each).description for each in self._pools.living}
+        used = {record_of(each).description for each in self._pools.occupants}
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
         if self._asked[1:2] == (None,):  # whose number was chosen for what was there before
             self.forget()

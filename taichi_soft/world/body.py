@@ -19,7 +19,7 @@ from taichi_soft.core.handles import recorded
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
 from taichi_soft.levels.level_change import set_level
-from taichi_soft.meshing.creases import ROUND
+from taichi_soft.meshing.creases import DEFAULT_CREASE
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body_control import BodyControl
 from taichi_soft.world.body_measures import BodyMeasures
@@ -70,7 +70,7 @@ class Body(BodyControl, BodyMeasures):
         """
         return cast("tuple[Body, ...]", cut(self, plane, triangle))
 
-    def render_mesh(self, *, crease: float | None = ROUND) -> RenderMesh:
+    def render_mesh(self, *, crease: float | None = DEFAULT_CREASE) -> RenderMesh:
         """What a renderer draws of the body: its surface, with a copy of a vertex per side of a sharp edge.
 
         `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once a frame. A cut or a
@@ -141,7 +141,7 @@ class Body(BodyControl, BodyMeasures):
         """
         released = set_level(self, level, release)
         clock = self._context.clock
-        self._context.built.events.note_released(clock.steps, clock.time, self, released)
+        self._context.built.events.record_released(clock.steps, clock.time, self, released)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.

@@ -73,7 +73,7 @@ def build(context: WorldContext) -> Simulation:
     pools.starts.clear()
     state.write_surroundings(settings)
     tears = context.of(Tears)
-    tears.open(state, program)
+    tears.activate(state, program)
     simulation = Simulation(
         settings,
         pools,

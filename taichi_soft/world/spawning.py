@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
-from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, require_alive
+from taichi_soft.bodies.soft_body import belongs_to, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.contact.overlap import Placed, require_apart
 from taichi_soft.control.constants import write_constants
@@ -35,7 +35,7 @@ def require_open(context: WorldContext) -> None:
 
 def require_own(context: WorldContext, body: Any) -> None:
     """Raises: OptionError for what is no body of this world; StateError for one that was removed."""
-    if not isinstance(body, Body) or not lives_in(body, context):
+    if not isinstance(body, Body) or not belongs_to(body, context):
         raise OptionError(f"body must be one that this world made, got {body!r}")
     require_alive(body)
 
@@ -150,7 +150,7 @@ def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, 
                     body.positions() if context.fields else starts[body.index][:, :3], dtype=np.float64
                 ),
             )
-            for body in context.slots.living
+            for body in context.slots.occupants
         )
         place = rows[:, :3].astype(np.float64)
         require_apart(Placed("the body", asset, mesh.tets, mesh.surface, place), others)
@@ -172,7 +172,7 @@ def despawn(context: WorldContext, body: Body) -> None:
 def _let_go(context: WorldContext, body: Body) -> None:
     """Give up what is tied to a body, and what its asset does not say, before its slot is emptied."""
     for each in context.slices:
-        each.let_go(body)
+        each.release_body(body)
     present = present_asset(body)
     if record_of(body).description is not present.description and not body.is_cut:
         context.built.change(body.index, write_constants, body, present.description)
@@ -201,10 +201,10 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
         else:  # a snapshot may have brought along what an earlier body had here, at another level or cut
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
-    return take_in(context, asset)
+    return make_handle(context, asset)
 
 
-def take_in(context: WorldContext, asset: SoftBodyAsset) -> Body:
+def make_handle(context: WorldContext, asset: SoftBodyAsset) -> Body:
     """A handle to what is in the next free slot of an asset."""
     body = Body(context, context.slots.next_slot(asset), asset)
     context.handles.enlist(body)

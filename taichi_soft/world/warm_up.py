@@ -19,7 +19,7 @@ from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.core.types import Schedule
-from taichi_soft.levels.level_change import bar_to_levels
+from taichi_soft.levels.level_change import reason_against_level_change
 from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
@@ -50,7 +50,7 @@ def warm_up(context: WorldContext) -> None:
     try:
         context.built.trial_step(SHORTEST)
         _fill_pools(context)
-        bodies = cast("tuple[Body, ...]", context.slots.living)
+        bodies = cast("tuple[Body, ...]", context.slots.occupants)
         for body in bodies:
             _free(context, body)
         if _has_drives(context):
@@ -78,7 +78,7 @@ def warm_up(context: WorldContext) -> None:
 
 def _find_stable_step(context: WorldContext) -> None:
     """Which the first step would find, if nobody had."""
-    if context.slots.living and not context.settings.is_implicit:
+    if context.slots.occupants and not context.settings.is_implicit:
         context.substeps.stable_count(FRAME)
 
 
@@ -87,7 +87,9 @@ def _fill_pools(context: WorldContext) -> None:
     pools = context.slots
     for wanted in (1, 2):
         for asset in pools.kinds:
-            is_needed = len(pools.living) < wanted or all(body.asset is not asset for body in pools.living)
+            is_needed = len(pools.occupants) < wanted or all(
+                body.asset is not asset for body in pools.occupants
+            )
             if is_needed and pools.free_slots(asset):
                 above = (context.settings.floor or 0.0) + float(np.abs(asset.mesh.vertices).max())
                 enter(context, asset, asset.placed(above * UP, None, 0.0 * UP, 0.0 * UP, None))
@@ -101,7 +103,7 @@ def _has_drives(context: WorldContext) -> bool:
 def _free(context: WorldContext, body: Body) -> None:
     """Release a body from whatever holds it; one that is frozen begins anew."""
     for each in context.slices:
-        each.let_go(body)
+        each.release_body(body)
     if len(body.pinned):
         body.unpin()
     if body.is_frozen:
@@ -119,7 +121,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_velocity(0.0 * UP)
     body.set_gravity_scale(body.gravity_scale)
     body.set_sheltered(True)
-    if body.asset.coarser and not bar_to_levels(body):
+    if body.asset.coarser and not reason_against_level_change(body):
         level, version = body.level, body.topology_version
         for other_level in (1 if level == 0 else 0, level):
             body.set_level(other_level)

@@ -28,7 +28,7 @@ from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
 from taichi_soft.world.building import build
-from taichi_soft.world.spawning import take_in
+from taichi_soft.world.spawning import make_handle
 from taichi_soft.world.warm_up import warm_up
 from taichi_soft.world.world_bodies import WorldBodies
 from taichi_soft.world.world_control import SLICES, WorldControl
@@ -144,7 +144,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             slots=pools,
             layout=Scene(),
             renew_substeps=substeps.renew,
-            take_in=take_in,
+            make_handle=make_handle,
             contact=touching,
             substeps=substeps,
             make_body=Body,
@@ -244,7 +244,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             with Whole():
                 reports = simulation.step(seconds, count, h)
         if self._recorder is not None:
-            reports += self._recorder.note_step(self._context, seconds, count, is_broken=bool(reports))
+            reports += self._recorder.record_step(self._context, seconds, count, has_failure=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
         if simulation.loss:
@@ -258,7 +258,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         if self._force_field is not None:
             rows = push_by_field(self._context, self._force_field)
             if self._recorder is not None:
-                self._recorder.pushes = [(serial_of(body), accelerations) for body, accelerations in rows]
+                self._recorder.field_accelerations = [
+                    (serial_of(body), accelerations) for body, accelerations in rows
+                ]
 
     def _keep(self) -> bytes | None:
         if self._force_field is None and not self._context.substeps.has_limit:
@@ -268,7 +270,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     def _undo(self, data: bytes) -> None:
         restore_snapshot(self._context, data, keeps_events=True)
         if self._recorder is not None:
-            self._recorder.go_back(self._context, data)
+            self._recorder.rewind(self._context, data)
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""

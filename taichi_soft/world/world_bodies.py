@@ -13,7 +13,7 @@ from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.render_mesh import RenderMesh, require_current
 from taichi_soft.bodies.skin_mesh import first_skin_mesh
-from taichi_soft.bodies.soft_body import SoftBody, lives_in
+from taichi_soft.bodies.soft_body import SoftBody, belongs_to
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
@@ -41,7 +41,7 @@ class WorldBodies(WorldParts):
     @property
     def bodies(self) -> Sequence[Body]:
         """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
-        return cast("tuple[Body, ...]", self._context.slots.living)
+        return cast("tuple[Body, ...]", self._context.slots.occupants)
 
     @property
     def slot_count(self) -> int:
@@ -267,7 +267,7 @@ class WorldBodies(WorldParts):
             mesh = first_skin_mesh(mesh)
         if not isinstance(mesh, RenderMesh):
             raise OptionError(f"mesh must be a RenderMesh, made by body.render_mesh(), got {mesh!r}")
-        if not lives_in(mesh.body, self._context):
+        if not belongs_to(mesh.body, self._context):
             raise OptionError(f"mesh must be of a body of this world, got one of {mesh.body!r} of another")
         require_current(mesh)
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:

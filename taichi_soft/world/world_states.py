@@ -27,7 +27,7 @@ class WorldStates(WorldParts):
         """
         data = take_snapshot(self._context)
         if self._recorder is not None:
-            self._recorder.note_snapshot(data)
+            self._recorder.record_snapshot(data)
         return data
 
     def restore(self, data: bytes) -> None:
@@ -46,7 +46,7 @@ class WorldStates(WorldParts):
         restore_snapshot(self._context, data)
         self._restore_count += 1
         if self._recorder is not None:
-            self._recorder.go_back(self._context, data)
+            self._recorder.rewind(self._context, data)
 
     @property
     def restore_count(self) -> int:

@@ -218,8 +218,8 @@ def test_others_in_the_same_world_do_not_flow(fresh):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "one of the two"),
-        ({"yield_stress": 1.0, "yield_strain": 1.0}, "one of the two"),
+        ({}, r"yield_stress.*yield_strain: got"),
+        ({"yield_stress": 1.0, "yield_strain": 1.0}, r"yield_stress.*yield_strain: got"),
         ({"yield_stress": 0.0}, "yield_stress must be a number above 0 Pa"),
         ({"yield_strain": -1.0}, "yield_strain"),
         ({"yield_strain": math.nan}, "yield_strain"),
@@ -235,10 +235,10 @@ def test_bad_numbers_are_refused(options, message):
 
 def test_bodies_that_cannot_flow_are_refused():
     clay = Plasticity(yield_strain=0.1)
-    with pytest.raises(OptionError, match="law 'springs' takes no plasticity"):
+    with pytest.raises(OptionError, match=r"law 'springs' has no plasticity.*'virial'"):
         SoftBodyAsset(MESH, CLAY, law="springs", plasticity=clay)
     with pytest.raises(OptionError, match="must be a Plasticity or None"):
         SoftBodyAsset(MESH, CLAY, plasticity=0.1)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
-    with pytest.raises(MaterialError, match="takes no plasticity"):
+    with pytest.raises(MaterialError, match="AnisotropicMaterial has no plasticity"):
         SoftBodyAsset(MESH, wood, plasticity=clay)

@@ -110,7 +110,7 @@ def test_render_vertices_lie_where_the_bodys_vertices_are(zoo, name, crease):
 def test_normals_are_the_means_of_the_triangles_weighted_by_area(
     zoo, name, crease, fewest_shared, monkeypatch
 ):
-    monkeypatch.setattr(render_mesh, "FEWEST_SHARED", fewest_shared)
+    monkeypatch.setattr(render_mesh, "MIN_PARALLEL_VERTICES", fewest_shared)
     body = getattr(zoo, name)
     shaken(body)
     mesh = body.render_mesh(crease=crease)
@@ -193,7 +193,7 @@ def test_a_sheet_has_two_sides_with_opposite_normals(zoo):
 
 
 def test_a_rope_has_no_surface_to_draw(zoo):
-    with pytest.raises(MeshError, match="no triangles to draw: give its ParticleMesh some with surface="):
+    with pytest.raises(MeshError, match=r"no triangles to draw: .*surface=.*ParticleMesh"):
         zoo.rope.render_mesh()
 
 
@@ -225,7 +225,7 @@ def test_after_a_cut_a_mesh_is_outdated_and_a_new_one_has_the_cut_faces(zoo):
     assert mesh.topology_version == body.topology_version - 1
     assert "outdated" in repr(mesh)
     buffers = [np.full((mesh.vertex_count, 3), np.nan, dtype=np.float32) for _ in range(2)]
-    with pytest.raises(StateError, match=r"topology_version 0, now 1\): make it anew by body.render_mesh"):
+    with pytest.raises(StateError, match=r"topology_version 0, now 1\): .*body.render_mesh"):
         world.read_render_mesh(mesh, 1.0, *buffers)
     assert np.isnan(buffers).all()
     total = 0.0

@@ -6,7 +6,7 @@ import surfaces
 import trimesh
 from difficult_surfaces import letter
 
-from taichi_soft.bodies.hull import FARTHEST, bind
+from taichi_soft.bodies.hull import MIN_WEIGHT, bind
 from taichi_soft.cages import tetrahedra_of
 from taichi_soft.cages.hull import hull_of
 from taichi_soft.meshing.surfaces import read_surfaces
@@ -78,7 +78,7 @@ def test_points_are_carried_by_weights_of_a_tetrahedron():
     hull = hull_of(parts, 400)
     carried = bind(mesh, hull)
     assert carried.weights.sum(axis=1) == pytest.approx(np.ones(len(hull.points)))
-    assert carried.weights.min() >= FARTHEST - 1e-9
+    assert carried.weights.min() >= MIN_WEIGHT - 1e-9
     assert np.einsum("hc,hcx->hx", carried.weights, mesh.vertices[carried.vertices]) == pytest.approx(
         carried.points
     )

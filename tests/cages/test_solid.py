@@ -47,7 +47,7 @@ def test_a_closed_surface_holds_its_volume_and_centre(name):
     assert found.volume == pytest.approx(volume, rel=0.03 if name == "needle" else 5e-3)
     assert volumes.sum() == pytest.approx(found.volume)
     np.testing.assert_allclose(volumes @ points / volumes.sum(), mesh.center_mass, atol=size / 128)
-    assert found.open_share == 0.0
+    assert found.open_fraction == 0.0
 
 
 @pytest.mark.parametrize("name", FAULTY)
@@ -98,5 +98,5 @@ def test_the_surface_within_a_voxel_lies_on_the_ball():
 
 def test_lines_through_a_sheet_do_not_come_back():
     sheet = with_triangles(turned(trimesh.creation.box((1.0, 1.0, 1.0))), [[0, 1, 2], [1, 3, 2]])
-    assert solid(sheet).open_share == 1.0
-    assert 0.0 < solid(without(BALL, 0.05)).open_share < 0.3
+    assert solid(sheet).open_fraction == 1.0
+    assert 0.0 < solid(without(BALL, 0.05)).open_fraction < 0.3

@@ -114,7 +114,7 @@ def test_the_cell_size_that_is_named_keeps_them_without_refinement():
     small = block((0.6, 0.4, 0.2), (0, 0, 0.6))
     legs = [block((0.006, 0.006, 0.6), (x, y, 0.3)) for x in (-0.2, 0.2) for y in (-0.1, 0.1)]
     surfaces = read_surfaces(joined(small, *legs))
-    (words,) = tetrahedra_of(surfaces, cells=3, refine=0).told
+    (words,) = tetrahedra_of(surfaces, cells=3, refine=0).notes
     assert "left out" in words
     named = float(words.split("cell_size=")[1].split()[0])
     found = build_cage(surfaces, cell_size=named, refine=0)
@@ -128,7 +128,7 @@ def test_the_octaves_that_are_named_keep_what_one_does_not():
     thin = table(0.006)
     once = tetrahedra_of(read_surfaces(thin), cells=6)
     assert once.mesh.vertices[:, 2].min() > 0.6
-    assert "refine=2" in once.told[0]
+    assert "refine=2" in once.notes[0]
     twice = cage(thin, cells=6, refine=2)
     assert twice.octave.max() == 2
     assert twice.mesh.vertices[:, 2].min() < 0.1
@@ -137,7 +137,7 @@ def test_the_octaves_that_are_named_keep_what_one_does_not():
 def test_what_is_thinner_than_any_refinement_is_left_out_and_told():
     made = tetrahedra_of(read_surfaces(table(0.0005)), cells=6, refine=3)
     assert made.mesh.vertices[:, 2].min() > 0.6
-    (words,) = made.told
+    (words,) = made.notes
     assert "left out" in words
     assert "refine=" not in words
 
@@ -191,7 +191,7 @@ def test_the_same_surface_gives_the_same_refined_cage(kept):
         ({"refine": -1}, "refine"),
         ({"refine": 4}, "refine"),
         ({"refine": 1.5}, "refine"),
-        ({"refine": 1, "method": "tetgen"}, "takes none"),
+        ({"refine": 1, "method": "tetgen"}, "refine=1.*leave it out"),
     ],
 )
 def test_a_bad_refinement_is_refused(options, text):

@@ -411,7 +411,7 @@ def test_what_takes_no_hull_is_refused():
     mesh = box(cells=(2, 2, 2))
     with pytest.raises(OptionError, match="no skin"):
         SoftBodyAsset(mesh, JELLY, hull=100)
-    with pytest.raises(MeshError, match="of the same thing"):
+    with pytest.raises(MeshError, match="of the same body"):
         _ = SoftBodyAsset(mesh, JELLY, hull=ball(at=(9, 0, 0))).arrays
     with pytest.raises(OptionError, match="cut"):
         SoftBodyAsset(mesh, JELLY, skin=ball(), hull=100, spare_vertices=10)

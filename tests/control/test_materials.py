@@ -177,7 +177,7 @@ def test_the_number_of_substeps_follows_at_once():
         (
             "virial",
             Material(1e5, 0.2, 1000.0, shear_modulus=1e4, damping_ratio=0.0),
-            "takes no shear_modulus",
+            "has no shear_modulus",
         ),
         ("anisotropic", AnisotropicMaterial(WOOD, np.ones(7), damping_ratio=0.0), "7 values"),
         ("virial", "jelly", "got str"),

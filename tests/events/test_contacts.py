@@ -23,7 +23,7 @@ class Game:
 
     def go(self, *touched, impulse=(0.0, 0.0, 1.0)):
         self.step += 1
-        began, ended = self.contacts.follow(
+        began, ended = self.contacts.update(
             dict.fromkeys(touched, impulse), self.handles, self.moving, self.step, self.time, self.dt
         )
         return [(e.a.index, e.b.index) for e in began], ended

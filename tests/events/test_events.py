@@ -223,7 +223,7 @@ def test_a_frame_of_several_fixed_steps_gives_the_events_of_all(world):
 
 
 def test_too_many_events_are_dropped_with_a_warning_in_the_step(world, monkeypatch):
-    monkeypatch.setattr(log, "MOST_EVENTS", 2)
+    monkeypatch.setattr(log, "MAX_EVENTS", 2)
     world.record_events([ContactBegan])
     before = world.dropped_events
     for i in range(2):

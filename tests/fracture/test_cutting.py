@@ -305,7 +305,9 @@ def test_what_does_not_fit_is_refused_and_changes_nothing():
             before = everything(world, body)
             with pytest.raises(StateError, match="2 pieces, and 0 slots are free"):
                 body.cut(plane=ALONG)
-            with pytest.raises(StateError, match=r"leave \d+ vertices in body 0, and there is room for 85"):
+            with pytest.raises(
+                StateError, match=r"leave \d+ vertices in body 0.* room for 85.*spare_vertices"
+            ):
                 body.cut(
                     triangle=middle + np.array([[-0.7, -9.0, 0.03], [-0.7, 9.0, 0.03], [9.0, 0.0, 0.03]])
                 )

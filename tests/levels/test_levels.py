@@ -451,7 +451,7 @@ def test_levels_that_are_none_are_refused(monkeypatch):
         asset.with_coarser(BAR[2], BAR[1])
     with pytest.raises(MeshError, match="of the level before"):
         SoftBodyAsset.from_surface(RING, RUBBER, cells=(5, 5))
-    with pytest.raises(MeshError, match="must be the same thing"):
+    with pytest.raises(MeshError, match="must be the same body"):
         asset.with_coarser(box((1.2, 0.3, 2.5), (4, 1, 1)))
     with pytest.raises(OptionError, match="cells"):
         SoftBodyAsset.from_surface(RING, RUBBER, cells=(None, 5))

@@ -184,8 +184,8 @@ def refusal(path):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        (GMSH_1.replace("$ELM\n4", "$ELM\n5"), r"section \$ELM is not what it announces"),
-        (GMSH_1.replace("4 2 3 4 5", "5 2 3 4 5"), r"section \$ELM is not what it announces"),
+        (GMSH_1.replace("$ELM\n4", "$ELM\n5"), r"section \$ELM .*damaged"),
+        (GMSH_1.replace("4 2 3 4 5", "5 2 3 4 5"), r"section \$ELM .*damaged"),
         (GMSH_1[: GMSH_1.index("$ELM")], r"has no section \$ELM, only \$NOD"),
         (GMSH_1 + "$NOD\n0\n$ENDNOD\n", r"has two sections \$NOD"),
         ("(0 grid written by Fluent)\n(2 3)\n", r"not a Gmsh file: it begins with '\(0 grid written.*\.vtu"),
@@ -203,7 +203,7 @@ def test_gmsh_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, r
     [
         (
             MEDIT.replace("Tetrahedra\n2", "Tetrahedra\n3"),
-            "Tetrahedra announces 3 rows of 5 and holds 10 numbers",
+            "Tetrahedra .*3 rows of 5 .*10 numbers: .*cut short",
         ),
         (MEDIT.replace("Dimension\n3", "Dimension 2"), "has dimension 2: a body needs 3"),
         (MEDIT.replace("Dimension\n3", "Dimension 3\xac"), "has dimension 3.*: a body needs 3"),
@@ -228,7 +228,7 @@ def test_cells_beside_the_tetrahedra_are_counted_in_a_warning(tmp_path, module, 
     write(tmp_path / f"x{suffix}", module, options, meshio.Mesh(np.array(POINTS + CUBE), blocks))
     with pytest.warns(
         SkippedCellsWarning,
-        match=rf"^x\{suffix}: left out cells of other kinds \(1 triangle, 1 hexahedron\) beside 2 tet",
+        match=rf"^x\{suffix}: skipped .*\(1 triangle, 1 hexahedron\) .*2 tetrahedra.*divide them",
     ) as caught:
         assert same(load_mesh(tmp_path / f"x{suffix}"), PAIR)
     assert caught[0].filename == __file__
@@ -260,28 +260,29 @@ def test_cells_that_meshio_drops_by_itself_are_counted_too(tmp_path):
     voxel = 11
     (tmp_path / "x.vtu").write_text(vtu([10, 10, voxel], [*np.ravel(TETS), *HEXAHEDRON[0]], [4, 8, 16]))
     with pytest.warns(
-        SkippedCellsWarning, match=r"x\.vtu: left out .*\(1 of kinds that meshio does not know\)"
+        SkippedCellsWarning, match=r"x\.vtu: skipped .*\(1 of kinds that meshio does not know\)"
     ):
         assert same(load_mesh(tmp_path / "x.vtu"), PAIR)
 
 
 def test_cells_that_meshio_stumbles_over_are_named(tmp_path):
     (tmp_path / "x.vtu").write_text(vtu([10, 10, 16], [*np.ravel(TETS), *range(5, 17)], [4, 8, 20]))
-    assert "meshio does not know 'hexa_prism': if that is a kind of cell, save the tetrahedra" in refusal(
-        tmp_path / "x.vtu"
+    assert (
+        "meshio does not know 'hexa_prism': if that is a kind of cell, save only the tetrahedra"
+        in refusal(tmp_path / "x.vtu")
     )
 
 
 def test_a_grid_in_pieces_of_which_meshio_reads_the_last_is_refused(tmp_path):
     (tmp_path / "x.vtu").write_text(vtu([10, 10], np.ravel(TETS), [4, 8], pieces=2))
-    assert "is in 2 pieces with vertices of their own each: join them" in refusal(tmp_path / "x.vtu")
+    assert re.search(r"2 pieces.*: join them", refusal(tmp_path / "x.vtu"))
 
 
 def test_a_silent_refusal_of_meshio_is_put_in_words(tmp_path):
     save_mesh(BALL, tmp_path / "x.vtu")
     text = (tmp_path / "x.vtu").read_text().replace("<Points>", "<Points><DataArray/>")
     (tmp_path / "x.vtu").write_text(text)
-    assert "meshio says ReadError, and no more: it is damaged, or of a variety" in refusal(tmp_path / "x.vtu")
+    assert re.search(r"ReadError .*: the file is damaged.*Save it again", refusal(tmp_path / "x.vtu"))
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".node", ".ele", ".msh", ".vtk", ".vtu", ".mesh"])
@@ -292,7 +293,7 @@ def test_a_silent_refusal_of_meshio_is_put_in_words(tmp_path):
             "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n",
             "a Git LFS pointer.*`git lfs pull`",
         ),
-        ("\n<!DOCTYPE html><html></html>", "a web page, not the file that it shows: download the raw file"),
+        ("\n<!DOCTYPE html><html></html>", "a web page, .*: download the raw file"),
     ],
     ids=["lfs", "page"],
 )
@@ -306,13 +307,14 @@ def test_what_stands_in_the_place_of_a_file_is_recognised(tmp_path, suffix, text
 def test_an_xml_file_under_the_suffix_of_the_older_format_is_told_its_own(tmp_path):
     save_mesh(BALL, tmp_path / "x.vtu")
     (tmp_path / "x.vtu").rename(tmp_path / "x.vtk")
-    assert refusal(tmp_path / "x.vtk") == "x.vtk: is an XML file of VTK: give it the suffix .vtu"
+    assert re.fullmatch(r"x\.vtk: .*XML.*: give it the suffix \.vtu", refusal(tmp_path / "x.vtk"))
 
 
 def test_archives_under_other_names_are_told_theirs_and_the_wanted_ones(tmp_path):
     np.savez(tmp_path / "x.npz", T=np.array(TETS), V=np.array(POINTS))
-    assert "wanted are arrays 'vertices' (n, 3) and 'tets' (m, 4), and the file has 'T', 'V'" in refusal(
-        tmp_path / "x.npz"
+    assert (
+        "arrays 'vertices' (n, 3) and 'tets' (m, 4), but the file has 'T', 'V': pass its arrays"
+        in refusal(tmp_path / "x.npz")
     )
 
 
@@ -329,13 +331,13 @@ def test_the_command_that_an_unknown_format_is_refused_with_makes_a_known_one(tm
 
 
 def test_surfaces_are_refused_with_the_way_to_fill_them(tmp_path):
-    fill = "SoftBodyAsset.from_surface('x.stl', material) makes a body of it"
+    fill = "SoftBodyAsset.from_surface('x.stl', material) makes a body from it"
     faces = meshio.Mesh(BALL.vertices, [("triangle", BALL.surface)])
     write(tmp_path / "x.vtk", "vtk", {}, faces)
     write(tmp_path / "x.msh", "gmsh", {}, faces)
     (tmp_path / "y.vtk").write_text(POLYDATA)
     assert (
-        f"x.msh: holds no tetrahedra, only 80 triangle, which is a surface: save it as x.stl, then {fill}"
+        f"x.msh: contains no tetrahedra, only 80 triangle, which is a surface: save it as x.stl, then {fill}"
         in refusal(tmp_path / "x.msh")
     )
     assert fill in refusal(tmp_path / "x.vtk")
@@ -352,7 +354,7 @@ def test_files_of_other_cells_only_say_what_they_lack(tmp_path):
     write(tmp_path / "hex.vtk", "vtk", {}, meshio.Mesh(np.array(POINTS + CUBE), [("hexahedron", HEXAHEDRON)]))
     assert "only 1 hexahedron: divide them into tetrahedra" in refusal(tmp_path / "hex.vtk")
     write(tmp_path / "line.vtk", "vtk", {}, meshio.Mesh(np.array(POINTS), [("line", [[0, 1]])]))
-    assert refusal(tmp_path / "line.vtk").endswith("only 1 line: save what fills the body too")
+    assert refusal(tmp_path / "line.vtk").endswith("only 1 line: save the cells that fill the body too")
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".node", ".msh", ".vtk", ".vtu", ".mesh"])
@@ -367,6 +369,4 @@ def test_a_tetgen_file_that_ends_after_its_head_is_cut_short(tmp_path):
     lines = (tmp_path / "x.ele").read_text().splitlines()
     head = next(line for line in lines if not line.startswith("#"))
     (tmp_path / "x.ele").write_text(f"{head}\n")
-    assert f"{head.split()[0]} tetrahedra announced, 0 found: the file is cut short" in refusal(
-        tmp_path / "x.node"
-    )
+    assert f"{head.split()[0]} tetrahedra and has 0: the file is cut short" in refusal(tmp_path / "x.node")

@@ -268,11 +268,11 @@ def test_what_a_file_has_besides_and_what_was_made_of_it_is_noted(path):
     writer.node(False, mesh=0)
     writer.json["extensionsUsed"] = ["KHR_mesh_quantization", "KHR_materials_unlit"]
     assert one(writer, path).notes == (
-        "1 primitive with a skin, 2 joints in all: posed as the file's joints rest",
+        "1 primitive with a skin, 2 joints in total: posed by the file's rest pose",
         "1 primitive with morph targets, not applied: their default weights are 0",
         "2 animations (run, 1): not played",
-        "1 primitive without triangles (points or lines): left out",
-        "1 node with a mesh outside the default scene or hidden: left out",
+        "1 primitive without triangles (points or lines): skipped",
+        "1 node with a mesh outside the default scene or hidden: skipped",
         "extensions: KHR_mesh_quantization (read); KHR_materials_unlit (ignored)",
     )
 
@@ -332,7 +332,7 @@ def test_without_pillow_the_shape_is_read_and_the_extra_is_named(path, monkeypat
     ("content", "image", "text"),
     [
         (b"no picture", {}, "texture image 0 is not read: its format is unknown to pillow"),
-        (None, {"uri": "my%20tex.png"}, "texture 'my%20tex.png' is not read .*there is none"),
+        (None, {"uri": "my%20tex.png"}, "texture 'my%20tex.png' is not read .*does not exist"),
         (-1, {}, "texture image 0 is not read"),
     ],
 )
@@ -441,12 +441,12 @@ DAMAGED = {
         lambda f: f.nodes.extend([{"children": [0]}, {"children": [0]}]),
         "node 0 has two parents",
     ),
-    "no such mesh": (lambda f: f.nodes[0].update(mesh=7), r"meshes\[7\], and has 1"),
+    "no such mesh": (lambda f: f.nodes[0].update(mesh=7), r"meshes\[7\] .*has 1"),
     "index too large": (
         lambda f: f.meshes[0]["primitives"][0].update(indices=0),
         "accessor 0 has the type 'VEC3'",
     ),
-    "half a triangle": (lambda f: f.accessors[1].update(count=11), "11 corners of triangles"),
+    "half a triangle": (lambda f: f.accessors[1].update(count=11), "11 triangle corners, .*multiple of 3"),
     "count beyond the buffer": (
         lambda f: f.accessors[0].update(count=10**12),
         "its buffer view has 48 bytes",
@@ -531,7 +531,7 @@ def test_a_file_cut_short_is_refused_wherever_it_ends(tmp_path, suffix):
     text = whole.decode("utf-8", errors="replace").encode()
     if suffix == ".glb":
         (tmp_path / "x.glb").write_bytes(text)
-        assert "converted it as text" in refusal(tmp_path / "x.glb")
+        assert "as text. Copy the original as a binary file" in refusal(tmp_path / "x.glb")
     (tmp_path / "x.gltf").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     assert "git lfs pull" in refusal(tmp_path / "x.gltf")
 
@@ -539,13 +539,13 @@ def test_a_file_cut_short_is_refused_wherever_it_ends(tmp_path, suffix):
 @pytest.mark.parametrize(
     ("name", "uri", "text"),
     [
-        ("x.gltf", "gone.bin", "'gone.bin', and there is none"),
-        ("x.gltf", "https://example.org/x.bin", "put that file beside it"),
-        ("x.gltf", "/etc/hostname", "put that file beside it"),
-        ("x.gltf", "C:\\x.bin", "put that file beside it"),
+        ("x.gltf", "gone.bin", "'gone.bin', which does not exist"),
+        ("x.gltf", "https://example.org/x.bin", "put that file next to it"),
+        ("x.gltf", "/etc/hostname", "put that file next to it"),
+        ("x.gltf", "C:\\x.bin", "put that file next to it"),
         ("x.gltf", "data:application/octet-stream;base64,AAA", "damaged|cut short"),
-        ("x.gltf", "a\0b", "there is none"),
-        ("x.gltf", ".", "there is none"),
+        ("x.gltf", "a\0b", "does not exist"),
+        ("x.gltf", ".", "does not exist"),
         ("x.glb", "../x.bin", "outside its folder"),
         ("x.glb", "%2e%2e/x.bin", "outside its folder"),
     ],

@@ -227,13 +227,13 @@ def test_files_without_tetrahedra_are_refused(tmp_path):
     pytest.importorskip("meshio")
     text = VTK.replace("4 0 1 3 4\n", "").replace("4 3 1 4 5\n", "").replace("10\n5\n10", "5")
     (tmp_path / "x.vtk").write_text(text.replace("CELLS 3 14", "CELLS 1 4").replace("TYPES 3", "TYPES 1"))
-    with pytest.raises(MeshError, match=r"x\.vtk: holds no tetrahedra, only 1 triangle"):
+    with pytest.raises(MeshError, match=r"x\.vtk: .*no tetrahedra, only 1 triangle"):
         load_mesh(tmp_path / "x.vtk")
 
 
 def test_archives_of_other_things_are_refused(tmp_path):
     np.savez(tmp_path / "x.npz", vertices=np.eye(3))
-    with pytest.raises(MeshError, match=r"x\.npz: wanted are arrays.* and the file has 'vertices'"):
+    with pytest.raises(MeshError, match=r"x\.npz: .*and 'tets' .*has 'vertices': .*save_mesh"):
         load_mesh(tmp_path / "x.npz")
     np.savez(tmp_path / "y.npz", vertices=np.array([{}], dtype=object), tets=np.eye(4))
     with pytest.raises(MeshError, match=r"y\.npz: not a mesh file"):

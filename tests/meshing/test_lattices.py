@@ -120,12 +120,12 @@ REFUSED = {
     "cells the other way round": (
         lambda: cloth_constants(cloth((1, 1), (3, 2), 1.0), (2, 3), tensile=1.0, shear=1.0, bend=1.0),
         MeshError,
-        r"no spring of a cloth of \(2, 3\) cells",
+        r"edge 0 .*\(2, 3\) cells: pass",
     ),
     "missing": (
         lambda: cloth_constants(cloth((1, 1), (2, 2), 1.0), (2, 2), tensile=1.0, shear=1.0),
         OptionError,
-        "the cloth has bend springs: give bend=",
+        "the cloth has bend springs: .*bend=.*0",
     ),
     "constant": (
         lambda: cloth_constants(cloth((1, 1), (2, 2), 1.0), (2, 2), tensile="1", shear=1, bend=1),

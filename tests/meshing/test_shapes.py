@@ -146,7 +146,7 @@ REFUSED = [
     (torus, {"segments": 2}, "segments must .* from 3 .*, got 2"),
     (sphere, {"resolution": 10**9}, "resolution must"),
     (sphere, {"resolution": 100}, "20,000,000 tetrahedra"),
-    (box, {"cells": (1000, 1000, 1000)}, "5,000,000,000 tetrahedra: ask for a coarser"),
+    (box, {"cells": (1000, 1000, 1000)}, "5,000,000,000 tetrahedra: .*coarser"),
     (beam, {"cells_across": 1000}, "tetrahedra"),
     (beam, {"length": 1e300, "width": 1e-300}, "cells"),
     (cylinder, {"rings": 10_000}, "tetrahedra"),

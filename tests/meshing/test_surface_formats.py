@@ -184,7 +184,7 @@ def test_a_binary_stl_file_has_the_colours_of_two_programs(tmp_path):
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     np.testing.assert_allclose(plain.normals, np.repeat(across, 3, axis=0), atol=1e-5)
     (tmp_path / "cut.stl").write_bytes(binary_stl(corners, [0] * 5)[:-10])
-    with pytest.raises(MeshError, match="cut short: it is to have 5 triangles, and has 4"):
+    with pytest.raises(MeshError, match=r"cut short: .*5 triangles .*has 4"):
         read_surfaces(tmp_path / "cut.stl")
 
 

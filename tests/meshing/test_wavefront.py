@@ -1,5 +1,7 @@
 """The .obj reader beside a reader of the test's own, which takes each corner of each face by itself."""
 
+import re
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -181,11 +183,11 @@ def test_text_is_read_however_it_is_written(tmp_path, odd):
 @pytest.mark.parametrize(
     ("line", "text"),
     [
-        ("f 1 2 9", "face 6 names vertex 8, and there are 8"),
+        ("f 1 2 9", "face 6 names vertex 8, .*8 vertices.*export it again"),
         ("f 1 2 -9", "face 6 names a vertex before the first one"),
         ("f 1 2 0", "whole numbers from 1"),
         ("f 1 2 1.5", "whole numbers from 1"),
-        ("v 1 2", "vertex 8 is '1 2': wanted are 3 numbers"),
+        ("v 1 2", "vertex 8 is '1 2': .*3 numbers"),
         ("v 1,5 2 3", "decimal point"),
         ("v 1 2 nan", "finite"),
     ],
@@ -200,8 +202,8 @@ def test_what_a_corner_lacks_is_made_up_and_said(tmp_path):
     (found,) = read_surfaces(written(tmp_path / "x.obj", text), up="z")
     assert np.isfinite(found.normals).all()
     assert np.isfinite(found.visual.uv).all()
-    assert "2 corners of faces name texture coordinates that are not there" in " ".join(found.notes)
-    assert "1 corner of a face names normals that are not there" in " ".join(found.notes)
+    notes = " ".join(found.notes)
+    assert re.search("2 corners .*texture coordinates .*1 corner .*normals", notes)
 
 
 LIBRARY = """

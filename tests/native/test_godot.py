@@ -287,7 +287,7 @@ def test_a_game_in_godot_has_the_same_bits(world, game, run, project, world_of, 
 
 @pytest.fixture(scope="module")
 def levels(run, project, world_of):
-    """What bodies with levels of detail tell of themselves and of what is drawn of them."""
+    """Printed state of bodies with levels of detail, and of their drawn meshes."""
     world_of("levels")
     text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
     (script,) = re.findall(r"^```gdscript\n(# Coarser.*?)^```", text, re.DOTALL | re.MULTILINE)
@@ -371,7 +371,7 @@ def test_the_script_of_the_page_chooses_levels_by_distance(levels):
 
 @pytest.fixture(scope="module")
 def drives(run, world_of):
-    """What bodies do under the functions of soft_world.gd for gravity, friction, joints and motors."""
+    """Motion of bodies under the functions of soft_world.gd for gravity, friction, joints and motors."""
     world_of("joined")
     return told(run("drives.gd"))
 

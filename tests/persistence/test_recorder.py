@@ -204,7 +204,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
         with pytest.raises(SnapshotError):
             replay(saved)
     saved.write_text(json.dumps({"start": "", "entries": entries})[:-100])
-    with pytest.raises(SnapshotError, match=r"is cut off or damaged \(.*: save it again there"):
+    with pytest.raises(SnapshotError, match=r"is damaged \(.*: save it again there"):
         replay(saved)
     with pytest.raises(OptionError, match="steps"):
         replay(path, steps=-1)
@@ -212,7 +212,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
 
 def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch):
     world, path = game
-    monkeypatch.setattr("taichi_soft.persistence.recorder.MOST_CONTENT", 1 << 20)
+    monkeypatch.setattr("taichi_soft.persistence.recorder.MAX_CONTENT", 1 << 20)
     bomb = tmp_path / "bomb.recording"
     bomb.write_bytes(seal(MARK, VERSION, [zlib.compress(b" " * (1 << 27), 9), b""]))
     tracemalloc.start()
@@ -222,7 +222,7 @@ def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch
         assert tracemalloc.get_traced_memory()[1] < 1 << 23
     finally:
         tracemalloc.stop()
-    monkeypatch.setattr("taichi_soft.persistence.recorder.MOST_CONTENT", 1000)
+    monkeypatch.setattr("taichi_soft.persistence.recorder.MAX_CONTENT", 1000)
     before = path.read_bytes()
     with pytest.raises(SnapshotError, match="smaller record"):
         world.save_recording(path)

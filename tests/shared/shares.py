@@ -1,5 +1,6 @@
 """Which worker runs which test files, and in which order."""
 
+import contextlib
 from collections import Counter
 
 from xdist.scheduler import LoadScopeScheduling
@@ -56,9 +57,16 @@ class Shares(LoadScopeScheduling):
     def _split_scope(self, nodeid):
         return nodeid.split("::")[0]
 
+    def _reschedule(self, node):
+        if (
+            node in self.registered_collections
+        ):  # the base class would give files to a worker that still starts
+            super()._reschedule(node)
+
     def _assign_work_unit(self, node):
         self.workqueue.move_to_end(self._next_file(node), last=False)
-        super()._assign_work_unit(node)
+        with contextlib.suppress(OSError):  # the worker has just ended: `remove_node` takes its files back
+            super()._assign_work_unit(node)
         if self.workqueue and self._pending_of(self.assigned_work[node]) < 2:
             self._assign_work_unit(node)  # a worker starts a test only when it has the next one
 

@@ -21,7 +21,7 @@ if __name__ == "__main__":
 import random_play
 
 from taichi_soft import Contact, Material, SoftBodyAsset, SpringMaterial, World, box, cloth, init, sphere
-from taichi_soft.bodies.render_mesh import FEWEST_SHARED
+from taichi_soft.bodies.render_mesh import MIN_PARALLEL_VERTICES
 
 CUBE = box(cells=(2, 2, 2))
 TOP = np.flatnonzero(CUBE.vertices[:, 2] > 0.49)
@@ -150,7 +150,7 @@ def drawn():
     shift = np.random.default_rng(2).normal(scale=0.1, size=mesh.vertices.shape)
     body.set_motion(mesh.vertices + shift, 0.0 * shift)
     skin = body.render_mesh()
-    assert skin.vertex_count > FEWEST_SHARED
+    assert skin.vertex_count > MIN_PARALLEL_VERTICES
     return [rows.tobytes().hex() for rows in world.read_render_mesh(skin, 0.3)]
 
 

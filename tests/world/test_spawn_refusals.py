@@ -36,7 +36,7 @@ SPAWNS = {
     "far": ({"position": (9.9999999e6, 0, 0)}, "beyond 1e[+]07 m"),
     "crooked": ({"rotation": (0, 0, 0, 2)}, "length 2: normalise"),
     "fast": ({"velocity": (0, 2e4, 0)}, "velocity must lie within"),
-    "whirling": ({"angular_velocity": (0, 5e4, 0)}, "makes a vertex as fast as"),
+    "whirling": ({"angular_velocity": (0, 5e4, 0)}, "angular_velocity=.* a vertex .* m/s"),
     "whirling nan": ({"angular_velocity": (0, NAN, 0)}, "angular_velocity must be finite"),
     "on no floor": ({"on_floor": True}, r"no floor: make it with World\(floor=0.0\)"),
     "on floor text": ({"on_floor": "yes"}, "on_floor must be"),
@@ -71,9 +71,7 @@ def test_a_full_pool_an_unknown_asset_and_a_late_reserve_are_refused(empty):
     world, (kind, other) = empty
     bodies = [world.spawn(kind, position=(3 * i, 0, 0)) for i in range(3)]
     before = state_of(world)
-    with pytest.raises(
-        StateError, match=r"is full: 3 of 3 bodies live\. Reserve more before build, or despawn"
-    ):
+    with pytest.raises(StateError, match=r"is full: 3 of 3 slots .*Reserve more before build, or despawn"):
         world.spawn(kind)
     with pytest.raises(StateError, match="has no pool in this world: call reserve"):
         world.spawn(cube())

@@ -142,7 +142,7 @@ def test_nothing_is_compiled_where_the_game_looks(game, compiled, kind):
 
 @pytest.mark.parametrize("fewest_shared", [0, 10**9], ids=["by all threads", "by one"])
 def test_nothing_is_compiled_where_a_mesh_of_any_size_is_drawn(game, compiled, monkeypatch, fewest_shared):
-    monkeypatch.setattr(render_mesh, "FEWEST_SHARED", fewest_shared)
+    monkeypatch.setattr(render_mesh, "MIN_PARALLEL_VERTICES", fewest_shared)
     game.begin()
     compiled.clear()
     for crease in (None, 30.0):

@@ -238,7 +238,7 @@ Variant get_level(Self self, In in) {
   return of(int64_t(level));
 }
 
-// Of an asset.
+// Number of levels of detail of an asset.
 Variant level_count(Self self, In in) {
   int32_t found = 0;
   check(ts_asset_get_level_count(self.scene, in.small(0), &found));

@@ -55,7 +55,7 @@ ts_result guarded(Function function) noexcept {
 #endif
 }
 
-// What to give instead of a wrong name: as many names as fit into an error's text.
+// Lists the names to give instead of a wrong one: as many as fit into an error's text.
 std::string choice(const std::vector<std::string>& names) {
   if (names.empty()) return "the world file has none of that kind";
   std::string found = "give one of ";

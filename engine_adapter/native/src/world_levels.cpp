@@ -1,4 +1,4 @@
-// Levels of detail: as taichi_soft/levels/level_change.py and hanging.py have them.
+// Levels of detail: as taichi_soft/levels/level_change.py and reattaching.py have them.
 
 #include <algorithm>
 #include <limits>

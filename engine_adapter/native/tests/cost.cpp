@@ -1,4 +1,4 @@
-// What a step of the library takes over its kernel, which is timed within it: cost FOLDER [ROUNDS [STEPS]]
+// Measures the time of a step beside its kernel, which is timed within it: cost FOLDER [ROUNDS [STEPS]]
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -47,7 +47,7 @@ void print(const char* what, std::vector<double> numbers) {
   std::printf("%-32s %9.3f %9.3f %9.3f\n", what, numbers.front(), numbers[numbers.size() / 2], numbers.back());
 }
 
-// Of many steps in a row, each from the same beginning.
+// Times many steps in a row. Each round begins with a new world.
 void measure(const char* what, const std::shared_ptr<Scene>& scene, int rounds, int steps, int32_t events) {
   std::vector<double> own, ratios;
   for (int round = 0; round < rounds; ++round) {

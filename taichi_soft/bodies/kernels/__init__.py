@@ -1,1 +1,1 @@
-"""Loops over the particles and faces of one body."""
+"""Kernels over the particles and faces of one body."""

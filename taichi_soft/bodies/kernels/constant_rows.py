@@ -1,4 +1,4 @@
-"""Constants of one body written anew between two steps: rows of a flat field from a given one on."""
+"""Rewrite constants of one body between two steps: consecutive rows of a flat field."""
 
 from taichi_soft.core.runtime import ti
 
@@ -26,7 +26,7 @@ def write_masses(
     masses: ti.types.ndarray(dtype=ti.f32, ndim=1),
     inverses: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Masses [kg] and their inverses; pinned particles keep an inverse of zero."""
+    """Write masses [kg] and their inverses; pinned particles keep an inverse of zero."""
     ti.loop_config(serialize=True)
     for i in range(masses.shape[0]):
         p = first + i

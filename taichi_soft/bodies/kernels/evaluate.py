@@ -1,6 +1,6 @@
-"""Evaluation without motion: forces on a body where it is, or would be."""
+"""Evaluate forces on a body at given positions, without motion."""
 
-from taichi_soft.bodies.kernels.particles import particle_is_sound
+from taichi_soft.bodies.kernels.particles import particle_is_valid
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.tensors import widened
@@ -12,59 +12,59 @@ from taichi_soft.elements.kernels.elastic import lane_forces
 
 @ti.func
 def _add_tet_forces(state: ti.template(), model: ti.template(), body):
-    """Returns the first broken tetrahedron (block times `LANES` plus lane) or -1."""
-    broken = -1
+    """Add the forces of tetrahedra. Returns the first that failed (block times `LANES` plus lane), or -1."""
+    failed = -1
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         forces = lane_forces(state, model, block, lane)
         for corner in ti.static(range(4)):
             p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-            if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
-                broken = t
+            if failed < 0 and (particle_is_valid(state, p) & is_finite(forces[corner])) == 0:
+                failed = t
             state.particle_force[p] = state.particle_force[p] + widened(forces[corner])
     accumulate_edge_forces(state, model, body)
-    return broken
+    return failed
 
 
 @ti.func
 def _add_bond_forces(state: ti.template(), model: ti.template(), body):
-    """Returns the first broken edge or -1."""
-    broken = -1
+    """Add the forces of bonds. Returns the first edge that failed, or -1."""
+    failed = -1
     if ti.static(model.reads_expansion):
         accumulate_pressures(state, body)
     accumulate_edge_forces(state, model, body)
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        sound = particle_is_sound(state, p) & particle_is_sound(state, q)
-        if broken < 0 and (sound & is_finite(edge_force_of(state, model, e))) == 0:
-            broken = e
-    return broken
+        valid = particle_is_valid(state, p) & particle_is_valid(state, q)
+        if failed < 0 and (valid & is_finite(edge_force_of(state, model, e))) == 0:
+            failed = e
+    return failed
 
 
 @ti.func
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, element by element.
 
-    Returns the first tetrahedron (block times `LANES` plus lane), or edge where forces act along edges, with
-    an end out of reach or a force that is not finite, or -1.
+    Returns the first tetrahedron (block times `LANES` plus lane), or edge for forces along edges, with an end
+    out of range or a force that is not finite, or -1.
     """
-    broken = -1
+    failed = -1
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
             if ti.static(model.has_bonds):
-                broken = _add_bond_forces(state, model, body)
+                failed = _add_bond_forces(state, model, body)
             else:
-                broken = _add_tet_forces(state, model, body)
-    return broken
+                failed = _add_tet_forces(state, model, body)
+    return failed
 
 
 @ti.kernel
 def compute_body_forces(
     state: ti.template(), program: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=2)
 ):
-    """Internal forces on the particles of one body where they are now [N], in kernel order."""
+    """Internal forces on the particles of one body at their present positions [N], in kernel order."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         accumulate_forces_one_by_one(state, program, body)

@@ -1,6 +1,6 @@
-"""Faces of a deformed surface: its triangles; or, of a body without any, its vertices.
+"""Faces of a deformed surface: the triangles of a body, or its vertices if it has none.
 
-A vertex counts as a triangle of no size. Rays cannot hit it, and it has a nearest point like any other.
+A vertex counts as a triangle of no size. Rays cannot hit it, but it has a nearest point like any other.
 """
 
 from taichi_soft.bodies.status import ABSENT
@@ -8,12 +8,12 @@ from taichi_soft.core.math.triangle import solid_angle
 from taichi_soft.core.runtime import ti
 
 INSIDE = 6.283
-"""Solid angle [sr] from which on a point counts as inside: half of the 4 pi that a whole surface fills."""
+"""Solid angle [sr] above which a point counts as inside: half of the 4 pi of a closed surface."""
 
 
 @ti.func
 def face_count(state: ti.template(), body):
-    """Triangles of a body, or vertices where it has none; 0 for a body that is not there."""
+    """Number of triangles of a body, or of vertices if it has none; 0 for an absent body."""
     triangles, particles = state.body_triangles[body], state.body_particles[body]
     count = triangles[1] - triangles[0]
     if count == 0:
@@ -37,7 +37,7 @@ def face_particles(state: ti.template(), body, face):
 
 @ti.func
 def face_corners(state: ti.template(), body, face, origin):
-    """Corners of a face as seen from `origin` [m]."""
+    """Corners of a face relative to `origin` [m]."""
     v = face_particles(state, body, face)
     x = ti.static(state.particle_position)
     return x[v[0]] - origin, x[v[1]] - origin, x[v[2]] - origin
@@ -45,19 +45,19 @@ def face_corners(state: ti.template(), body, face, origin):
 
 @ti.func
 def box_around(state: ti.template(), body):
-    """Least and greatest coordinates of a body [m]."""
+    """Bounding box of a body: smallest and largest coordinates [m]."""
     outer = state.body_outer[body]
     lower = ti.Vector([1e30, 1e30, 1e30])
     upper = -lower
     for i in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[i]]
-        lower, upper = ti.select(x < lower, x, lower), ti.select(x > upper, x, upper)  # quicker than min, max
+        lower, upper = ti.select(x < lower, x, lower), ti.select(x > upper, x, upper)  # faster than min, max
     return lower, upper
 
 
 @ti.func
 def is_inside(state: ti.template(), body, x):
-    """Whether a body's surface goes round a point more than half, mirrored surfaces too."""
+    """True if a body's surface, mirrored or not, winds around a point by more than half."""
     total = x.x * 0.0
     for face in range(face_count(state, body)):
         a, b, c = face_corners(state, body, face, x)
@@ -66,10 +66,10 @@ def is_inside(state: ti.template(), body, x):
 
 
 @ti.func
-def write_place(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
-    """Distance, weights, point, unit normal (`away` where the face has none), body and face of an answer.
+def write_result(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
+    """Write a result: distance, weights, point, unit normal (`away` if the face has none), body and face.
 
-    As float32 all of them: 16 million faces are counted exactly.
+    All of them are float32, which counts 16 million faces exactly.
     """
     v = face_particles(state, body, face)
     x = ti.static(state.particle_position)

@@ -1,7 +1,7 @@
-"""Plastic flow: the rest shape of a tetrahedron goes after its deformation, by what this has beyond yield.
+"""Plastic flow: the rest shape of a tetrahedron follows the part of its deformation that is beyond yield.
 
-A rest shape A0 that has flowed is Fp A0, kept as its inverse A0^-1 P with P = Fp^-1 symmetric, of
-determinant 1. P is taken from it, so nothing but `tet_rest_inverse` changes. See `Plasticity`.
+Flow turns the rest shape A0 into Fp A0, stored as its inverse A0^-1 P, where P = Fp^-1 is symmetric and has
+determinant 1. P is computed from it, so that only `tet_rest_inverse` changes. See `Plasticity`.
 """
 
 from taichi_soft.bodies.status import ACTIVE
@@ -22,11 +22,11 @@ from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
-_ROUNDS = 12
-"""Of the search for the strain at yield; from twice its length it is exact to float32 after eight."""
+_ITERATIONS = 12
+"""Iterations of the search for the strain at yield; from twice the strain, eight are exact to float32."""
 
-_WIDEST = 1e6
-"""Strain beyond which nothing flows: a body on its way to infinity."""
+_MAX_STRAIN = 1e6
+"""Strain above which nothing flows: the body is diverging."""
 
 
 @ti.func
@@ -43,17 +43,17 @@ def _deviator(v):
 
 @ti.func
 def _equivalent(v):
-    """Of the principal values of a deviator: sqrt(2/3 e:e)."""
+    """Equivalent strain sqrt(2/3 e:e) of the principal values of a deviator."""
     return ti.sqrt(v.dot(v) * 2.0 / 3.0)
 
 
 @ti.func
 def _excess(logarithms, limit):
-    """The part of the logarithmic strains' deviator that is beyond yield, 0 to 1."""
+    """Fraction of the logarithmic strains' deviator that is beyond yield, 0 to 1."""
     deviator = _deviator(logarithms)
     mean = logarithms - deviator
     kept = logarithms.x * 0.0 + 1.0
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         strain = _equivalent(_deviator(0.5 * exp_each(2.0 * (mean + kept * deviator))))
         kept = ti.min(kept * limit / ti.max(strain, 1e-30), 1.0)
     return 1.0 - kept
@@ -61,9 +61,9 @@ def _excess(logarithms, limit):
 
 @ti.func
 def _limited(columns, maximum):
-    """The symmetric matrix of determinant 1 with the stretches of M, none beyond the maximum, as columns.
+    """Symmetric matrix of determinant 1 with the stretches of M up to the maximum, as columns.
 
-    M is that matrix and a turn behind it, which means nothing to an isotropic material.
+    M is such a matrix times a rotation, which has no effect in an isotropic material.
     """
     squares, axes = symmetric_eigen(outer_square(columns))
     logarithms = _deviator(0.5 * log_each(ti.max(squares, 1e-30)))
@@ -82,7 +82,7 @@ def _flow_tet(state: ti.template(), block, lane, plasticity, dt):
     strain = ti.sqrt((shift[0].dot(shift[0]) + shift[1].dot(shift[1]) + shift[2].dot(shift[2])) * 2.0 / 3.0)
     shear = state.tet_lame[(block * 2 + 1) * LANES + lane]
     limit = plasticity[1] + plasticity[0] / (3.0 * ti.max(shear, 1e-30))
-    if strain > limit and strain < _WIDEST and determinant(B) > 0.0:
+    if strain > limit and strain < _MAX_STRAIN and determinant(B) > 0.0:
         squares, axes = symmetric_eigen(square)
         logarithms = 0.5 * log_each(ti.max(squares, 1e-12))
         part = _excess(logarithms, limit) * (1.0 - exp(-plasticity[2] * dt))
@@ -99,14 +99,14 @@ def _flow_tet(state: ti.template(), block, lane, plasticity, dt):
 
 @ti.func
 def flow_block(state: ti.template(), body, block, dt):
-    """Let the tetrahedra of one block flow for a time [s]."""
+    """Apply plastic flow to the tetrahedra of one block for a time [s]."""
     for lane in range(LANES):
         _flow_tet(state, block, lane, state.body_plasticity[body], dt)
 
 
 @ti.func
 def flow_body(state: ti.template(), body, dt):
-    """Let the tetrahedra of one body flow for a time [s], in one thread."""
+    """Apply plastic flow to the tetrahedra of one body for a time [s], in one thread."""
     if state.body_status[body] == ACTIVE and state.body_plasticity[body][2] > 0.0:
         blocks = state.body_blocks[body]
         for block in range(blocks[0], blocks[1]):
@@ -115,7 +115,7 @@ def flow_body(state: ti.template(), body, dt):
 
 @ti.func
 def restore_shape(state: ti.template(), body):
-    """Give a body its first rest shape back."""
+    """Restore the original rest shape of a body."""
     blocks = state.body_blocks[body]
     for i in range(blocks[0] * 9 * LANES, blocks[1] * 9 * LANES):
         state.tet_rest_inverse[i] = state.tet_original_inverse[i]
@@ -123,7 +123,7 @@ def restore_shape(state: ti.template(), body):
 
 @ti.kernel
 def read_rest_inverses(state: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=3)):
-    """A^-1 of each tetrahedron as it is now, (m, 3, 3) [1/m], in kernel order."""
+    """Present A^-1 of each tetrahedron, (m, 3, 3) [1/m], in kernel order."""
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = state.body_blocks[body][0] + t // LANES, t % LANES

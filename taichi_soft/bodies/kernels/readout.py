@@ -1,4 +1,4 @@
-"""Copies between the fields of a world and the caller's arrays, in the caller's vertex order."""
+"""Copy between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
 from taichi_soft.bodies.status import ABSENT, ACTIVE, PLACED
 from taichi_soft.core.math.rows import row_behind
@@ -7,9 +7,9 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Positions of all bodies [m], `alpha` of the way from the previous step (0) to the last one (1).
+    """Positions of all bodies [m], interpolated by `alpha` from the previous step (0) to the last one (1).
 
-    Rows of absent bodies are left alone.
+    Rows of absent bodies are unchanged.
     """
     ti.loop_config(serialize=True)
     for body in range(state.capacity.bodies):
@@ -29,7 +29,7 @@ def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dt
 def read_velocities(
     state: ti.template(), begin: ti.i32, count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Velocities of one body as the integrator keeps them [m/s]."""
+    """Velocities of one body as the integrator stores them [m/s]."""
     ti.loop_config(serialize=True)
     for i in range(count):
         v = state.particle_velocity[state.particle_of_vertex[begin + i]]
@@ -44,7 +44,7 @@ def write_motion(
     positions: ti.types.ndarray(ndim=2),
     velocities: ti.types.ndarray(ndim=2),
 ):
-    """Put the particles of one body somewhere else, with velocities of the same moment."""
+    """Set positions of the particles of one body, and velocities of the same time."""
     i = 0
     while i < positions.shape[0]:
         p = state.particle_of_vertex[state.body_particles[body][0] + i]

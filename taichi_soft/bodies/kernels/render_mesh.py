@@ -1,24 +1,24 @@
-"""Vertices and normals of one body, as a renderer draws them.
+"""Vertices and normals of one body for a renderer.
 
-Render vertices lie in blocks of `LANES`. What one thread does with a block is the same wherever the block
-comes, so the bits are the same for any number of threads.
+Render vertices are grouped in blocks of `LANES`. The computation of a block does not depend on its position,
+so the bits are the same for any number of threads.
 """
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Vertices in the ring round a render vertex: eight triangles, which is more than most have, and six, which
-most have. Blocks whose rings are all small come first."""
+"""Vertices in the ring around a render vertex: eight triangles, which is more than most vertices have, and
+six, which most have. Blocks with small rings only come first."""
 
 STRIDE = (1 + RING) * LANES
-"""Numbers of a block in the table."""
+"""Table entries of a block."""
 
 BLOCK_BITS = (1 << 24) - 1
-"""Mask that leaves every block number unchanged, so that index arithmetic is seen not to overflow."""
+"""Mask that leaves block numbers unchanged: it shows the compiler that index arithmetic cannot overflow."""
 
 NO_LENGTH = 1e-37
-"""Square [m^4] of the sum of a vertex's triangles below which they have no direction: float32 ends there."""
+"""Squared norm [m^4] of a sum of triangles below which it has no direction: the limit of float32."""
 
 
 @ti.func
@@ -28,7 +28,7 @@ def _row(rows: ti.template(), i):
 
 @ti.func
 def drawn_position(state: ti.template(), first, vertex, alpha):
-    """Of a vertex of the body whose particles begin at `first`, between two steps [m]."""
+    """Position of a vertex between two steps [m]; `first` is the body's first particle."""
     p = state.particle_of_vertex[first + vertex]
     before, after = state.prev_position[p], state.particle_position[p]
     x = before + alpha * (after - before)
@@ -44,7 +44,7 @@ def _block_count(positions: ti.template()):
 
 @ti.func
 def _sum_of_ring(positions: ti.template(), table: ti.template(), place, length: ti.template()):
-    """Of the triangles in the ring of a render vertex, twice their area times their normal."""
+    """Sum of the triangles in the ring of a render vertex: twice their areas times their normals."""
     a = _row(positions, table[place])
     one = _row(positions, table[place + LANES]) - a
     n = ti.Vector.zero(ti.f32, 3)
@@ -65,11 +65,11 @@ def write_render_mesh(
     positions: ti.types.ndarray(dtype=ti.f32, ndim=1),
     normals: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Positions [m] and unit normals of render vertices, `alpha` of the way from the previous step (0) to the
-    last one (1).
+    """Positions [m] and unit normals of render vertices, interpolated by `alpha` from the previous step (0)
+    to the last one (1).
 
     Args:
-        table: see `RenderMesh`.
+        table: see `render_table`.
         positions, normals: (3 k,).
     """
     ti.loop_config(serialize=is_serial)
@@ -85,7 +85,7 @@ def write_render_mesh(
         nx, ny = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
         nz = ti.Vector.zero(ti.f32, LANES)
         small = table[_block_count(positions) * (STRIDE + 1) + positions.shape[0] // 3 + 1]
-        # Reads arrays and writes local ones only, so that LLVM makes one pass over vector registers of it.
+        # Reads arrays and writes only local ones, so that LLVM vectorises it in one pass.
         if block < small:
             for lane in range(LANES):
                 j = lane & (LANES - 1)
@@ -96,7 +96,7 @@ def write_render_mesh(
                 j = lane & (LANES - 1)
                 n = _sum_of_ring(positions, table, (block & BLOCK_BITS) * STRIDE + j, RING)
                 nx[j], ny[j], nz[j] = n.x, n.y, n.z
-        # The few triangles that no ring has.
+        # The few triangles that are in no ring.
         row = _block_count(positions) * STRIDE + positions.shape[0] // 3 + block
         for number in range((table[row + 1] - table[row]) // 3):
             place = table[row] + 3 * number
@@ -108,10 +108,10 @@ def write_render_mesh(
             j = lane & (LANES - 1)
             square = nx[j] * nx[j] + ny[j] * ny[j] + nz[j] * nz[j]
             scale = 1.0 / ti.sqrt(ti.max(square, NO_LENGTH))
-            is_sound = square > NO_LENGTH
-            nx[j] = ti.select(is_sound, nx[j] * scale, 0.0)
-            ny[j] = ti.select(is_sound, ny[j] * scale, 0.0)
-            nz[j] = ti.select(is_sound, nz[j] * scale, 1.0)
+            is_valid = square > NO_LENGTH
+            nx[j] = ti.select(is_valid, nx[j] * scale, 0.0)
+            ny[j] = ti.select(is_valid, ny[j] * scale, 0.0)
+            nz[j] = ti.select(is_valid, nz[j] * scale, 1.0)
         for j in ti.static(range(LANES)):
             i = table[block * STRIDE + j]
             normals[3 * i], normals[3 * i + 1], normals[3 * i + 2] = nx[j], ny[j], nz[j]

@@ -6,22 +6,24 @@ from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
 FRAME = 12
-"""Numbers of a frame of a vertex of the body: the gradient F of the deformation there, by columns, and where
-the vertex is less F X / 2, with X its place at rest."""
+"""Numbers per frame of a vertex of the body: the deformation gradient F by columns, and the position less F X
+/ 2, with the position X at rest."""
 
 ROW = 10
-"""Numbers of a vertex of the skin: four shares, where it aims, its normal at rest."""
+"""Numbers per vertex of the skin: four weights, the target, and the normal at rest."""
 
 LANES = 16
-"""Vertices of the skin whose numbers lie side by side, and which are computed so."""
+"""Vertices of the skin that are stored and computed side by side."""
 
 NO_LENGTH = 1e-30
-"""Square of a normal below which it has no direction: float32 ends there."""
+"""Squared norm of a normal below which it has no direction, at float32's limit."""
 
 
-def in_lanes(rows: np.ndarray) -> np.ndarray:
-    """Rows (k, n) as the kernel reads them: of `LANES` after each other the first numbers, then the second,
-    and so on; 0 where the last block has no more, (blocks n LANES,)."""
+def interleaved(rows: np.ndarray) -> np.ndarray:
+    """Rows (k, n) in the order of the kernel: the first numbers of `LANES` rows, then the second, and so on.
+
+    The last block is padded with 0. The result is (blocks n LANES,).
+    """
     blocks = -(-len(rows) // LANES)
     padded = np.zeros((blocks * LANES, rows.shape[1]), dtype=rows.dtype)
     padded[: len(rows)] = rows
@@ -46,15 +48,15 @@ def write_skin(
     positions: ti.types.ndarray(dtype=ti.f32, ndim=1),
     normals: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Positions [m] and unit normals, `alpha` of the way from the previous step (0) to the last one (1).
+    """Positions [m] and unit normals, interpolated by `alpha` from the previous step (0) to the last one (1).
 
     Args:
-        count: vertices of the body.
-        ints: where the neighbours of each of these begin, the last end, the neighbours, and the four vertices
-            of the body that each vertex of the skin hangs on: `in_lanes`.
-        floats: the row of each neighbour in the gradient, the body's vertices at rest, and `ROW` numbers for
-            each vertex of the skin: `in_lanes`.
-        frames: to work in, (FRAME count,).
+        count: number of vertices of the body.
+        ints: where the neighbours of each of these begin, and the last end; the neighbours; and the four
+            vertices of the body that carry each vertex of the skin, `interleaved`.
+        floats: the row of each neighbour in the gradient; the body's vertices at rest; and `ROW` numbers for
+            each vertex of the skin, `interleaved`.
+        frames: work array, (FRAME count,).
         positions, normals: (3 k,).
     """
     ti.loop_config(serialize=is_serial)
@@ -76,12 +78,12 @@ def write_skin(
         rows = 3 * (edges + count) + ROW * LANES * block
         corners = count + 1 + edges + 4 * LANES * block
         drawn = ti.Vector.zero(ti.f32, 6 * LANES)
-        for lane in range(LANES):  # reads arrays and writes a local one only: so LLVM vectorises it
+        for lane in range(LANES):  # reads arrays and writes only a local one, so that LLVM vectorises it
             frame = ti.Vector.zero(ti.f32, FRAME)
             for c in ti.static(range(4)):
-                start, share = FRAME * ints[corners + LANES * c + lane], floats[rows + LANES * c + lane]
+                start, weight = FRAME * ints[corners + LANES * c + lane], floats[rows + LANES * c + lane]
                 for i in ti.static(range(FRAME)):
-                    frame[i] += share * frames[start + i]
+                    frame[i] += weight * frames[start + i]
             a, b, c, offset = (
                 ti.Vector([frame[0], frame[1], frame[2]]),
                 ti.Vector([frame[3], frame[4], frame[5]]),

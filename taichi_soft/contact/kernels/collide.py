@@ -42,7 +42,7 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
     position = contact.collider_position[c] + contact.collider_velocity[c] * since
     rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
     margin = contact.collider_surface[c].z + contact.collider_speed[c] * left
-    # The floor is a plane, and lies under most bodies: its distance is a few instructions alone.
+    # Most bodies are near the floor, a plane: its distance takes a few instructions.
     plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
     is_plane = kind == ShapeKind.PLANE
     for k in range(first, end):
@@ -110,9 +110,9 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 
 @ti.func
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
-    """Store how far each particle is clear of the first `count` near colliders.
+    """Store the clearance of each particle from the first `count` near colliders, 1 or more.
 
-    Planes stop all particles, or inner ones of a body that folds would go below the floor.
+    Planes stop all particles: inner ones of a body that folds would otherwise go below the floor.
     """
     contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.contact.shapes.shape import LONGEST, SHORTEST
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing import TetMesh
-from taichi_soft.meshing.advice import joining, needing
+from taichi_soft.meshing.advice import scene_hint, with_install_hint
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices
 
 FLATTEST = 1e-9
@@ -60,7 +60,7 @@ def _arrays(source: Any) -> tuple[Any, Any]:
         return source.vertices, source.faces
     raise MeshError(
         "a mesh shape is made of a trimesh.Trimesh, a TetMesh or (vertices, triangles), got "
-        f"{type(source).__name__}{joining(source)}"
+        f"{type(source).__name__}{scene_hint(source)}"
     )
 
 
@@ -75,14 +75,14 @@ def _require_closed(triangles: IntArray, numbers: NDArray[Any]) -> None:
         raise MeshError(
             f"the mesh is open: {odd.sum()} edges such as that of vertices "
             f"{name_vertices(numbers[pairs[odd.argmax()]])} belong to one triangle only. Close it, for "
-            f"example by {needing('trimesh.repair.fill_holes(mesh)', 'networkx')}, or give a sheet a "
-            "thickness"
+            f"example by {with_install_hint('trimesh.repair.fill_holes(mesh)', 'networkx')}, or give a "
+            "sheet a thickness"
         )
     bad = balance != 0
     if bad.any():
         raise MeshError(
             f"triangles at the edge of vertices {name_vertices(numbers[pairs[bad.argmax()]])} face opposite "
-            f"ways: turn them by {needing('mesh.fix_normals()', 'networkx', 'scipy')}"
+            f"ways: turn them by {with_install_hint('mesh.fix_normals()', 'networkx', 'scipy')}"
         )
 
 

@@ -16,7 +16,7 @@ from taichi_soft.contact.shapes.shape import as_length
 from taichi_soft.contact.shapes.triangle_tree import triangle_tree
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.runtime import init
-from taichi_soft.meshing.advice import needing
+from taichi_soft.meshing.advice import with_install_hint
 
 USUAL_CELLS = 64
 """Along the longest side of the mesh, where nobody says."""
@@ -90,7 +90,7 @@ def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
     if windings.min() < 0:
         raise MeshError(
             f"a part of the mesh is inside out, round {_place(windings, grid)} m: turn it by "
-            f"{needing('mesh.fix_normals()', 'networkx', 'scipy')}"
+            f"{with_install_hint('mesh.fix_normals()', 'networkx', 'scipy')}"
         )
     _require_thickness(corners, distances, grid)
     metres: NDArray[np.float32] = distances * np.float32(grid.cell)

@@ -1,1 +1,1 @@
-"""Loops over tetrahedra and edges: they load values, call laws, store forces."""
+"""Kernels over tetrahedra and edges: load values, call laws, store forces."""

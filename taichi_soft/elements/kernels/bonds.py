@@ -1,4 +1,4 @@
-"""Forces along and across edges: loads values, calls the law, stores forces."""
+"""Forces along and across edges: load values, call the law, store forces."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
@@ -27,7 +27,7 @@ def lane_pressure(state: ti.template(), block, lane):
 
 @ti.func
 def store_block_pressures(state: ti.template(), number):
-    """Pressures of a block's tetrahedra, for their edges to read."""
+    """Store the pressures of a block's tetrahedra, for their edges to read."""
     block = number & BLOCK_BITS
     pressure = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -38,7 +38,7 @@ def store_block_pressures(state: ti.template(), number):
 
 @ti.func
 def accumulate_pressures(state: ti.template(), body):
-    """Store the pressures of a body's tetrahedra, and in `edge_pressure` their sums, in one thread."""
+    """Store the pressures of a body's tetrahedra, and their sums in `edge_pressure`, in one thread."""
     edges, blocks = state.body_edges[body], state.body_blocks[body]
     for e in range(edges[0], edges[1]):
         state.edge_pressure[e] = 0.0
@@ -55,7 +55,7 @@ def accumulate_pressures(state: ti.template(), body):
 
 @ti.func
 def _corner(state: ti.template(), k, origin):
-    """A corner of a Voronoi face against `origin` [m]."""
+    """Corner of a Voronoi face relative to `origin` [m]."""
     members, weights = state.ring_members[k], state.ring_weights[k]
     arm = state.particle_position[members[0]] * weights[0] - origin
     for i in ti.static(range(1, 4)):
@@ -79,7 +79,7 @@ def _voronoi_normal(state: ti.template(), e, center):
 
 @ti.func
 def _subface_normal(state: ti.template(), e, xp, r):
-    """Area vector of the subfaces of an edge, and the direction it had at rest carried along (4.4.1)."""
+    """Area vector of the subfaces of an edge, and its rest direction as carried along (4.4.1)."""
     total, carried = r * 0.0, r * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -92,7 +92,7 @@ def _subface_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def _fitted_normal(state: ti.template(), e, xp, r):
-    """Normal of the plane through the particles round an edge, and its carried direction (4.4.2)."""
+    """Normal of the plane that best fits the particles around an edge, and its carried direction (4.4.2)."""
     total, carried = r * 0.0, r * 0.0
     s0, s1, s2 = r * 0.0, r * 0.0, r * 0.0
     ring = state.edge_ring[e]
@@ -104,29 +104,29 @@ def _fitted_normal(state: ti.template(), e, xp, r):
         s0 += arm * arm.x
         s1 += arm * arm.y
         s2 += arm * arm.z
-    count = ti.max(ring[1] - ring[0], 3)  # of two, the centre of the edge is the third
+    count = ti.max(ring[1] - ring[0], 3)  # with two, the centre of the edge is the third
     return plane_normal(count, total, (s0, s1, s2), r), carried
 
 
 @ti.func
 def _tilted_normal(state: ti.template(), e, xp, r):
-    """Normal of the plane that the particles round an edge tilt (4.4.3)."""
+    """Normal of the plane tilted by the particles around an edge (4.4.3)."""
     axis = direction_of(r)
     height = axis.x * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
         height += axis.dot(state.particle_position[state.ring_members[k][0]] - xp)
     height /= ti.max(ring[1] - ring[0], 1)
-    push = r * 0.0
+    rotation = r * 0.0
     for k in range(ring[0], ring[1]):
         arm = state.particle_position[state.ring_members[k][0]] - xp
-        push += tilt(axis, arm, height, state.ring_weights[k][1], state.ring_weights[k][0])
-    return tilted_normal(axis, push)
+        rotation += tilt(axis, arm, height, state.ring_weights[k][1], state.ring_weights[k][0])
+    return tilted_normal(axis, rotation)
 
 
 @ti.func
 def bond_frame_of(state: ti.template(), law: ti.template(), e):
-    """Of an edge: second end minus first [m], the unit direction of tension, and what is compared with it."""
+    """Second end of an edge minus the first [m], unit direction of tension, and the compared direction."""
     xp = state.particle_position[state.edge_vertices[e][0]]
     r = state.particle_position[state.edge_vertices[e][1]] - xp
     normal, compared = r, r
@@ -142,8 +142,8 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 
 @ti.func
-def kept_frame_of(state: ti.template(), law: ti.template(), e):
-    """`bond_frame_of` at the last evaluation of forces: to compute it anew costs as much as the forces."""
+def stored_frame_of(state: ti.template(), law: ti.template(), e):
+    """`bond_frame_of` from the last evaluation of forces: computing it again costs as much as the forces."""
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)
     else:
@@ -154,7 +154,7 @@ def kept_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def ring_tension(state: ti.template(), e):
-    """Pull of the tetrahedra round an edge on its ends [N], gathered from their pressures."""
+    """Pull of the tetrahedra around an edge on its ends [N], gathered from their pressures."""
     pressure = state.edge_damping[e] * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -164,7 +164,7 @@ def ring_tension(state: ti.template(), e):
 
 @ti.func
 def bond_force_of(state: ti.template(), law: ti.template(), e):
-    """Elastic and damping force on the first end of an edge that looks round it [N]."""
+    """Elastic and damping force on the first end of an edge with a ring [N]."""
     p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
     relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
     _, n, compared = bond_frame_of(state, law, e)

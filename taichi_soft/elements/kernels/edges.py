@@ -1,4 +1,4 @@
-"""Forces between the two ends of each edge, of pairwise laws or of damping alone: loads, calls, stores."""
+"""Forces between the two ends of each edge, by pairwise laws or by damping alone: load, call, store."""
 
 from taichi_soft.core.constants import HALF, LANES, ROW_BITS
 from taichi_soft.core.math.tensors import widened
@@ -10,7 +10,7 @@ from taichi_soft.elements.laws.springs import damped_pull, spring_tension
 
 @ti.func
 def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_velocity, tension):
-    """Force on the first end of an edge whose law looks at its ends only, and at a tension given [N]."""
+    """Force on the first end of an edge whose law uses only its ends and a given tension [N]."""
     if ti.static(model.has_bonds):
         pull = spring_tension(r, state.edge_bond[e]) + tension
         return damped_pull(r, relative_velocity, pull, state.edge_damping[e])
@@ -20,7 +20,7 @@ def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_vel
 
 @ti.func
 def edge_force_of(state: ti.template(), model: ti.template(), e):
-    """Force on the first end of edge `e` [N]; the second feels the opposite."""
+    """Force on the first end of edge `e` [N]; the second gets the opposite."""
     if ti.static(model.has_simple_edges):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
         tension = state.edge_damping[e] * 0.0
@@ -40,10 +40,9 @@ def edge_force_of(state: ti.template(), model: ti.template(), e):
 
 @ti.func
 def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
-    """Up to `LANES` edges, each half with one first end, side by side as the tetrahedra in `elastic`.
+    """Add the forces of up to `LANES` edges, each half with one first end, vectorised as in `elastic`.
 
-    What lies behind them is computed too, and counts nothing: other edges of the same body, or its spare
-    rows.
+    The edges that follow, of the same body or its spare rows, are computed too but do not count.
     """
     p = state.edge_vertices[first][0]
     p_later = state.edge_vertices[first + ti.select(count > HALF, HALF, 0)][0]
@@ -61,7 +60,7 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
         force = _simple_force(state, model, e, r, relative_velocity, tension)
         for i in ti.static(range(3)):
             forces[lane, i] = ti.select(lane < count, force[i], 0.0)
-        forces[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
+        forces[lane, 3] = 0.0  # written too: gaps in the rows would prevent vector stores
     for half in ti.static(range(2)):
         total = ti.Vector.zero(state.real, 4)
         for i in range(HALF):

@@ -1,9 +1,9 @@
-"""Elastic forces of tetrahedra: loads values, calls the law, stores corner forces.
+"""Elastic forces of tetrahedra: load values, call the law, store corner forces.
 
-The lanes of a block run in one loop that reads fields and writes local arrays only. Then LLVM's loop
-vectoriser turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`).
-It needs two things that are easy to lose: nothing in the loop may store to a field (it could overlap what
-the next lane reads), and index arithmetic must be seen not to overflow, which masking by `BLOCK_BITS` shows.
+The lanes of a block run in one loop that reads fields and writes only local arrays. LLVM's loop vectoriser
+then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). It
+needs two things that are easy to lose. The loop must not store to a field, which could overlap what the next
+lane reads. And index arithmetic must provably not overflow, which masking by `BLOCK_BITS` shows.
 """
 
 from taichi_soft.core.constants import LANES
@@ -37,7 +37,7 @@ def rest_inverse_of(state: ti.template(), block, lane):
 
 @ti.func
 def stiffness_of(state: ti.template(), block, lane):
-    """The 21 constants of a tetrahedron as `anisotropic_stress` takes them."""
+    """The 21 constants of a tetrahedron in the form of `anisotropic_stress`."""
     base = block * 21 * LANES + lane
     c = [state.tet_stiffness[base + k * LANES] for k in ti.static(range(21))]
     return (
@@ -53,7 +53,7 @@ def stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def elasticity_of(state: ti.template(), model: ti.template(), block, lane):
-    """What turns the strain of a tetrahedron into stress: lambda and mu, or its stiffness [Pa]."""
+    """Elasticity of a tetrahedron: lambda and mu, or its stiffness [Pa]."""
     if ti.static(model.is_anisotropic):
         return stiffness_of(state, block, lane)
     else:
@@ -105,7 +105,7 @@ def lane_forces(state: ti.template(), model: ti.template(), block, lane):
 
 
 @ti.func
-def _find_block_forces(
+def _compute_block_forces(
     state: ti.template(),
     model: ti.template(),
     block,
@@ -114,8 +114,9 @@ def _find_block_forces(
     g2: ti.template(),
     g3: ti.template(),
 ):
-    """Write the forces of a block's tetrahedra on their corners [N] to four matrices (LANES, 4), the last
-    column zero. Matrices that are returned would be copied: free bodies then take 1.05 times as long.
+    """Write the forces of a block's tetrahedra on their corners [N] to four matrices (LANES, 4).
+
+    The last column is zero. The matrices are arguments because Taichi copies returned ones.
     """
     volumes = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -125,7 +126,7 @@ def _find_block_forces(
             g1[lane, i] = f1[i]
             g2[lane, i] = f2[i]
             g3[lane, i] = f3[i]
-        # Written as well, or the rows would have gaps, which no vector store leaves.
+        # Written too: gaps in the rows would prevent vector stores.
         g0[lane, 3] = 0.0
         g1[lane, 3] = 0.0
         g2[lane, 3] = 0.0
@@ -133,7 +134,7 @@ def _find_block_forces(
         if ti.static(model.repairs_flips):
             volumes[lane] = volume6
     if ti.static(model.repairs_flips):
-        # Flips are rare, so they are put right here and cost the loop above nothing.
+        # Flips are rare, so they are corrected here and cost the loop above nothing.
         for lane in range(LANES):
             if volumes[lane] < 0.0:
                 f0, f1, f2, f3 = _flipped_forces_of(state, model, block, lane)
@@ -154,12 +155,12 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         g1 = ti.Matrix.zero(state.real, LANES, 4)
         g2 = ti.Matrix.zero(state.real, LANES, 4)
         g3 = ti.Matrix.zero(state.real, LANES, 4)
-        _find_block_forces(state, model, block, g0, g1, g2, g3)
+        _compute_block_forces(state, model, block, g0, g1, g2, g3)
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                # The matrix gets no second name: Taichi would copy it onto the stack for every lane, and a
-                # copy that happens to lie across two pages there took twice as long as all the rest.
+                # No second name for the matrix: Taichi would copy it onto the stack for every lane, which is
+                # slow.
                 force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
                 # Not `+=`, which Taichi makes atomic: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
@@ -167,13 +168,13 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
 
 @ti.func
 def store_block_forces(state: ti.template(), model: ti.template(), number):
-    """Write a block's corner forces where its particles gather them from."""
+    """Store a block's corner forces for particles to gather."""
     block = number & BLOCK_BITS
     g0 = ti.Matrix.zero(state.real, LANES, 4)
     g1 = ti.Matrix.zero(state.real, LANES, 4)
     g2 = ti.Matrix.zero(state.real, LANES, 4)
     g3 = ti.Matrix.zero(state.real, LANES, 4)
-    _find_block_forces(state, model, block, g0, g1, g2, g3)
+    _compute_block_forces(state, model, block, g0, g1, g2, g3)
     for corner in ti.static(range(4)):
         for lane in range(LANES):
             force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
@@ -182,7 +183,7 @@ def store_block_forces(state: ti.template(), model: ti.template(), number):
 
 @ti.func
 def store_lane_forces(state: ti.template(), model: ti.template(), block, lane):
-    """As `store_block_forces` for one lane: for processors that run one tetrahedron per thread."""
+    """`store_block_forces` for one lane: for processors that run one tetrahedron per thread."""
     forces = lane_forces(state, model, block, lane)
     for corner in ti.static(range(4)):
         state.corner_force[(block * 4 + corner) * LANES + lane] = widened(forces[corner])

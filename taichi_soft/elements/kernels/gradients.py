@@ -1,4 +1,4 @@
-"""Stiffness of a body where it is, element by element or as the blocks that conjugate gradients see."""
+"""Stiffness of a body at its present positions, by element or as the blocks for conjugate gradients."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
@@ -30,7 +30,7 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
 
 @ti.kernel
 def compute_bond_stiffness(state: ti.template(), law: ti.template(), out: ti.types.ndarray(ndim=3)):
-    """- d f_p / d p of every edge of the first body with its normal held, exact, (k, 3, 3) [N/m]."""
+    """- d f_p / d p of every edge of the first body with fixed normals, exact, (k, 3, 3) [N/m]."""
     ti.loop_config(serialize=True)
     for e in range(out.shape[0]):
         columns = bond_stiffness(state, law, e, False)
@@ -53,7 +53,7 @@ def compute_volume_pull(
 
 @ti.kernel
 def compute_system_stiffness(state: ti.template(), program: ti.template()):
-    """Fill the blocks of the first body with its projected stiffness alone."""
+    """Fill the blocks of the first body with only its projected stiffness."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         clear_system(state, 0)

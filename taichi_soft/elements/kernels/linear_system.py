@@ -1,10 +1,10 @@
-"""The system of implicit Euler, as 3x3 blocks per particle and per edge: M + h D + h^2 K (eq. 3.26).
+"""The system of implicit Euler in 3x3 blocks per particle and per edge: M + h D + h^2 K (eq. 3.26).
 
 K = - df/dx and D = - df/dv, both projected to be positive semi-definite. Only particles that share an edge
-act on each other, so every law fills the same blocks, and a product with the matrix is one pass over the
-edges. The rows of K and D sum to zero, so a product needs only `particle_inertia` and the differences of
-velocity along edges. A sum of stiff blocks times a velocity that all particles share would leave only
-rounding errors. The blocks on the diagonal serve the preconditioner.
+interact, so every law fills the same blocks, and a product with the matrix is one pass over the edges. The
+rows of K and D sum to zero, so a product needs only `particle_inertia` and the differences of velocity along
+edges. A sum of stiff blocks times a velocity that all particles share would leave only rounding errors. The
+diagonal blocks are for the preconditioner.
 """
 
 from taichi_soft.core.constants import LANES
@@ -12,12 +12,12 @@ from taichi_soft.core.math.tensors import outer, product
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel
-from taichi_soft.elements.kernels.bonds import kept_frame_of, ring_tension
+from taichi_soft.elements.kernels.bonds import ring_tension, stored_frame_of
 from taichi_soft.elements.kernels.elastic import elasticity_of, particles_of, rest_inverse_of
 from taichi_soft.elements.laws.anisotropic_stiffness import (
-    held_stiffness,
+    fixed_rotation_stiffness,
     pair_stiffness,
-    turned_pair_stiffness,
+    rotating_pair_stiffness,
 )
 from taichi_soft.elements.laws.anisotropy import green_stress
 from taichi_soft.elements.laws.bond_stiffness import along_and_across, spring_stiffness
@@ -28,7 +28,7 @@ from taichi_soft.elements.laws.stiffness import (
     element_stiffness,
     positive_part,
     stiffness_block,
-    weighed_rows,
+    weighted_rows,
 )
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
@@ -49,7 +49,7 @@ def clear_system(state: ti.template(), body):
 
 @ti.func
 def _add_pair(state: ti.template(), e, columns):
-    """A matrix that pulls both ends of an edge together."""
+    """Add a matrix that pulls both ends of an edge together."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
     state.particle_block[p] = state.particle_block[p] + block
@@ -59,7 +59,7 @@ def _add_pair(state: ti.template(), e, columns):
 
 @ti.func
 def _add_corner_pair(state: ti.template(), e, first, columns):
-    """A block of a tetrahedron, its row belonging to particle `first`."""
+    """Add a block of a tetrahedron whose row belongs to particle `first`."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     if state.edge_vertices[e][0] != first:
         block = block.transpose()
@@ -68,10 +68,10 @@ def _add_corner_pair(state: ti.template(), e, first, columns):
 
 @ti.func
 def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, projected: ti.template()):
-    """What `corner_stiffness` needs of one tetrahedron where it is: rows for its corners, and the rest.
+    """Arguments of `corner_stiffness` for one tetrahedron now: rows for its corners, and the rest.
 
     Args:
-        projected: make it symmetric and positive semi-definite.
+        projected: True makes it symmetric and positive semi-definite.
     """
     v = particles_of(state, block, lane)
     x = [state.particle_position[v[i]] for i in ti.static(range(4))]
@@ -80,24 +80,24 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
     elasticity = elasticity_of(state, model, block, lane)
     if ti.static(model.is_anisotropic and not model.has_energy):
         if ti.static(projected):
-            M, tension = held_stiffness(model, F, elasticity)
-            return weighed_rows(inverse), (M, tension, elasticity)
+            M, tension = fixed_rotation_stiffness(model, F, elasticity)
+            return weighted_rows(inverse), (M, tension, elasticity)
         else:
-            return weighed_rows(inverse), (F, F, elasticity)
+            return weighted_rows(inverse), (F, F, elasticity)
     elif ti.static(model.is_anisotropic):
         a, b, c = green_stress(F, elasticity)
         if ti.static(projected):
             a, b, c = positive_part((a, b, c))
-        return weighed_rows(inverse), (F, (a, b, c), elasticity)
+        return weighted_rows(inverse), (F, (a, b, c), elasticity)
     else:
-        return element_stiffness(model, F, weighed_rows(inverse), elasticity, projected)
+        return element_stiffness(model, F, weighted_rows(inverse), elasticity, projected)
 
 
 @ti.func
 def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.template()):
-    """- d f_i / d x_j of two corners [N/m], as columns, by their rows and the rest of `tet_stiffness`."""
+    """- d f_i / d x_j of two corners [N/m], as columns, from their rows and the rest of `tet_stiffness`."""
     if ti.static(model.is_anisotropic and not model.has_energy and not projected):
-        return turned_pair_stiffness(model, element[0], gi, gj, element[2])
+        return rotating_pair_stiffness(model, element[0], gi, gj, element[2])
     elif ti.static(model.is_anisotropic):
         return pair_stiffness(element[0], gi, gj, element[1], element[2])
     else:
@@ -106,7 +106,7 @@ def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.templa
 
 @ti.func
 def row_of(rows, i):
-    """Row i of a matrix (4, 3) as a vec3, i known at run time only."""
+    """Row i of a matrix (4, 3) as a vec3, for an i known only at run time."""
     return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
 
 
@@ -116,7 +116,7 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         g, element = tet_stiffness(state, model, block, lane, True)
-        # Pairs of corners in a loop, not side by side: ten copies of a block took most of the compile time.
+        # Pairs of corners in a loop: ten copies of a block would dominate the compile time.
         rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
         for i in range(4):
             p = state.tet_vertices[(block * 4 + i) * LANES + lane]
@@ -132,9 +132,9 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
 
 @ti.func
 def volume_pull(state: ti.template(), t):
-    """Gradients of V / V0 by the four corners of a tetrahedron, and by how much each is pulled per V / V0.
+    """Gradients g of V / V0 at the four corners of a tetrahedron, and the pull w on each per V / V0.
 
-    The corners feel -w dV / V0, so the stiffness is the outer product of w and g.
+    The force on the corners is -w dV / V0, so the stiffness is the outer product of w and g.
     """
     block, lane = t // LANES, t % LANES
     v = particles_of(state, block, lane)
@@ -148,7 +148,7 @@ def volume_pull(state: ti.template(), t):
 
 @ti.func
 def _add_volume_stiffness(state: ti.template(), body, scale):
-    """Of tetrahedra that pull their edges together as they grow: the positive part of w g^T.
+    """Add the stiffness of tetrahedra that pull their edges together: the positive part of w g^T.
 
     Its symmetric part has the eigenvalues (w.g +- |w||g|) / 2, the positive one along w/|w| + g/|g|.
     """
@@ -176,8 +176,8 @@ def _add_volume_stiffness(state: ti.template(), body, scale):
 
 @ti.func
 def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.template()):
-    """- d f_p / d p of a bond with its normal held [N/m], as columns; d f_p / d q is the opposite."""
-    r, n, _ = kept_frame_of(state, law, e)
+    """- d f_p / d p of a bond with a fixed normal [N/m], as columns; d f_p / d q is the opposite."""
+    r, n, _ = stored_frame_of(state, law, e)
     constants = state.edge_bond[e]
     if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         tension = spring_tension(r, constants)
@@ -216,7 +216,7 @@ def add_stiffness(state: ti.template(), program: ti.template(), body, scale):
 @ti.func
 def bond_damping_matrix(state: ti.template(), law: ti.template(), e):
     """- d f_p / d v_p of the damping of an edge [N s/m], as columns."""
-    _, n, compared = kept_frame_of(state, law, e)
+    _, n, compared = stored_frame_of(state, law, e)
     zero = state.edge_damping[e] * 0.0
     c0, c1, c2 = along_and_across(n, state.edge_damping[e], zero)
     if ti.static(not (law.ring == Ring.NONE or law.ring == Ring.EXPANSION)):
@@ -268,7 +268,7 @@ def add_damping(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def add_inertia(state: ti.template(), p, inertia):
-    """Add to what resists any change of velocity of a particle [kg]."""
+    """Add to the inertia of a particle, which resists any change of its velocity [kg]."""
     state.particle_inertia[p] = state.particle_inertia[p] + inertia
     for i in ti.static(range(3)):
         state.particle_block[p][i, i] = state.particle_block[p][i, i] + inertia
@@ -276,7 +276,7 @@ def add_inertia(state: ti.template(), p, inertia):
 
 @ti.func
 def add_masses(state: ti.template(), body):
-    """Add the masses of one body to its diagonal; pinned particles, which have none, are not solved for."""
+    """Add the masses of one body to its diagonal; pinned particles are not solved for."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]

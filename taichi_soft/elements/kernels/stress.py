@@ -1,4 +1,4 @@
-"""Stress of tetrahedra where they are now: for those who watch it step by step."""
+"""Stress of tetrahedra at their present positions, for checks in every step."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen
@@ -9,7 +9,7 @@ from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, part
 from taichi_soft.elements.laws.model import cauchy_stress
 
 NO_LIMIT = 1e30
-"""[Pa]; infinity would not do, because fast-math compilers may assume that there is none."""
+"""[Pa]; not infinity, because fast-math compilers can assume that there is none."""
 
 
 @ti.func
@@ -33,7 +33,7 @@ def _largest_principal(mean, squares, determinant):
     """Largest eigenvalue of mean I + D, by the angle of the cubic's roots, to 1e-4 of the norm of D.
 
     Args:
-        squares, determinant: D : D, and det D, of D without trace.
+        squares, determinant: D : D, and det D, of the traceless D.
     """
     radius = ti.sqrt(squares / 6.0)
     cosine = 0.5 * determinant / ti.max(radius * radius * radius, 1e-30)
@@ -43,7 +43,7 @@ def _largest_principal(mean, squares, determinant):
 
 @ti.func
 def _read_block(state: ti.template(), model: ti.template(), block, limit, first, out: ti.template()):
-    """Write the rows of `read_stress` of a block's tetrahedra, of which the first goes to row `first`."""
+    """Write the rows of `read_stress` for a block's tetrahedra, from row `first` on."""
     means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     determinants = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):  # vector registers take all of them at once, see `elements.kernels.elastic`
@@ -72,12 +72,13 @@ def read_stress(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     out: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Von Mises stress of the tetrahedra in `blocks`; and how hard they are pulled, and in which direction.
+    """Von Mises stress of the tetrahedra in `blocks`, and their largest principal stress with its direction.
 
     Args:
-        limits: for each block, from which pull on the direction is wanted [Pa]; `NO_LIMIT` asks for no pull.
-        out: (blocks times `LANES`, 5): von Mises and largest principal stress [Pa]; where that is over the
-            limit its direction in the world, of length 1.
+        limits: for each block, principal stress above which the direction is written [Pa]; `NO_LIMIT` skips
+            the principal stress.
+        out: (blocks times `LANES`, 5): von Mises and largest principal stress [Pa]; above the limit, its
+            direction in world axes, of length 1.
     """
     for i in range(blocks.shape[0]):
         block = blocks[i] & BLOCK_BITS
@@ -89,7 +90,7 @@ def read_stress(
 
 @ti.func
 def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.template()):
-    """The 3x3 part of a matrix that begins at a row and a column, as columns."""
+    """The 3x3 part of a matrix from a row and a column on, as columns."""
     a = ti.Vector([matrices[t, row + i, column] for i in ti.static(range(3))])
     b = ti.Vector([matrices[t, row + i, column + 1] for i in ti.static(range(3))])
     c = ti.Vector([matrices[t, row + i, column + 2] for i in ti.static(range(3))])
@@ -98,7 +99,7 @@ def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.templ
 
 @ti.func
 def _elasticity_from(model: ti.template(), stiffness: ti.template(), t):
-    """As `elasticity_of`, of a matrix (6, 6)."""
+    """`elasticity_of` for a matrix (6, 6)."""
     if ti.static(model.is_anisotropic):
         normal, mixed = _columns_of(stiffness, t, 0, 0), _columns_of(stiffness, t, 0, 3)
         return normal, mixed, _columns_of(stiffness, t, 3, 3)

@@ -1,4 +1,4 @@
-"""Force laws by name. A new law is one file with its functions and one line here."""
+"""Force laws by name. A new law is one file with its functions and one entry here."""
 
 from dataclasses import replace
 from functools import partial
@@ -34,7 +34,7 @@ from taichi_soft.elements.laws.virial import virial_forces
 from taichi_soft.elements.laws.volume_springs import volume_spring_bonds
 from taichi_soft.elements.materials import CONSTANTS, AnisotropicMaterial, AnyMaterial, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
-from taichi_soft.meshing.advice import filling
+from taichi_soft.meshing.advice import fill_hint
 
 __all__ = [
     "LAWS",
@@ -55,7 +55,7 @@ LAWS: dict[LawName, Law] = {
         StressLaw("face", "thesis 6.2", "Hooke's stress to forces by the four faces", face_forces),
         EnergyLaw(
             "st_venant_kirchhoff",
-            "thesis 6.4 asks for it",
+            "suggested in thesis 6.4",
             "Hooke's law as the derivative of an energy: no drift without damping",
             st_venant_kirchhoff_piola,
             st_venant_kirchhoff_principal,
@@ -67,7 +67,7 @@ LAWS: dict[LawName, Law] = {
         EnergyLaw(
             "neo_hookean",
             "Smith, de Goes and Kim 2018",
-            "rubber that keeps its energy and comes back from every flip",
+            "rubber that conserves energy and recovers from every flip",
             neo_hookean_piola,
             neo_hookean_principal,
             neo_hookean_energy,
@@ -86,7 +86,7 @@ LAWS: dict[LawName, Law] = {
         BondLaw(
             "volume_springs",
             "thesis 5.1",
-            "springs, and tetrahedra that pull their edges together as they grow",
+            "springs, and tetrahedra that pull their edges together as they expand",
             Ring.EXPANSION,
             volume_spring_bonds,
             SOLID,
@@ -94,7 +94,7 @@ LAWS: dict[LawName, Law] = {
         BondLaw(
             "cmpm",
             "thesis 4.1",
-            "a spring along and one across each edge, told apart by its Voronoi face",
+            "a spring along and one across each edge, separated by its Voronoi face",
             Ring.VORONOI,
             cmpm_bonds,
         ),
@@ -108,14 +108,14 @@ LAWS: dict[LawName, Law] = {
         BondLaw(
             "best_fitting_plane",
             "thesis 4.4.2",
-            "the same with a plane fitted to the particles round the edge",
+            "the same with a plane fitted to the particles around the edge",
             Ring.PLANE,
             best_fitting_plane_bonds,
         ),
         BondLaw(
             "tilted_plane",
             "thesis 4.4.3",
-            "the same with a plane that the particles round the edge tilt",
+            "the same with a plane tilted by the particles around the edge",
             Ring.TILT,
             tilted_plane_bonds,
         ),
@@ -136,21 +136,21 @@ def element_model(
     flips: FlipsName | None = None,
     damping_model: DampingModelName = DampingModel.EDGE,
 ) -> ElementModel:
-    """The model that these names choose; None takes the law's own.
+    """Return the model with the given choices.
 
     Args:
         law: a key of `LAWS`, such as "neo_hookean".
-        strain: "linear" or "exact"; None takes the default of the law.
-        flips: "tolerant", "recover" or "off"; None takes the default of the law.
+        strain: "linear" or "exact"; None: the law's default.
+        flips: "tolerant", "recover" or "off"; None: the law's default.
         damping_model: "edge", the default, or "tet_mean".
-    Raises: OptionError for a name that is not known or that the law does not take.
+    Raises: OptionError for a name that is unknown or that the law does not support.
     """
     if not isinstance(law, str) or law not in LAWS:
         raise OptionError(f"unknown law {law!r}: {choose_one_of(LAWS, law)}")
     chosen = LAWS[law]
     damping = DampingModel.parse(damping_model)
     if isinstance(chosen, BondLaw) and damping is not DampingModel.EDGE:
-        raise OptionError(f"law {law!r} has no damping_model={damping.value!r}: it takes 'edge'")
+        raise OptionError(f"law {law!r} has no damping_model={damping.value!r}: use 'edge'")
     return ElementModel(
         chosen,
         _one_of(chosen, "strain", None if strain is None else Strain.parse(strain), chosen.strains),
@@ -160,11 +160,11 @@ def element_model(
 
 
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
-    """Name of the law that a body has where none is named.
+    """Name of the law of a body for which none is given.
 
-    Neo-Hookean: no body froze by it, and every wreck came back (`python -m lab drop-test --sweep`). The
-    virial one for options that only the thesis's laws have and for an `AnisotropicMaterial`; springs for a
-    `SpringMaterial`.
+    Neo-Hookean, because no body froze with it and every inverted body recovered (`python -m lab drop-test
+    --sweep`). "virial" for options that only the thesis's laws have and for an `AnisotropicMaterial`;
+    "springs" for a `SpringMaterial`.
     """
     if isinstance(material, SpringMaterial):
         return "springs"
@@ -174,20 +174,20 @@ def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsNa
 
 
 def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
-    """The model that this mesh and this material need.
+    """Return the model that this mesh and this material need.
 
-    Raises: MeshError or MaterialError where a law cannot be made of them.
+    Raises: MeshError or MaterialError if the law does not support them.
     """
     law = model.law
     if not isinstance(mesh, BodyMesh):
         is_surface = hasattr(mesh, "faces") or hasattr(mesh, "geometry")
-        advice = f": {filling('mesh')}" if is_surface else ""
-        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}{advice}")
+        hint = f": {fill_hint('mesh')}" if is_surface else ""
+        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}{hint}")
     if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
     if isinstance(material, SpringMaterial) and law.name == "springs":
         if not isinstance(mesh, ParticleMesh):
-            raise MaterialError("a SpringMaterial tells no density: turn the mesh into a ParticleMesh first")
+            raise MaterialError("a SpringMaterial has no density: convert the mesh to a ParticleMesh first")
         return model
     if not isinstance(mesh, TetMesh):
         raise MeshError(
@@ -203,22 +203,27 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
             material.per_tet(name, len(mesh.tets))
     given = material.shear_modulus is not None or material.shear_damping is not None
     if given and not (isinstance(law, BondLaw) and law.takes_shear):
-        raise MaterialError(f"law {law.name!r} takes no shear_modulus or shear_damping of its own")
+        raise MaterialError(f"law {law.name!r} has no shear_modulus and shear_damping: leave them out")
     return replace(model, is_anisotropic=False)
 
 
 def _fit_anisotropic(model: ElementModel, tet_count: int, material: AnisotropicMaterial) -> ElementModel:
     if not model.law.takes_anisotropy:
-        takers = ", ".join(repr(law.name) for law in LAWS.values() if law.takes_anisotropy)
-        raise MaterialError(f"law {model.law.name!r} takes no AnisotropicMaterial: {takers} do")
+        supported = ", ".join(repr(law.name) for law in LAWS.values() if law.takes_anisotropy)
+        raise MaterialError(
+            f"law {model.law.name!r} does not support an AnisotropicMaterial: use {supported}"
+        )
     material.require_count(tet_count)
     return replace(model, is_anisotropic=True)
 
 
-def _one_of(law: Law, option: str, asked: ChoiceT | None, taken: tuple[ChoiceT, ...]) -> ChoiceT | None:
-    if asked is None:
-        return taken[0] if taken else None
-    if asked not in taken:
-        names = " or ".join(repr(member.value) for member in taken) or "none"
-        raise OptionError(f"law {law.name!r} has no {option}={asked.value!r}: it takes {names}")
-    return asked
+def _one_of(
+    law: Law, option: str, requested: ChoiceT | None, supported: tuple[ChoiceT, ...]
+) -> ChoiceT | None:
+    if requested is None:
+        return supported[0] if supported else None
+    if requested not in supported:
+        names = " or ".join(repr(member.value) for member in supported)
+        fix = f"pass {names}" if names else f"leave {option} out"
+        raise OptionError(f"law {law.name!r} does not support {option}={requested.value!r}: {fix}")
+    return requested

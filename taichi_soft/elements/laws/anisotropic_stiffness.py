@@ -1,14 +1,14 @@
-"""How the forces of an anisotropic tetrahedron change as its vertices move: what implicit integration needs.
+"""Derivatives of an anisotropic tetrahedron's forces by its vertices, for implicit integration.
 
-The law of St. Venant-Kirchhoff needs no rotation. Those of thesis chapter 6 have, with F = R U and
-S = C : eps(U), forces -V P g with P = R Q and Q = S cof(U). A change of F turns R as well: with
+The law of St. Venant-Kirchhoff involves no rotation. Those of thesis chapter 6 do: with F = R U and
+S = C : eps(U), the forces are -V P g with P = R Q and Q = S cof(U). A change of F rotates R as well: with
 U = A diag(s) A^T and G = A^T R^T dF A it is
 
     dU = A [(s_a G_ab + s_b G_ba) / (s_a + s_b)] A^T,    R^T dR = A [(G_ab - G_ba) / (s_a + s_b)] A^T.
 
-These forces have no energy, so that is not symmetric. What conjugate gradients get is positive semi-definite
-by its form: the stiffness C, turned with R and weighed as the deformed areas weigh it (R held: Mueller and
-Gross 2004, Interactive virtual materials), and what tension adds to it.
+These forces have no energy, so their derivative is not symmetric. Conjugate gradients get a matrix that is
+positive semi-definite by construction: the stiffness C, rotated by R and weighted by the deformed areas (R
+fixed: Mueller and Gross 2004, Interactive virtual materials), plus the contribution of tension.
 """
 
 from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
@@ -29,13 +29,13 @@ from taichi_soft.core.types import Flips, Strain
 from taichi_soft.elements.laws.anisotropy import anisotropic_stress, between, green_stress, wave_modulus
 from taichi_soft.elements.laws.stiffness import element_stiffness, positive_part, stiffness_block
 
-FLATTEST = 0.05
-"""Part of its volume at rest that a flatter tetrahedron is taken to have, where tension is divided by it."""
+MIN_VOLUME = 0.05
+"""Lower limit of the volume relative to rest by which tension is divided."""
 
 
 @ti.func
 def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
-    """S = C : eps of the strain that the model names [Pa], as columns."""
+    """S = C : eps of the model's strain [Pa], as columns."""
     if ti.static(model.strain == Strain.EXACT):
         return anisotropic_stress(scaled_plus_identity(U, 1.0, -1.0), stiffness)
     else:
@@ -43,10 +43,10 @@ def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
 
 
 @ti.func
-def held_stiffness(model: ti.template(), F, stiffness):
-    """What `pair_stiffness` takes for a law of chapter 6 in place of F and S: positive semi-definite.
+def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
+    """Arguments of `pair_stiffness` in place of F and S for a law of chapter 6: positive semi-definite.
 
-    Of what is inside out and comes back, the modulus of its `recovering_piola` alone.
+    For an inverted tetrahedron that recovers, only the modulus of its `recovering_piola`.
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -58,7 +58,7 @@ def held_stiffness(model: ti.template(), F, stiffness):
     W = from_axes(weight, A)
     S = _stress_in_rest_axes(model, F, U, stiffness)
     tension = positive_part(product(S, product(others, others)))
-    a, b, c = plus(tension, 1.0 / ti.max(determinant(U), FLATTEST), tension, 0.0)
+    a, b, c = plus(tension, 1.0 / ti.max(determinant(U), MIN_VOLUME), tension, 0.0)
     d, e, f = product(R, W)
     if ti.static(model.flips == Flips.RECOVER):
         if determinant(F) < 0.0:
@@ -68,11 +68,11 @@ def held_stiffness(model: ti.template(), F, stiffness):
 
 
 @ti.func
-def turned_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
-    """- d f_i / d x_j of two vertices [N/m], as columns, of a law of chapter 6: exact.
+def rotating_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
+    """- d f_i / d x_j of two vertices [N/m], as columns, for a law of chapter 6: exact.
 
     Args:
-        gi, gj: as `pair_stiffness` takes them.
+        gi, gj: as for `pair_stiffness`.
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -84,7 +84,7 @@ def turned_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
     if ti.static(model.flips == Flips.OFF):
         side = ti.select(determinant(F) < 0.0, -1.0, 1.0)
     block = ti.Matrix.zero(ti.f64, 3, 3)
-    for k in range(3):  # side by side they took Taichi minutes to compile
+    for k in range(3):  # a loop, because three copies take minutes to compile
         along = ti.Vector([int(k == 0), int(k == 1), int(k == 2)]) + F[0] * 0.0
         G = product(product(transposed(RA), outer(along, gj)), A)
         in_axes, turn_in_axes = _parts(G, s)
@@ -116,7 +116,7 @@ def _strain_change(model: ti.template(), U, dU):
 
 @ti.func
 def _parts(G, s):
-    """Change of U, and R^T dR, in the axes of U, as columns; G as above."""
+    """Change of U, and R^T dR, in the axes of U, as columns; for G see above."""
     least = 1e-9
     xy, xz, yz = ti.max(s.x + s.y, least), ti.max(s.x + s.z, least), ti.max(s.y + s.z, least)
     u_xy = (s.x * G[1].x + s.y * G[0].y) / xy
@@ -131,7 +131,7 @@ def _parts(G, s):
 
 @ti.func
 def _mixed_cofactor(M, N):
-    """How the cofactor of M changes with M along N, as columns."""
+    """Derivative of the cofactor of M in the direction N, as columns."""
     return (
         M[1].cross(N[2]) + N[1].cross(M[2]),
         M[2].cross(N[0]) + N[2].cross(M[0]),
@@ -141,16 +141,16 @@ def _mixed_cofactor(M, N):
 
 @ti.func
 def pair_stiffness(F, gi, gj, stress, stiffness):
-    """- d f_i / d x_j of two vertices [N/m], as columns, of forces -V F S g_i with S = `green_stress`.
+    """- d f_i / d x_j of two vertices [N/m], as columns, for forces -V F S g_i with S = `green_stress`.
 
-    F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i takes a move of the vertex to strain.
+    F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of the vertex to strain.
     Args:
-        gi, gj: rows of A^-1 that belong to the vertices, times the root of the rest volume.
-        stress: S as columns, or the part of it that is let count.
+        gi, gj: rows of A^-1 of the vertices, times the root of the rest volume.
+        stress: S as columns, or the part of it that is used.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     Ti, Tj = _shear_of(gi), _shear_of(gj)
-    # C B_j: normal and shear stress by a move of the second vertex.
+    # C B_j: normal and shear stress from a displacement of the second vertex.
     a = _scaled_columns(normal, gj), product(mixed, Tj)
     b = _scaled_columns(transposed(mixed), gj), product(shear, Tj)
     N = (
@@ -163,7 +163,7 @@ def pair_stiffness(F, gi, gj, stress, stiffness):
 
 @ti.func
 def _shear_of(g):
-    """Engineering shear yz, xz, xy by a move, as columns."""
+    """Engineering shear yz, xz, xy from a displacement, as columns."""
     zero = g.x * 0.0
     return ti.Vector([zero, g.z, g.y]), ti.Vector([g.z, zero, g.x]), ti.Vector([g.y, g.x, zero])
 

@@ -1,7 +1,7 @@
-"""Hooke's law of materials that are not the same in all directions (thesis eq. 2.25, chapter 7).
+"""Hooke's law for anisotropic materials (thesis eq. 2.25, chapter 7).
 
-Their stiffness is known in the axes of the rest shape, so the strain has to be known there as well: besides
-the stretch U of F = U R it takes the rotation R, which isotropic laws do not need.
+Their stiffness is given in the axes of the rest shape, so the strain is needed in these axes too. That takes
+the rotation R of F = U R besides the stretch U; isotropic laws do not need R.
 """
 
 from taichi_soft.core.math.polar import orthogonal_factor
@@ -42,9 +42,9 @@ def green_stress(F, stiffness):
 
 @ti.func
 def turned_stress(model: ti.template(), F, stiffness):
-    """Stress R (C : R^T eps R) R^T of the strain that the model names [Pa], as columns.
+    """Stress R (C : R^T eps R) R^T of the model's strain [Pa], as columns.
 
-    In a mirrored tetrahedron R mirrors too, so that its stress is that of the mirror image.
+    In a mirrored tetrahedron R mirrors too, so the stress is that of the mirror image.
     """
     R = orthogonal_factor(F)
     if ti.static(model.strain == Strain.EXACT):
@@ -62,7 +62,7 @@ def between(M, columns):
 
 @ti.func
 def wave_modulus(stiffness):
-    """What pressure waves meet, the mean over all directions [Pa]: 1/15 (C_iijj + 2 C_ijij)."""
+    """Modulus of pressure waves, averaged over all directions [Pa]: 1/15 (C_iijj + 2 C_ijij)."""
     normal, shear = stiffness[0], stiffness[2]
     along = normal[0].x + normal[1].y + normal[2].z
     lateral = normal[1].x + normal[2].x + normal[2].y

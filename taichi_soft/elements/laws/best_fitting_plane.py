@@ -1,9 +1,9 @@
-"""CMPM with the plane that fits the particles round an edge best (thesis section 4.4.2).
+"""CMPM with the plane that best fits the particles around an edge (thesis section 4.4.2).
 
-Least squares for more than three particles; the same formula gives the cross product for three. Where there
-are two, the centre of the edge is the third. Such planes are rarely perpendicular to their edge, so, as in
-CMPM2, their normal is compared with where the tetrahedra have carried it from rest. Implicit Euler holds the
-normal, and takes the edge itself for what is compared (`bond_stiffness`).
+The fit is by least squares for more than three particles; the same formula gives the cross product for three.
+If there are two, the centre of the edge is the third. Such planes are rarely perpendicular to their edge. As
+in CMPM2, their normal is therefore compared with its rest direction as carried by the tetrahedra. Implicit
+Euler keeps the normal fixed, and compares it with the edge itself (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 
 @ti.func
 def plane_normal(count, total, squares, r):
-    """Unit normal of the plane through points, on the side of `r`.
+    """Unit normal of the plane that best fits points, on the side of `r`.
 
     Args:
-        count: of the points.
+        count: number of points.
         total: their sum, vec3 [m].
         squares: sum of their outer squares, as columns [m^2].
         r: second end of the edge minus the first [m].
@@ -40,37 +40,38 @@ def plane_normal(count, total, squares, r):
 
 
 def plane_normals(rings: EdgeRings) -> Floats:
-    """`plane_normal` of every edge at rest, in numpy, (k, 3)."""
+    """`plane_normal` of every edge at rest, in NumPy, (k, 3)."""
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges]
-    arm = mesh.vertices[vertex] - ends[edge].mean(axis=1)
+    offset = mesh.vertices[vertex] - ends[edge].mean(axis=1)
     start = np.searchsorted(edge, np.arange(len(mesh.edges)))
-    count = np.maximum(np.bincount(edge), 3)[:, None]  # of two, the centre of the edge is the third
-    total = np.add.reduceat(arm, start, axis=0)
-    squares = np.add.reduceat(arm[:, :, None] * arm[:, None, :], start, axis=0)
+    count = np.maximum(np.bincount(edge), 3)[:, None]  # with two, the centre of the edge is the third
+    total = np.add.reduceat(offset, start, axis=0)
+    squares = np.add.reduceat(offset[:, :, None] * offset[:, None, :], start, axis=0)
     _, axes = np.linalg.eigh(squares - total[:, :, None] * (total / count)[:, None, :])
     side = np.einsum("ka,ka->k", axes[:, :, 0], ends[:, 1] - ends[:, 0])
     return np.asarray(axes[:, :, 0] * np.where(side < 0, -1.0, 1.0)[:, None])
 
 
 def split_ring_normals(rings: EdgeRings) -> Floats:
-    """The cheap normals of 4.4.2 at rest, (k, 3): no eigenvectors, nothing but sums.
+    """Cheap normals of 4.4.2 at rest, (k, 3): sums instead of eigenvectors.
 
-    The particles round an edge are split into two halves, and once more a quarter of a turn further. The
-    normal is that of the two vectors between the means of the halves; of three particles it is the plane's.
+    The particles around an edge are split into two halves, and again a quarter of a turn further. The normal
+    is perpendicular to the two vectors between the means of the halves; for three particles it is that of
+    their plane.
     """
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges]
-    arm = mesh.vertices[vertex] - ends[edge].mean(axis=1)
+    offset = mesh.vertices[vertex] - ends[edge].mean(axis=1)
     start = np.searchsorted(edge, np.arange(len(mesh.edges)))
-    number, count = np.arange(len(edge)) - start[edge], np.maximum(np.bincount(edge), 3)[edge]
+    index, count = np.arange(len(edge)) - start[edge], np.maximum(np.bincount(edge), 3)[edge]
     half = count // 2
     spans = []
-    for turn in (0 * count, np.maximum(1, np.rint(count / 4).astype(np.int64))):
-        weight = np.where((number - turn) % count < half, 1 / half, -1 / (count - half))
-        spans.append(np.add.reduceat(weight[:, None] * arm, start, axis=0))
+    for shift in (0 * count, np.maximum(1, np.rint(count / 4).astype(np.int64))):
+        weight = np.where((index - shift) % count < half, 1 / half, -1 / (count - half))
+        spans.append(np.add.reduceat(weight[:, None] * offset, start, axis=0))
     normals = np.cross(*spans)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     side = np.einsum("ka,ka->k", normals, ends[:, 1] - ends[:, 0])
@@ -78,7 +79,7 @@ def split_ring_normals(rings: EdgeRings) -> Floats:
 
 
 def best_fitting_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Ring rows: a particle; its weight, and a share of the far end's, in the carried direction."""
+    """Ring rows: a particle; its weight, and part of the far end's weight, in the carried direction."""
     rings = require_tets(mesh, material, "best_fitting_plane")
     normals = plane_normals(rings)
     far, one, other = carried_direction(rings, normals).T
@@ -87,15 +88,15 @@ def best_fitting_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
     keys = edge * count + vertex
     weight = np.zeros(len(keys))
     order = np.argsort(keys)
-    for side, part in zip(rings.sides.T, (one, other), strict=True):
-        np.add.at(weight, order[np.searchsorted(keys[order], rings.edge * count + side)], part)
-    share = (rings.sum(far) / np.bincount(edge))[edge]
+    for side, weights in zip(rings.sides.T, (one, other), strict=True):
+        np.add.at(weight, order[np.searchsorted(keys[order], rings.edge * count + side)], weights)
+    far_weight = (rings.sum(far) / np.bincount(edge))[edge]
     young, shear, damping = moduli(rings, material)
     area = rings.edge_areas
     return Bonds(
         columns(1.0, area * young, area * shear, damping, count=len(mesh.edges)),
         edge,
         member_columns(vertex, count=len(edge)),
-        columns(weight, share, count=len(edge)),
+        columns(weight, far_weight, count=len(edge)),
         normals,
     )

@@ -1,4 +1,4 @@
-"""What a pairwise law knows of every edge of a body at rest: made once, in numpy, by the law's own file."""
+"""Constants of every edge of a body at rest for a pairwise law, made once in NumPy by the law's own file."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Ints = NDArray[np.int64]
 
 
 class Ring(Enum):
-    """What the rows of an edge's ring name, and what is made of them while the body deforms."""
+    """Rows of an edge's ring, and how they are used while the body deforms."""
 
-    NONE = "none"  # a spring looks at its two ends only
+    NONE = "none"  # a spring depends only on its two ends
     EXPANSION = "expansion"  # tetrahedra, whose change of volume pulls or pushes along the edge
     VORONOI = "voronoi"  # corners of the Voronoi face, each in barycentric coordinates of four particles
     SUBFACES = "subfaces"  # the two particles that span a barycentric subface
@@ -31,14 +31,15 @@ class Bonds:
 
     Attributes:
         constants: (k, 4): length at rest [m], stiffness along and across it [N/m], damping across it
-            [N s/m]. Zero where an edge is no bond. Laws that compare directions take length 1 and [N]; those
-            that look at expansion have the area of the edge [m^2] in the third column.
-        ring_edge: (r,) the edge of each row of the rings, ascending.
-        ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 where a law needs fewer.
+            [N s/m]. Zero if an edge is not a bond. Laws that compare directions use length 1 and [N]; those
+            with expansion have the area of the edge [m^2] in the third column.
+        ring_edge: (r,) edge of each row of the rings, ascending.
+        ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 in columns that a law does not
+            use.
         ring_weights: (r, 4), see the law.
-        normals: (k, 3) unit normal at rest of the plane that tells tension from shear; NaN where none.
-        masses: (n,) [kg], where the law distributes mass its own way.
-        expansion_modulus: (m,) [Pa], pressure of a tetrahedron on its edges per dV / V0, where a law has it.
+        normals: (k, 3) unit normal at rest of the plane that separates tension from shear; NaN without one.
+        masses: (n,) [kg], if the law distributes mass differently.
+        expansion_modulus: (m,) [Pa], pressure of a tetrahedron on its edges per dV / V0, if a law has it.
     """
 
     constants: Floats
@@ -54,12 +55,12 @@ class Bonds:
 
     @property
     def is_bond(self) -> NDArray[np.bool_]:
-        """Whether each edge carries force, (k,)."""
+        """True for edges that carry force, (k,)."""
         return np.asarray(self.constants[:, 1] > 0)
 
 
 def columns(*values: Floats | float, count: int) -> Floats:
-    """The given columns side by side, zeros to the right, (count, 4)."""
+    """The given columns side by side, padded with zeros on the right, (count, 4)."""
     rows = np.zeros((count, 4))
     for i, value in enumerate(values):
         rows[:, i] = value
@@ -67,7 +68,7 @@ def columns(*values: Floats | float, count: int) -> Floats:
 
 
 def member_columns(*values: Ints, count: int) -> Ints:
-    """The given columns side by side, -1 to the right, (count, 4)."""
+    """The given columns side by side, padded with -1 on the right, (count, 4)."""
     rows = np.full((count, 4), -1, dtype=np.int64)
     for i, value in enumerate(values):
         rows[:, i] = value

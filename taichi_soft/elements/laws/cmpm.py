@@ -1,8 +1,8 @@
 """Continuum mechanics particle model: a spring along and one across each edge (thesis chapter 4).
 
-Between two particles lies a face of the Voronoi graph. Its corners move with the tetrahedra that hold them,
-and the normal of the deformed face tells what part of the edge is tension and what is shear.
-Implicit Euler holds that normal (`bond_stiffness`), as thesis 4.2 does.
+Between two particles lies a face of the Voronoi graph. Its corners move with the tetrahedra that contain
+them. The normal of the deformed face separates the edge into tension and shear. Implicit Euler keeps that
+normal fixed (`bond_stiffness`), as in thesis 4.2.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from taichi_soft.meshing.voronoi import voronoi_graph
 
 @ti.func
 def direction_of(v):
-    """The unit vector along `v`, or zero where it has no length."""
+    """Unit vector along `v`, or zero if it has no length."""
     return v / ti.max(ti.sqrt(v.dot(v)), 1e-30)
 
 
@@ -26,7 +26,7 @@ def direction_of(v):
 def bond_force(r, n, constants):
     """Force on the first end of a bond [N], eq. 4.1 to 4.4: f_p = a/l (E (n.r - l) n + G m), f_q = -f_p.
 
-    m = r - (n.r) n is what of r lies across n; unnormalised, so that nothing is divided by zero at rest.
+    m = r - (n.r) n is the part of r across n. It is not normalised, which avoids a division by zero at rest.
     Args:
         r: second end minus first [m].
         n: unit normal of the face between them, towards the second end; zero gives no force.
@@ -38,12 +38,12 @@ def bond_force(r, n, constants):
 
 @ti.func
 def bond_damping(r, n, relative_velocity, tensile, shear):
-    """Damping force on the first end of a bond [N], eq. 4.5, along n and along m where there is shear.
+    """Damping force on the first end of a bond [N], eq. 4.5, along n, and along m if there is shear.
 
-    Along m it brakes the rotation of sheared bodies too.
+    Along m it also damps the rotation of sheared bodies.
     Args:
-        r, n: as in `bond_force`; or the direction that is compared with n.
-        relative_velocity: of the second end against the first [m/s].
+        r, n: as for `bond_force`; or the direction that is compared with n.
+        relative_velocity: velocity of the second end relative to the first [m/s].
         tensile, shear: b_n and b_m [N s/m].
     """
     m = shear_direction(r, n)
@@ -52,7 +52,7 @@ def bond_damping(r, n, relative_velocity, tensile, shear):
 
 @ti.func
 def shear_direction(r, n):
-    """Unit vector along what of r lies across n; zero where that is a millionth of r and so rounding."""
+    """Unit vector along the part of r across n; zero if that is within a millionth of r, and so rounding."""
     m = r - n * n.dot(r)
     return ti.select(m.dot(m) > 1e-12 * r.dot(r), direction_of(m), m * 0.0)
 
@@ -74,7 +74,7 @@ def moduli(rings: EdgeRings, material: Material) -> tuple[Floats, Floats, Floats
 def cmpm_bonds(mesh: TetMesh, material: Material) -> Bonds:
     """Bonds across the clipped Voronoi faces; ring rows: a corner in barycentric coordinates.
 
-    The first corner of a face is repeated at its end. Masses are those of the Voronoi cells (section 4.1).
+    The first corner of a face is repeated at the end. Masses are those of the Voronoi cells (section 4.1).
     Raises: MeshError if the mesh is not Delaunay.
     """
     graph = voronoi_graph(mesh)

@@ -1,9 +1,10 @@
 """CMPM2: barycentric subfaces instead of the Voronoi graph (thesis section 4.4.1).
 
-The normal n of the subfaces of an edge is compared with r, the direction that it had at rest and that has
-been carried along by the tetrahedra: eq. 4.9 (with r - n^, of unit length) and 4.10. On an edge that several
-tetrahedra share, r is their mean, weighed by the areas of their subfaces. Implicit Euler holds n, and takes
-the edge itself for r (`bond_stiffness`).
+The normal n of an edge's subfaces is compared with r, the direction that it had at rest as carried along by
+the
+tetrahedra: eq. 4.9 (with r - n^, of unit length) and 4.10. On an edge that several tetrahedra share, r is
+their mean, weighted by the areas of their subfaces. Implicit Euler keeps n fixed, and uses the edge itself
+for r (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ def subface(center, a, b):
     """Area vector of a barycentric subface [m^2], along its edge (fig. 4.4).
 
     Args:
-        center: of the edge [m].
-        a, b: the vertices of the tetrahedron off the edge, counterclockwise against its direction [m].
+        center: centre of the edge [m].
+        a, b: the other two vertices of the tetrahedron, counterclockwise against the edge's direction [m].
     """
     return (a - center).cross(b - center) / 12.0
 
@@ -33,18 +34,18 @@ def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
     """Weights (r, 3) of an edge's far end and of the two sides in its carried direction.
 
     A direction d at rest becomes F d = sum (A^-1 d)_i (x_i - x_0) in each tetrahedron (eq. 6.3), here with
-    the edge's first end as x_0; summed over the rows of an edge these are the means that the law wants.
+    the edge's first end as x_0; summed over the rows of an edge, these give the means of the law.
     """
     mesh = rings.mesh
     x = mesh.vertices
     first, second = mesh.edges[rings.edge].T
     A = np.stack([x[i] - x[first] for i in (second, rings.sides[:, 0], rings.sides[:, 1])], axis=2)
-    share = rings.areas / rings.edge_areas[rings.edge]
-    return np.asarray(share[:, None] * np.linalg.solve(A, directions[rings.edge][:, :, None])[:, :, 0])
+    fraction = rings.areas / rings.edge_areas[rings.edge]
+    return np.asarray(fraction[:, None] * np.linalg.solve(A, directions[rings.edge][:, :, None])[:, :, 0])
 
 
 def require_tets(mesh: TetMesh, material: Material, law: str) -> EdgeRings:
-    """The rings of a mesh of tetrahedra. Raises: MeshError for what has none."""
+    """Return the rings of a tetrahedral mesh. Raises: MeshError for another mesh or material."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError(f"law {law!r} needs tetrahedra and a Material")
     return EdgeRings.of(mesh)

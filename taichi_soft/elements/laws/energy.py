@@ -1,4 +1,4 @@
-"""Vertex forces from the derivative of an energy by the deformation.
+"""Vertex forces from the derivative of an energy with respect to the deformation.
 
 The energy of a tetrahedron is its volume at rest V0 times a density psi(F), and F = B A^-1 (thesis eq. 6.3)
 is linear in the vertices: f_i = -V0 P r_i, with P = d psi / d F (the first Piola-Kirchhoff stress) and r_i
@@ -15,7 +15,7 @@ def energy_forces(piola, rest_inverse):
 
     Args:
         piola: P as columns [Pa].
-        rest_inverse: A^-1 as columns [1/m]; all zero for the lanes that pad a block, which have no volume.
+        rest_inverse: A^-1 as columns [1/m]; all zero for padding lanes, which have no volume.
     """
     a, b, c = rest_inverse[0], rest_inverse[1], rest_inverse[2]
     inverse_volume6 = determinant(rest_inverse)

@@ -1,4 +1,4 @@
-"""What a force law is: its name, its source, and one function from deformation to forces."""
+"""Force laws: a name, a source, and a function from deformation to forces."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,25 +19,25 @@ class StressLaw:
     source: str
     summary: str
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
-    strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
+    strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # supported, the default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
     parameters: tuple[str, ...] = SOLID  # of its material
     keeps_energy: bool = False
-    takes_anisotropy: bool = True  # also a material with the parameters `ANISOTROPIC`
+    takes_anisotropy: bool = True  # True if it also supports the parameters `ANISOTROPIC`
 
 
 @dataclass(frozen=True)
 class EnergyLaw:
-    """An elastic energy and its derivative: what a body gives back is what was put in."""
+    """An elastic energy and its derivative: elastic deformation conserves energy."""
 
     name: LawName
     source: str
     summary: str
     piola: Any  # ti.func (F columns, lambda, mu) -> d energy / d F, columns [Pa]
-    principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in their axes, and its derivatives
+    principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in principal axes, and derivatives
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
-    flips: tuple[Flips, ...]  # one: what it does with them follows from the energy
+    flips: tuple[Flips, ...]  # one, which follows from the energy
     parameters: tuple[str, ...] = SOLID
     keeps_energy: bool = True
     takes_anisotropy: bool = False
@@ -50,7 +50,7 @@ class BondLaw:
     name: LawName
     source: str
     summary: str
-    ring: Ring  # what is looked at besides the two ends
+    ring: Ring  # what the law reads besides the two ends
     bonds: Callable[..., Bonds]  # numpy: (mesh, material) -> constants of every edge
     parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
     keeps_energy: bool = False
@@ -60,7 +60,7 @@ class BondLaw:
 
     @property
     def takes_shear(self) -> bool:
-        """Whether shear modulus and shear damping of a material mean anything to it."""
+        """True if it uses the shear modulus and shear damping of a material."""
         return "shear_modulus" in self.parameters
 
 

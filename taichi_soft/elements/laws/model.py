@@ -1,4 +1,4 @@
-"""Force model of one tetrahedron: which law, which strain, what happens to flips, which damping.
+"""Force model of one tetrahedron: law, strain, treatment of flips, and damping.
 
 A model holds choices, never numbers, so that one compiled kernel serves every material.
 """
@@ -17,61 +17,61 @@ from taichi_soft.elements.laws.hooke import hooke_stress
 from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law
 from taichi_soft.elements.laws.recovery import recovering_piola
 
-LEAST_VOLUME = 1 / 1024
-"""Part of its volume at rest that a flatter tetrahedron is taken to have, where stress is force by area."""
+MIN_VOLUME = 1 / 1024
+"""Lower limit of the volume relative to rest in the division of force by area."""
 
 
 @dataclass(frozen=True)
 class ElementModel:
-    """The choices that shape one body's force kernel."""
+    """Choices that shape the force kernel of one body."""
 
     law: Law
-    strain: Strain | None  # None where the law has no strain to choose
-    flips: Flips | None  # None where the law does not look at tetrahedra
+    strain: Strain | None  # None if the law has no choice of strain
+    flips: Flips | None  # None if the law does not act on tetrahedra
     damping_model: DampingModel
     is_anisotropic: bool = False  # its material has 21 constants instead of 2
 
     @property
     def has_energy(self) -> bool:
-        """True where the forces are the derivative of an energy."""
+        """True if the forces are the derivative of an energy."""
         return isinstance(self.law, EnergyLaw)
 
     @property
     def has_bonds(self) -> bool:
-        """True where forces act between the ends of edges, False where on the corners of tetrahedra."""
+        """True if forces act between the ends of edges, False if on the corners of tetrahedra."""
         return isinstance(self.law, BondLaw)
 
     @property
     def reads_expansion(self) -> bool:
-        """True where edges look at how their tetrahedra have grown."""
+        """True if edges read the expansion of their tetrahedra."""
         return isinstance(self.law, BondLaw) and self.law.ring is Ring.EXPANSION
 
     @property
     def has_simple_edges(self) -> bool:
-        """True where an edge asks for its two ends only, and for what tetrahedra pull it with."""
+        """True if an edge needs only its two ends, and the pull of its tetrahedra."""
         return not isinstance(self.law, BondLaw) or self.law.ring in (Ring.NONE, Ring.EXPANSION)
 
     @property
     def repairs_flips(self) -> bool:
-        """True where a flipped tetrahedron takes another path than an upright one."""
+        """True if a flipped tetrahedron takes another branch than an upright one."""
         return self.flips is Flips.RECOVER and not self.has_energy
 
     @property
     def mirrors_forces(self) -> bool:
-        """True where a flipped tetrahedron takes the forces of its mirror image."""
+        """True if a flipped tetrahedron has the forces of its mirror image."""
         return self.flips is Flips.TOLERANT and not self.has_energy
 
 
 @ti.func
 def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
-    """Hooke's stress of the strain that the model names, or linear strain [Pa], as columns."""
+    """Hooke's stress of the model's strain, linear strain by default [Pa], as columns."""
     strain = strains.exact_strain(F) if ti.static(model.strain == Strain.EXACT) else strains.linear_strain(F)
     return hooke_stress(strain, lame_lambda, lame_mu)
 
 
 @ti.func
 def piola_of(model: ti.template(), F, elasticity):
-    """Derivative of the energy that the model's law has by F [Pa], as columns."""
+    """Derivative of the energy of the model's law with respect to F [Pa], as columns."""
     if ti.static(model.is_anisotropic):
         return product(F, green_stress(F, elasticity))
     else:
@@ -80,17 +80,17 @@ def piola_of(model: ti.template(), F, elasticity):
 
 @ti.func
 def cauchy_stress(model: ti.template(), F, elasticity):
-    """Force by deformed area that the model's law answers a deformation with [Pa], as columns.
+    """Cauchy stress of a deformation by the model's law, force per deformed area [Pa], as columns.
 
-    In the axes of the world. Laws along edges have none: theirs is Hooke's, of the linear strain. What is
-    inside out has the stress of its mirror image; under an energy that turns it round again that of the
-    negative volume, or what was crushed would count as pulled.
+    It is in world axes. Laws along edges have no stress; they use Hooke's for linear strain. An inverted
+    tetrahedron has the stress of its mirror image. If an energy restores it, the stress is that of the
+    negative volume, because compression would otherwise count as tension.
     Args:
-        elasticity: as in `elastic_forces`.
+        elasticity: as for `elastic_forces`.
     """
     if ti.static(model.has_energy):
         J = determinant(F)
-        volume = ti.max(ti.abs(J), LEAST_VOLUME)
+        volume = ti.max(ti.abs(J), MIN_VOLUME)
         if ti.static(model.flips == Flips.RECOVER):
             volume = ti.select(J < 0.0, -volume, volume)
         stress = product(piola_of(model, F, elasticity), transposed(F))
@@ -106,7 +106,7 @@ def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
     """Forces on four vertices [N] by the model's law.
 
     Args:
-        elasticity: lambda and mu [Pa], or a stiffness as `anisotropic_stress` takes it.
+        elasticity: lambda and mu [Pa], or a stiffness as for `anisotropic_stress`.
     """
     if ti.static(model.has_energy):
         return energy_forces(piola_of(model, F, elasticity), rest_inverse)
@@ -120,18 +120,18 @@ def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
 def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticity):
     """Elastic forces on four vertices [N], and six times the signed volume [m^3].
 
-    Valid for every pose unless `model.repairs_flips`: then only where the volume is not negative.
+    Valid for every pose unless `model.repairs_flips`: then only if the volume is not negative.
     Args:
         x0, x1, x2, x3: deformed vertices, vec3 [m].
         rest_inverse: A^-1 of thesis eq. 6.1, as columns [1/m].
-        elasticity: as in `elastic_forces`.
+        elasticity: as for `elastic_forces`.
     """
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
     f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, elasticity)
     volume6 = determinant(B)
     if ti.static(model.mirrors_forces):
-        # The mirrored shape is at rest too: take the area vectors as a right-handed tetrahedron would.
+        # The mirrored shape is at rest too: use the area vectors of a right-handed tetrahedron.
         mirror = ti.select(volume6 < 0.0, -1.0, 1.0)
         f0, f1, f2, f3 = f0 * mirror, f1 * mirror, f2 * mirror, f3 * mirror
     return f0, f1, f2, f3, volume6

@@ -1,7 +1,7 @@
 """Stable neo-Hookean material, after Smith, de Goes and Kim, Stable Neo-Hookean Flesh Simulation (2018).
 
 psi = m/2 (I - 3) + l/2 (J - a)^2 - m/2 log(I + 1), with I = F : F and J = det F: finite and smooth for every
-pose. Flat and flipped tetrahedra are driven back; one shrunk to a point has no force on it until something
+pose. Flat and flipped tetrahedra are driven back; one shrunk to a point is in equilibrium until something
 disturbs it. m = 4/3 mu, l = lambda + 5/6 mu and a = 1 + mu/l make it Hooke's law for small strain (their
 section 3.4).
 """
@@ -17,7 +17,7 @@ from taichi_soft.elements.laws.principal import axis_of, cofactors
 def neo_hookean_piola(F, lame_lambda, lame_mu):
     """P = m (1 - 1/(I + 1)) F + l (J - a) cof F [Pa], as columns."""
     square = F[0].dot(F[0]) + F[1].dot(F[1]) + F[2].dot(F[2])
-    # Numbers that float32 holds exactly: Taichi would round 4 / 3 to it also where all else is float64.
+    # Factors that are exact in float32: Taichi rounds 4 / 3 to float32 even if everything else is float64.
     along = lame_mu * 4.0 / 3.0 * (1.0 - 1.0 / (square + 1.0))
     pressure = (lame_lambda + lame_mu * 5.0 / 6.0) * (determinant(F) - 1.0) - lame_mu
     return plus(F, along, cofactor(F), pressure)
@@ -40,7 +40,7 @@ def neo_hookean_principal(s, lame_lambda, lame_mu):
 
 
 def neo_hookean_energy(F, lame_lambda, lame_mu):
-    """psi [J/m^3] of deformations (m, 3, 3) less that of the rest shape, in numpy."""
+    """psi [J/m^3] of deformations (m, 3, 3) relative to the rest shape, in NumPy."""
     square, J = np.einsum("mab,mab->m", F, F), np.linalg.det(F)
     m, l = 4 / 3 * lame_mu, lame_lambda + 5 / 6 * lame_mu  # noqa: E741
     a = 1 + lame_mu / l

@@ -1,4 +1,4 @@
-"""How far from perpendicular to their edges the planes of CMPM and its variants are (thesis fig. 4.7)."""
+"""Deviation of the planes of CMPM and its variants from perpendicular to their edges (thesis fig. 4.7)."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 
 
 def plane_angles(mesh: TetMesh, law: str, *, is_split: bool = False) -> NDArray[np.float64]:
-    """Angle at rest between each edge and the normal of its plane, (k,) [degrees]; NaN where no bond.
+    """Return the angle at rest between each edge and the normal of its plane, (k,) [degrees].
 
-    The strain of an edge is told apart by this normal: the larger the angle, the more of a pull is taken for
-    shear. Faces of the Voronoi graph and tilted planes are perpendicular by construction.
+    It is NaN for edges without a bond.
+
+    This normal separates the strain of an edge into tension and shear: the larger the angle, the more of a
+    tension counts as shear. Faces of the Voronoi graph and tilted planes are perpendicular by construction.
     Args:
         law: one of chapter 4, such as "cmpm2" or "best_fitting_plane".
-        is_split: for "best_fitting_plane": the cheap normals that section 4.4.2 thinks of instead, across
-            the lines between the means of the halves of a ring that is split twice.
+        is_split: for "best_fitting_plane": use the cheap normals that section 4.4.2 considers, across the
+            lines between the means of the halves of a ring that is split twice.
         mesh: rest shape.
-    Raises: OptionError for another law; MeshError for what is no TetMesh, or not Delaunay for "cmpm".
+    Raises: OptionError for another law; MeshError if `mesh` is not a TetMesh, or not Delaunay for "cmpm".
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
@@ -34,7 +36,7 @@ def plane_angles(mesh: TetMesh, law: str, *, is_split: bool = False) -> NDArray[
         )
         raise OptionError(f"law {law!r} has no planes: choose one of {names}")
     if as_flag(is_split, "is_split") and law != "best_fitting_plane":
-        raise OptionError(f"law {law!r} fits no planes that could be split: leave out is_split")
+        raise OptionError(f"law {law!r} has no planes that can be split: leave out is_split")
     material = Material(young=1.0, poisson=0.0, density=1.0)
     normals = split_ring_normals(EdgeRings.of(mesh)) if is_split else chosen.bonds(mesh, material).normals
     assert normals is not None

@@ -1,4 +1,4 @@
-"""Stress of isotropic laws in principal axes, and how it changes: all that a gradient needs.
+"""Stress of isotropic laws in principal axes, and its derivatives: everything that a gradient needs.
 
 With F = U diag(s) V^T every isotropic law has P = U diag(p(s)) V^T (Stomakhin et al. 2012, Energetically
 consistent invertible elasticity). The laws of thesis chapter 6 have p_a = sigma_a times the product of the
@@ -28,7 +28,7 @@ def axis_of(s, c: ti.template()):
 
 @ti.func
 def hooke_principal(model: ti.template(), s, lame_lambda, lame_mu):
-    """p(s) [Pa] and dp/ds, as columns, of the laws of chapter 6 with the model's strain and flips."""
+    """p(s) [Pa] and dp/ds, as columns, for the laws of chapter 6 with the model's strain and flips."""
     t = s
     mirror = s.x * 0.0 + 1.0
     if ti.static(model.flips == Flips.TOLERANT):

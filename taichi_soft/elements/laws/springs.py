@@ -9,7 +9,7 @@ from taichi_soft.elements.materials import Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
 
 TINY = 1e-30
-"""[m^2], beside any length that counts; added, because a maximum takes three times as many instructions."""
+"""[m^2], far below any squared length; added, because a maximum takes three times as many instructions."""
 
 
 @ti.func
@@ -25,16 +25,16 @@ def spring_tension(r, constants):
 
 @ti.func
 def along(r, tension):
-    """Force on the first end of an edge pulled together with `tension` [N].
+    """Force on the first end of an edge that is pulled together with `tension` [N].
 
-    None where both ends meet: they have no direction.
+    It is zero if both ends coincide, because there is no direction.
     """
     return r * (tension / ti.max(ti.sqrt(r.dot(r)), 1e-15))
 
 
 @ti.func
 def damped_pull(r, relative_velocity, tension, damping):
-    """`along` and `edge_damping_force` in one, whose one division need not wait for the root."""
+    """`along` and `edge_damping_force` combined, with one division that does not wait for the root."""
     square = r.dot(r) + TINY
     inverse = 1.0 / square
     return r * (inverse * (tension * ti.sqrt(square) + damping * r.dot(relative_velocity)))
@@ -43,7 +43,7 @@ def damped_pull(r, relative_velocity, tension, damping):
 def spring_bonds(mesh: BodyMesh, material: Material | SpringMaterial) -> Bonds:
     """Springs between given particles, or on the edges of a solid with k = E a / l (eq. 5.1).
 
-    The area a is that of the barycentric subfaces (4.4.1), E their mean.
+    The area a is that of the barycentric subfaces (4.4.1), and E is their mean.
     """
     count = len(mesh.edges)
     if isinstance(material, SpringMaterial):

@@ -1,9 +1,9 @@
-"""St. Venant-Kirchhoff: Hooke's law in the directions of the rest shape, the derivative of an energy.
+"""St. Venant-Kirchhoff: Hooke's law in the axes of the rest shape, the derivative of an energy.
 
 psi = lambda/2 (tr E)^2 + mu E : E with Green's strain E = 1/2 (F^T F - I). The principal strains are those
 of thesis eq. 6.7, but the thesis's stress acts in the deformed directions and per deformed area, and so
-belongs to no energy: section 6.4 sees it drift. F^T F does not see a mirror, so a mirrored tetrahedron is at
-rest; and under strong compression (a third of a length alone) it gives way.
+has no energy: section 6.4 observes that it drifts. F^T F is the same for a mirror image, so a mirrored
+tetrahedron is at rest. Under strong compression (to a third of one length) the law collapses.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
-"""How the forces of a tetrahedron change as its vertices move: what implicit integration needs.
+"""Derivatives of a tetrahedron's forces by its vertices, for implicit integration.
 
-The derivative of an isotropic law falls apart in the axes of the singular value decomposition F = U diag(s)
+The derivative of an isotropic law decouples in the axes of the singular value decomposition F = U diag(s)
 V^T: a 3x3 block for the stretches, and for each pair of axes one number for their shear, (p_a - p_b)/(s_a -
-s_b), and one for their rotation, (p_a + p_b)/(s_a + s_b). (As Smith, de Goes and Kim 2019, Analytic
-eigensystems for isotropic distortion energies, find for energies; it holds without one, but then the block is
-not symmetric.) Projected, the block is symmetrised and nothing is negative: then the system is positive
+s_b), and one for their rotation, (p_a + p_b)/(s_a + s_b). Smith, de Goes and Kim 2019, Analytic eigensystems
+for isotropic distortion energies, show this for energies; it also holds without one, but then the block is
+not symmetric. When projected, the block is symmetrised and nothing is negative: the system is then positive
 definite for every pose, which conjugate gradients need.
 """
 
@@ -14,8 +14,8 @@ from taichi_soft.core.math.tensors import determinant, symmetric_part, transpose
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.laws.principal import hooke_principal
 
-CLOSE = 2.0e-3
-"""Part of the larger of two stretches: nearer to each other they share a limit, not to divide by rounding."""
+MIN_GAP = 2.0e-3
+"""Relative gap of two stretches below which their limit is used, to avoid division by rounding errors."""
 
 
 @ti.func
@@ -29,24 +29,24 @@ def principal(model: ti.template(), s, lame_lambda, lame_mu):
 
 @ti.func
 def positive_part(columns):
-    """The nearest positive semi-definite matrix to the symmetric part, as columns."""
+    """Nearest positive semi-definite matrix to the symmetric part, as columns."""
     values, axes = symmetric_eigen(symmetric_part(columns))
     return from_axes(ti.max(values, 0.0), axes)
 
 
 @ti.func
 def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template()):
-    """Sum and difference halves alpha, beta of a pair's shear and rotation stiffness [Pa].
+    """Half sum alpha and half difference beta of a pair's shear and rotation stiffness [Pa].
 
     Args:
-        sa, sb: stretches, sa >= |sb| as `signed_svd` has them.
+        sa, sb: stretches, sa >= |sb| as `signed_svd` orders them.
         pa, pb: stress along them [Pa].
         along: limit of the shear stiffness for equal stretches.
-        largest: bound of the rotation stiffness, which near sa = -sb is one rounding by another.
+        largest: bound of the rotation stiffness, which near sa = -sb is a quotient of rounding errors.
     """
     gap, total = sa - sb, sa + sb
     shear = along
-    if gap > CLOSE * sa:
+    if gap > MIN_GAP * sa:
         shear = (pa - pb) / gap
     rotation = (pa + pb) / ti.max(total, 1e-9)
     if ti.static(projected):
@@ -56,10 +56,10 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
 
 @ti.func
-def weighed_rows(rest_inverse):
-    """Rows of A^-1 that take a move of each vertex to F (four vec3), times the root of the volume at rest.
+def weighted_rows(rest_inverse):
+    """Rows of A^-1 that map a vertex displacement to F (four vec3), times the root of the rest volume.
 
-    Zero for the lanes that pad a block, whose rows are.
+    They are zero for padding lanes, whose rows are zero.
     """
     root = 1.0 / ti.sqrt(6.0 * ti.max(determinant(rest_inverse), 1e-37))
     rows = transposed(rest_inverse)
@@ -69,10 +69,10 @@ def weighed_rows(rest_inverse):
 
 @ti.func
 def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.template()):
-    """What `stiffness_block` needs: the `weighed_rows` in the axes of V; and U, dp/ds, alpha and beta.
+    """Arguments of `stiffness_block`: the `weighted_rows` in the axes of V; and U, dp/ds, alpha and beta.
 
     Args:
-        projected: make it symmetric and positive semi-definite.
+        projected: True makes it symmetric and positive semi-definite.
     """
     lame_lambda, lame_mu = elasticity[0], elasticity[1]
     U, s, V = signed_svd(F)
@@ -87,8 +87,8 @@ def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.t
     m0, m1, m2 = M[0], M[1], M[2]
     if ti.static(projected):
         m0, m1, m2 = positive_part((m0, m1, m2))
-    turned = _in_axes(V, rows[0]), _in_axes(V, rows[1]), _in_axes(V, rows[2]), _in_axes(V, rows[3])
-    return turned, (U, (m0, m1, m2), ti.Vector([ax, ay, az]), ti.Vector([bx, by, bz]))
+    rotated_rows = _in_axes(V, rows[0]), _in_axes(V, rows[1]), _in_axes(V, rows[2]), _in_axes(V, rows[3])
+    return rotated_rows, (U, (m0, m1, m2), ti.Vector([ax, ay, az]), ti.Vector([bx, by, bz]))
 
 
 @ti.func

@@ -1,10 +1,10 @@
-"""CMPM with a plane that the particles round an edge tilt (thesis section 4.4.3), which never built it.
+"""CMPM with a plane tilted by the particles around an edge (thesis section 4.4.3, not implemented there).
 
-The plane is perpendicular to its edge at rest. Where a particle round the edge rises by an angle, it tilts
-the plane by c times that angle about the axis through the edge at right angles to the particle's arm. Eq.
-4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt it by an eighth of an even shear only; c =
-beta / pi tilts it by all of it wherever the particles stand evenly. beta is the angle that a particle
-represents. Implicit Euler holds the plane's normal (`bond_stiffness`).
+The plane is perpendicular to its edge at rest. A particle around the edge that rises by an angle tilts the
+plane by c times that angle, about the axis through the edge that is perpendicular to the particle's arm. Eq.
+4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt it by only an eighth of a uniform shear; c =
+beta / pi tilts it by all of the shear if the particles are evenly spaced. beta is the angle that a particle
+represents. Implicit Euler keeps the plane's normal fixed (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -20,38 +20,38 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 PRINTED = 1 / 8
-"""What eq. 4.12 as printed makes of c = beta / pi: (1/4) beta / (2 pi)."""
+"""Factor by which eq. 4.12 as printed differs from c = beta / pi: it is (1/4) beta / (2 pi)."""
 
 
 @ti.func
 def tilt(axis, arm, height, rest_angle, weight):
-    """How far one particle pushes the normal over, as a vector across the edge.
+    """Contribution of one particle to the tilt of the normal, as a vector across the edge.
 
     Args:
         axis: unit vector along the edge.
-        arm: from the edge's first end to the particle [m].
-        height: of the plane over that end [m].
-        rest_angle: of the particle over the plane at rest.
+        arm: vector from the edge's first end to the particle [m].
+        height: height of the plane above that end [m].
+        rest_angle: angle of the particle above the plane at rest.
         weight: c.
     """
     rise = axis.dot(arm)
     across = arm - axis * rise
     distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
-    # By a name: within a vector's expression a real function would ask for the angle once per component.
+    # As a variable: inside a vector's expression, Taichi would evaluate the real function once per component.
     angle = atan2(rise - height, distance)
     return across * (weight * (angle - rest_angle) / distance)
 
 
 @ti.func
-def tilted_normal(axis, push):
-    """The unit vector `axis` turned away from `push` by an angle of its length."""
-    angle = ti.sqrt(push.dot(push))
+def tilted_normal(axis, rotation):
+    """Rotate the unit vector `axis` away from `rotation` by an angle of its length."""
+    angle = ti.sqrt(rotation.dot(rotation))
     cosine, sine = cos_sin(angle)
-    return axis * cosine - push * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
+    return axis * cosine - rotation * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
 
 
 def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """beta / pi, and the angle over the plane at rest, of each of `rings.neighbours`, (s,) each."""
+    """For each of `rings.neighbours`: beta / pi, and the angle above the plane at rest, (s,)."""
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges[edge]]
@@ -62,14 +62,14 @@ def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
     start, count = np.searchsorted(edge, edge), np.bincount(edge)[edge]
     height = np.add.reduceat(rise, np.unique(start))[edge] / count
     rest_angle = np.arctan2(rise - height, np.linalg.norm(across, axis=1))
-    number = np.arange(len(edge)) - start
-    after, before = (start + (number + step) % count for step in (1, -1))
-    return (_turn(axis, across, across[after]) + _turn(axis, across[before], across)) / (
+    index = np.arange(len(edge)) - start
+    after, before = (start + (index + step) % count for step in (1, -1))
+    return (_angle_about(axis, across, across[after]) + _angle_about(axis, across[before], across)) / (
         2 * np.pi
     ), rest_angle
 
 
-def _turn(axis: Floats, one: Floats, other: Floats) -> Floats:
+def _angle_about(axis: Floats, one: Floats, other: Floats) -> Floats:
     """Angle from `one` to `other` about `axis`, from 0 to 2 pi."""
     sine = np.einsum("sa,sa->s", axis, np.cross(one, other))
     angle = np.arctan2(sine, np.einsum("sa,sa->s", one, other))
@@ -77,10 +77,10 @@ def _turn(axis: Floats, one: Floats, other: Floats) -> Floats:
 
 
 def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -> Bonds:
-    """Ring rows: a particle; its c (times `factor`) and its angle over the plane at rest."""
+    """Ring rows: a particle; its c (times `factor`) and its angle above the plane at rest."""
     rings = require_tets(mesh, material, "tilted_plane")
     edge, vertex = rings.neighbours
-    share, rest_angle = tilt_rows(rings)
+    fraction, rest_angle = tilt_rows(rings)
     young, shear, damping = moduli(rings, material)
     length = mesh.edge_lengths
     per_length = rings.edge_areas / length
@@ -89,6 +89,6 @@ def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -
         columns(length, young * per_length, shear * per_length, damping, count=len(mesh.edges)),
         edge,
         member_columns(vertex, count=len(edge)),
-        columns(factor * share, rest_angle, count=len(edge)),
+        columns(factor * fraction, rest_angle, count=len(edge)),
         (ends[:, 1] - ends[:, 0]) / length[:, None],
     )

@@ -1,9 +1,9 @@
 """Springs that keep the volume of their tetrahedra (thesis chapter 5).
 
-Each tetrahedron that has grown by dV pulls the ends of its six edges together with the pressure E nu dV / V0
-times the area a of the whole edge, besides the springs (eq. 5.5 with its sign turned: as printed a grown one
-pushes them apart, and its volume runs away). A `Material` whose Poisson's ratio is -nu has the forces as they
-are printed, because the springs know no ratio.
+Besides the springs, each tetrahedron that has expanded by dV pulls the ends of its six edges together with
+the pressure E nu dV / V0 times the total area a of the edge (eq. 5.5 with its sign reversed: as printed, an
+expanded tetrahedron pushes them apart, and its volume diverges). A `Material` with Poisson's ratio -nu has
+the printed forces, because the springs have no ratio.
 """
 
 from __future__ import annotations
@@ -20,11 +20,10 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 
 @ti.func
 def expansion(x0, x1, x2, x3, inverse_volume6):
-    """Growth dV / V0 of a tetrahedron (eq. 5.4).
+    """Expansion dV / V0 of a tetrahedron (eq. 5.4).
 
-    Turned inside out it has a volume too, and is at rest as its own mirror image: by its signed volume it
-    would push its edges apart, have less of it still, and run away.
-
+    An inverted tetrahedron has a volume too, and is at rest as its mirror image. With the signed volume it
+    would push its edges apart, lose more of it, and diverge.
     Args:
         inverse_volume6: 1 / (6 V0) [1/m^3].
     """
@@ -33,7 +32,7 @@ def expansion(x0, x1, x2, x3, inverse_volume6):
 
 @ti.func
 def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
-    """How V / V0 changes as each of the four vertices moves, four vec3 [1/m]."""
+    """Derivatives of V / V0 by each of the four vertices, four vec3 [1/m]."""
     B = shape(x0, x1, x2, x3)
     C = cofactor(B)
     scale = inverse_volume6 * ti.select(determinant(B) < 0.0, -1.0, 1.0)
@@ -42,7 +41,7 @@ def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
 
 
 def volume_spring_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Springs of eq. 5.2, with the area a of the edge; ring rows name a tetrahedron each."""
+    """Springs of eq. 5.2, with the area a of the edge; each ring row is a tetrahedron."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError("law 'volume_springs' needs tetrahedra and a Material")
     rings = EdgeRings.of(mesh)

@@ -1,4 +1,4 @@
-"""What bodies are made of: numbers only, no Taichi."""
+"""Materials of bodies: numbers only, no Taichi."""
 
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
@@ -7,7 +7,7 @@ from taichi_soft.elements.materials.springs import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
 AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
-"""What a body can be made of."""
+"""Any material of a body."""
 
 __all__ = [
     "CONSTANTS",

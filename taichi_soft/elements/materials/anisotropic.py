@@ -1,4 +1,4 @@
-"""Materials that are not the same in all directions: wood, muscle, laminates (thesis 2.4 and chapter 7)."""
+"""Anisotropic materials: wood, muscle, laminates (thesis 2.4 and chapter 7)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from taichi_soft.elements.materials.element_values import (
     spread,
 )
 from taichi_soft.elements.materials.material import DAMPING_RATIO
-from taichi_soft.elements.materials.stiffness import Stiffness, turned
+from taichi_soft.elements.materials.stiffness import Stiffness, rotate_stiffness
 
 
 @serialised("stiffness", "density", "damping", "frame", "damping_ratio")
@@ -34,13 +34,13 @@ class AnisotropicMaterial:
     """A linearly elastic, damped material whose stiffness depends on the direction.
 
     Args:
-        stiffness: in the material's own axes: a `Stiffness`, or a sequence of one per tetrahedron.
+        stiffness: stiffness in the material's axes: a `Stiffness`, or a sequence of one per tetrahedron.
         density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
         damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
         frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
-            (x, y, z, w) for the whole body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
-            `frames_along` gives. None: those of the mesh.
-        damping_ratio: as of a `Material`.
+            (x, y, z, w) for the body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
+            `frames_along` returns. None: the axes of the mesh.
+        damping_ratio: as for `Material`.
     Raises: MaterialError or OptionError with the first value out of range.
     """
 
@@ -83,26 +83,26 @@ class AnisotropicMaterial:
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def require_count(self, tet_count: int) -> None:
-        """Check that every constant and the frame fit a number of tetrahedra.
+        """Check that constants and frame have values for a number of tetrahedra.
 
         Args:
             tet_count: number of tetrahedra.
-        Raises: MaterialError if a constant or the frame is given for another number of them.
+        Raises: MaterialError if a constant or the frame has another number of values.
         """
         self.per_tet("density", tet_count)
         self.per_tet("damping", tet_count)
         if np.ndim(self.frame) == 3 and len(self.frame) != tet_count:
             raise MaterialError(
-                f"frame has {len(self.frame)} rotations for a mesh of {tet_count} tetrahedra: give one each"
+                f"frame has {len(self.frame)} rotations for a mesh of {tet_count} tetrahedra: pass one each"
             )
         if not isinstance(self.stiffness, Stiffness) and len(self.stiffness) != tet_count:
             raise MaterialError(
                 f"stiffness has {len(self.stiffness)} entries for a mesh of {tet_count} tetrahedra: "
-                "give one each"
+                "pass one each"
             )
 
     def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:
-        """The material of some of the tetrahedra.
+        """Return the material of a subset of the tetrahedra.
 
         Args:
             rows: numbers of the tetrahedra, (k,).
@@ -121,21 +121,21 @@ class AnisotropicMaterial:
 
         Args:
             tet_count: number of tetrahedra m.
-        Raises: MaterialError if there are frames for another number of tetrahedra.
+        Raises: MaterialError for values or frames of another number of tetrahedra.
         """
         self.require_count(tet_count)
         each = [self.stiffness] if isinstance(self.stiffness, Stiffness) else self.stiffness
         own = np.stack([stiffness.matrix for stiffness in each])
-        matrices = turned(own, np.atleast_3d(self.frame).reshape(-1, 3, 3))
+        matrices = rotate_stiffness(own, np.atleast_3d(self.frame).reshape(-1, 3, 3))
         return np.ascontiguousarray(np.broadcast_to(matrices, (tet_count, 6, 6)))
 
 
 def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
-    """Frames whose first axis points along each direction: for fibres, with `Stiffness.one_axis`.
+    """Return frames whose first axis points along each direction: for fibres, with `Stiffness.one_axis`.
 
     Args:
         directions: (m, 3), of any length but zero.
-    Returns: rotation matrices, (m, 3, 3). Their other two axes lie as near to those of the mesh as they can.
+    Returns: rotation matrices, (m, 3, 3). Their other two axes are as close to those of the mesh as possible.
     Raises: MaterialError for a direction that is zero.
     """
     rows = as_array(directions, "directions", (None, 3))
@@ -144,7 +144,7 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
         where = f" {int(lengths.argmin())} is zero" if len(rows) else " are missing"
         raise MaterialError(f"directions{where}: pass the fibre's direction in every tetrahedron")
     along = rows / lengths[:, None]
-    # The shortest turn that takes x there; straight back it is half a turn about z.
+    # The shortest rotation that maps x there; for the opposite direction half a turn about z.
     frames = np.empty((len(rows), 3, 3))
     cosine = along[:, 0]
     axis = np.cross([1.0, 0.0, 0.0], along)
@@ -157,19 +157,19 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
 
 
 def _one_per_tet(values: Any) -> tuple[Stiffness, ...]:
-    found = tuple(values) if isinstance(values, Sequence) else (values,)
-    wrong = next((each for each in found if not isinstance(each, Stiffness)), None)
-    if wrong is not None or not found:
-        what = type(values if wrong is None or len(found) == 1 else wrong).__name__
+    stiffnesses = tuple(values) if isinstance(values, Sequence) else (values,)
+    wrong = next((each for each in stiffnesses if not isinstance(each, Stiffness)), None)
+    if wrong is not None or not stiffnesses:
+        kind = type(values if wrong is None or len(stiffnesses) == 1 else wrong).__name__
         raise MaterialError(
-            f"stiffness must be a taichi_soft.Stiffness, or one per tetrahedron, got {what}: "
+            f"stiffness must be a taichi_soft.Stiffness, or one per tetrahedron, got {kind}: "
             "make it with Stiffness.orthotropic(...), or Stiffness(matrix)"
         )
-    return found
+    return stiffnesses
 
 
 def _frame(value: Any) -> Array:
-    """One rotation (3, 3), or one for each tetrahedron (m, 3, 3), read-only."""
+    """One rotation (3, 3), or one per tetrahedron (m, 3, 3), read-only."""
     if value is None or to_array(value, "frame").shape in ((4,), (3, 3)):
         frame: Array = as_rotation(value).copy()
     else:

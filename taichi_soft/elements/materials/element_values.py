@@ -1,4 +1,4 @@
-"""Constants that are one number for a whole body or one per element."""
+"""Constants with one number for a body or one per element."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from taichi_soft.core.errors import MaterialError
 Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 1e-9, 1e20
-"""Constants beyond overflow float32 on their way to a force or an acceleration."""
+"""Range of constants: beyond it, forces or accelerations overflow float32."""
 
-MOST_DAMPING_RATIO = 1000.0
-"""Far above what a substep can take of a vibration: larger ones would damp no more."""
+MAX_DAMPING_RATIO = 1000.0
+"""Far above the damping that a substep can apply: larger ratios have no further effect."""
 
 POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
 
 
 def is_positive(x: Array) -> NDArray[np.bool_]:
-    """Which values are above 0 and can be computed with."""
+    """True for values above 0 and in the range of constants."""
     return np.asarray((x >= SMALLEST) & (x < LARGEST))
 
 
 def is_damping(x: Array) -> NDArray[np.bool_]:
-    """Which values are 0 or more and can be computed with."""
+    """True for values of 0 or more and in the range of constants."""
     return np.asarray((x >= 0) & (x < LARGEST))
 
 
 def as_ratio(given: Any) -> float:
-    """A damping ratio. Raises: MaterialError."""
+    """Check a damping ratio. Raises: MaterialError."""
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, float, np.integer, np.floating)):
-        raise MaterialError(f"damping_ratio must be one number for the whole body, got {given!r}")
-    if not 0.0 <= given <= MOST_DAMPING_RATIO:
+        raise MaterialError(f"damping_ratio must be one number for the body, got {given!r}")
+    if not 0.0 <= given <= MAX_DAMPING_RATIO:
         raise MaterialError(
-            f"damping_ratio is {given!r}: it must be from 0 to {MOST_DAMPING_RATIO:g}; 1 is critical damping"
+            f"damping_ratio is {given!r}: it must be from 0 to {MAX_DAMPING_RATIO:g}; 1 is critical damping"
         )
     return float(given)
 
@@ -46,7 +46,7 @@ def as_ratio(given: Any) -> float:
 def as_constant(
     given: Any, name: str, element: str, is_valid: Callable[[Array], Any], range_text: str
 ) -> float | Array:
-    """A number, or a read-only array of one per `element`. Raises: MaterialError with the first bad value."""
+    """Return a number, or a read-only array of one per `element`. Raises: MaterialError with a bad one."""
     try:
         if np.asarray(given).dtype.kind not in "iuf":
             raise TypeError
@@ -65,17 +65,17 @@ def as_constant(
 
 
 def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
-    """One value for each of `count` elements. Raises: MaterialError for an array of another length."""
+    """Return one value for each of `count` elements. Raises: MaterialError for an array of another length."""
     values = np.asarray(given, dtype=np.float64)
     if values.ndim == 1 and values.shape[0] != count:
         raise MaterialError(
-            f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: give one each"
+            f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: pass one each"
         )
     return np.ascontiguousarray(np.broadcast_to(values, (count,)))
 
 
 def described(material: Any) -> str:
-    """What `repr` says of a material: numbers as they are, arrays by their length and range."""
+    """`repr` of a material: numbers as they are, arrays by their length and range."""
     given = {each.name: getattr(material, each.name) for each in fields(material)}
     texts = [f"{name}={_text(value)}" for name, value in given.items() if value is not None]
     return f"{type(material).__name__}({', '.join(texts)})"
@@ -92,7 +92,7 @@ def _text(value: Any) -> str:
 
 
 def require_one_length(given: dict[str, Any], element: str) -> None:
-    """Raises: MaterialError where constants are given for different numbers of elements."""
+    """Check that constants have values for the same number of elements. Raises: MaterialError."""
     lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
     if len(set(lengths.values())) > 1:
-        raise MaterialError(f"arrays of different lengths {lengths}: give one value per {element} in each")
+        raise MaterialError(f"arrays of different lengths {lengths}: pass one value per {element} in each")

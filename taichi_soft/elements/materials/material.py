@@ -25,13 +25,13 @@ from taichi_soft.elements.materials.element_values import (
 )
 
 DAMPING_RATIO = 0.05
-"""Of a body's first mode, if nothing else is said: it swings seven times until a tenth is left."""
+"""Default damping ratio of a body's first mode: a tenth of the amplitude is left after seven oscillations."""
 
 CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping")
 
 
 def isotropic_stiffness(lame_lambda: Array, lame_mu: Array) -> Array:
-    """Stiffness by Lame's constants (m,) [Pa], (m, 6, 6) [Pa], as `Stiffness.matrix`."""
+    """Stiffness from Lame's constants (m,) [Pa], (m, 6, 6) [Pa], as `Stiffness.matrix`."""
     matrices = np.zeros((len(lame_mu), 6, 6))
     matrices[:, :3, :3] = lame_lambda[:, None, None]
     matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
@@ -43,18 +43,19 @@ def isotropic_stiffness(lame_lambda: Array, lame_mu: Array) -> Array:
 class Material:
     """An isotropic, linearly elastic, damped material.
 
-    Each constant is a number for the whole body or an array with one value per tetrahedron.
+    Each constant is a number for the body or an array with one value per tetrahedron.
     Args:
         young: Young's modulus E [Pa], above 0.
         poisson: Poisson's ratio nu, above -1 and below 0.5.
         density: mass per volume [kg/m^3], above 0.
-        damping: b of thesis eq. 3.9 [N s/m], one per edge, 0 or more. An array is averaged over the
+        damping: b of thesis eq. 3.9 [N s/m], for each edge, 0 or more. An array is averaged over the
             tetrahedra that share an edge.
-        shear_modulus: G [Pa] of the laws of chapter 4, which take it by itself; None is E / (2 (1 + nu)).
-        damping_ratio: of the slowest vibration of a free body made of it: 0 rings for ever, 0.05 swings seven
-            times until a tenth is left, 1 returns without swinging. All vibrations fade at the same rate, and
-            rigid motion does not. However large, it takes no more substeps. `damping` comes on top.
-        shear_damping: b_m of eq. 4.5 [N s/m] of the same laws, across the edges; None is `damping`.
+        shear_modulus: G [Pa] for the laws of chapter 4, where it is independent; None: E / (2 (1 + nu)).
+        damping_ratio: damping ratio of the slowest vibration of a free body: 0 is undamped, 0.05 leaves a
+            tenth of the amplitude after seven oscillations, 1 returns without oscillating. All vibrations
+            decay at the same rate, and rigid motion does not. It never needs more substeps. `damping` is
+            added to it.
+        shear_damping: b_m of eq. 4.5 [N s/m] for the same laws, across the edges; None: `damping`.
     Raises: MaterialError with the first value out of range.
     Example:
         rubber = Material(young=1e6, poisson=0.45, density=1100, damping_ratio=0.1)
@@ -103,7 +104,7 @@ class Material:
         return self.young / (2 * (1 + self.poisson))
 
     def per_tet(self, name: str, tet_count: int) -> Array:
-        """One value of a constant or Lame parameter for each of `tet_count` tetrahedra.
+        """Return one value of a constant or Lame parameter for each of `tet_count` tetrahedra.
 
         Args:
             name: "young", "poisson", "density", "damping", "lame_lambda" or "lame_mu".
@@ -114,7 +115,7 @@ class Material:
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def of_tets(self, rows: NDArray[np.int64]) -> Material:
-        """The material of some of the tetrahedra.
+        """Return the material of a subset of the tetrahedra.
 
         Args:
             rows: numbers of the tetrahedra, (k,).

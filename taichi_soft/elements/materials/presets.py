@@ -1,9 +1,9 @@
-"""Named materials. Textbook figures, rounded: a start, not a measurement.
+"""Named materials with rounded textbook values: a start, not a measurement.
 
 Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
-gelatine from the stiff end of its usual range of 1 to 100 kPa (by the thesis's law with tolerant flips a fall
-of metres dents it for good); damping ratios are half of usual loss factors at a few hertz, rounded;
-`thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
+gelatine from the stiff end of its usual range of 1 to 100 kPa (with the thesis's law and tolerant flips, a
+fall from several metres dents it permanently); damping ratios are half of usual loss factors at a few hertz,
+rounded; `thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ PRESETS: dict[PresetName, Material] = {
 
 
 def preset(name: PresetName) -> Material:
-    """The material of that name.
+    """Return the material with a given name.
 
     Args:
         name: one of `PRESETS`, such as "gelatine".
-    Raises: OptionError with the names there are.
+    Raises: OptionError with the available names.
     """
     if not isinstance(name, str) or name not in PRESETS:
         raise OptionError(f"unknown material {name!r}: {choose_one_of(PRESETS, name)}")

@@ -24,7 +24,7 @@ from taichi_soft.elements.materials.element_values import (
 
 
 def _is_stiffness(x: Array) -> NDArray[np.bool_]:
-    """Which values are 0, or above it and can be computed with."""
+    """True for 0, and for values in the range of constants."""
     return np.asarray((x == 0) | is_positive(x))
 
 
@@ -34,11 +34,11 @@ class SpringMaterial:
     """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per row of `mesh.edges`.
 
     Args:
-        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge of 0 has
-            its damping only.
+        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge with 0 has
+            only its damping.
         damping: b of eq. 3.9 [N s/m], 0 or more.
-        rest_length: l of eq. 3.8 [m], above 0; None takes the lengths in the mesh.
-    Raises: MaterialError with the first value out of range, or where no edge has any stiffness.
+        rest_length: l of eq. 3.8 [m], above 0; None: the lengths in the mesh.
+    Raises: MaterialError with the first value out of range, or if no edge has any stiffness.
     """
 
     stiffness: float | Array
@@ -51,7 +51,7 @@ class SpringMaterial:
     def __post_init__(self) -> None:
         self._check("stiffness", _is_stiffness, f"0 N/m, or {POSITIVE}")
         if not np.any(self.stiffness):
-            raise MaterialError("stiffness is 0 N/m for every edge: give at least one edge more than that")
+            raise MaterialError("stiffness is 0 N/m for every edge: make at least one edge stiffer")
         self._check("damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
         if self.rest_length is not None:
             self._check("rest_length", is_positive, f"above 0 m, {POSITIVE}")
@@ -65,14 +65,14 @@ class SpringMaterial:
     def from_young(
         cls, young: float, area: ArrayLike, lengths: ArrayLike, damping: float | Array = 0.0
     ) -> SpringMaterial:
-        """Springs as stiff as bars: k = E a / l (eq. 5.1).
+        """Make springs as stiff as bars: k = E a / l (eq. 5.1).
 
         Args:
             young: Young's modulus E [Pa].
             area: cross-section a of each bar, or of all [m^2].
-            lengths: at rest [m], such as `mesh.edge_lengths`.
+            lengths: lengths at rest [m], such as `mesh.edge_lengths`.
             damping: b [N s/m].
-        Raises: MaterialError if a number is not positive or lengths do not fit.
+        Raises: MaterialError for a number that is not positive or for arrays of different lengths.
         """
         E, a, l = (  # noqa: E741
             np.asarray(as_constant(value, name, "edge", is_positive, f"above 0 {unit}, {POSITIVE}"))
@@ -84,13 +84,13 @@ class SpringMaterial:
         )
         if a.ndim and l.ndim and len(a) != len(l):
             raise MaterialError(
-                f"area has {len(a)} values and lengths has {len(l)}: give one per edge in each"
+                f"area has {len(a)} values and lengths has {len(l)}: pass one per edge in each"
             )
         stiffness = E * a / l
         return cls(stiffness if stiffness.ndim else float(stiffness), damping, l if l.ndim else float(l))
 
     def per_edge(self, name: str, edge_count: int, default: Array | None = None) -> Array:
-        """One value of a constant for each of `edge_count` edges; `default` where it is None.
+        """Return one value of a constant for each of `edge_count` edges; `default` if it is None.
 
         Args:
             name: "stiffness", "damping" or "rest_length".

@@ -1,8 +1,8 @@
-"""Stiffness of a linear material that need not be the same in all directions (thesis 2.3 and 2.4, eq. 2.25).
+"""Stiffness of a linear material, which can be anisotropic (thesis 2.3 and 2.4, eq. 2.25).
 
-A 6x6 matrix takes strain to stress in Voigt's order xx, yy, zz, yz, xz, xy, with engineering shear
-gamma_xy = 2 eps_xy: then it is symmetric, and so are its inverses and sums. The thesis's own order is xx, yy,
-zz, xy, xz, yz with tensor shear; `Stiffness.from_thesis` reads it.
+A 6x6 matrix maps strain to stress in Voigt's order xx, yy, zz, yz, xz, xy, with engineering shear
+gamma_xy = 2 eps_xy: it is then symmetric, and so are its inverses and sums. The thesis's order is xx, yy,
+zz, xy, xz, yz with tensor shear; `Stiffness.from_thesis` converts it.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 """Axes of each of Voigt's six components."""
 
 ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
-"""Entries that one plane of symmetry leaves: it mirrors yz and xz, which act on each other only."""
+"""Entries that one plane of symmetry leaves: yz and xz, which it mirrors, couple only with each other."""
 
 THESIS_ORDER = (0, 1, 2, 5, 4, 3)
-"""Where Voigt's components stand in the thesis: its fourth is xy, its sixth yz."""
+"""Positions of Voigt's components in the thesis: its fourth is xy, its sixth yz."""
 
 
 def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
-    """Poisson's ratio, strictly between -1 and `high`. Raises: OptionError."""
+    """Check Poisson's ratio, strictly between -1 and `high`. Raises: OptionError."""
     return as_number(value, name, np.nextafter(-1, 0), np.nextafter(high, 0), f"above -1 and below {high:g}")
 
 
-def turned(matrix: Floats, rotations: Floats) -> Floats:
-    """A stiffness (6, 6) in the axes of materials that are turned by `rotations` (m, 3, 3), (m, 6, 6).
+def rotate_stiffness(matrix: Floats, rotations: Floats) -> Floats:
+    """Rotate a stiffness (6, 6) by `rotations` (m, 3, 3) of the material, (m, 6, 6).
 
-    With K, which turns stress in Voigt's order, it is K C K^T (Bond 1943).
+    With the matrix K that rotates stress in Voigt's order, it is K C K^T (Bond 1943).
     """
     first, second = np.array(PAIRS).T
     R = rotations
-    # Stress turns as R s R^T, and components off the diagonal stand in it twice.
+    # Stress rotates as R s R^T, and components off the diagonal occur twice in it.
     K = R[:, first[:, None], first] * R[:, second[:, None], second]
     K[:, :, 3:] += (R[:, first[:, None], second] * R[:, second[:, None], first])[:, :, 3:]
     return np.asarray(K @ matrix @ np.swapaxes(K, 1, 2))
@@ -64,8 +64,8 @@ class Stiffness:
 
     Args:
         matrix: (6, 6) [Pa], Voigt's order, engineering shear.
-    Raises: MaterialError if it is not symmetric to 1e-6 of its largest entry, or if a strain would release
-        energy (with the smallest eigenvalue).
+    Raises: MaterialError if it is not symmetric to 1e-6 of its largest entry, or not positive definite (with
+        the smallest eigenvalue).
     """
 
     matrix: Floats
@@ -83,8 +83,8 @@ class Stiffness:
         lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]].tolist()
         if lowest <= 0:
             raise MaterialError(
-                f"stiffness has the eigenvalue {lowest:g} Pa: a material that resists every strain has none "
-                "of 0 or below"
+                f"stiffness has the eigenvalue {lowest:g} Pa: all must be above 0, so that the material "
+                "resists every strain"
             )
         if not (lowest > 1e-9 * highest and lowest >= SMALLEST and highest < LARGEST):
             raise MaterialError(
@@ -99,7 +99,7 @@ class Stiffness:
 
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
-        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5.
+        """Make an isotropic stiffness: 2 constants (thesis eq. 2.35).
 
         Args:
             young: Young's modulus [Pa], above 0.
@@ -118,13 +118,13 @@ class Stiffness:
         poisson_across: float,
         shear_along: float,
     ) -> Stiffness:
-        """The same in all directions round x, such as wood: 5 constants (thesis 2.4.2).
+        """Make a stiffness with rotational symmetry about x, such as wood's: 5 constants (thesis 2.4.2).
 
         Args:
             young_along, young_across: Young's moduli along x, and across it [Pa].
-            poisson_along: contraction across x when pulled along x.
-            poisson_across: contraction across x when pulled across x, at right angles.
-            shear_along: shear modulus of planes through x [Pa]. The other follows: E / (2 (1 + nu)) across.
+            poisson_along: contraction across x under tension along x.
+            poisson_across: contraction across x under tension across x, at right angles to it.
+            shear_along: shear modulus of planes through x [Pa]. The other is E / (2 (1 + nu)) across x.
         """
         shear_across = as_positive(young_across, "young_across", "Pa") / (
             2 * (1 + _as_ratio(poisson_across, "poisson_across", 1.0))
@@ -139,12 +139,12 @@ class Stiffness:
     def orthotropic(
         cls, young: Sequence[float], poisson: Sequence[float], shear: Sequence[float]
     ) -> Stiffness:
-        """Three planes of symmetry at right angles: 9 constants (thesis 2.4.1).
+        """Make a stiffness with three planes of symmetry at right angles: 9 constants (thesis 2.4.1).
 
         Args:
-            young: along x, y, z [Pa].
-            poisson: nu_yz, nu_xz, nu_xy: contraction along the second axis when pulled along the first.
-            shear: moduli G_yz, G_xz, G_xy [Pa].
+            young: Young's moduli along x, y, z [Pa].
+            poisson: nu_yz, nu_xz, nu_xy: contraction along the second axis under tension along the first.
+            shear: shear moduli G_yz, G_xz, G_xy [Pa].
         """
         moduli = as_array(young, "young", (3,), "Pa")
         ratios = as_array(poisson, "poisson", (3,))
@@ -162,11 +162,11 @@ class Stiffness:
 
     @classmethod
     def one_plane(cls, constants: Sequence[float]) -> Stiffness:
-        """One plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
+        """Make a stiffness with one plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
 
         Args:
-            constants: [Pa], the entries of the matrix that need not vanish, row by row from the diagonal
-                on: c11, c12, c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
+            constants: [Pa], the independent entries of the matrix, row by row from the diagonal: c11, c12,
+                c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
         """
         values = as_array(constants, "constants", (13,), "Pa")
         matrix = np.zeros((6, 6))
@@ -176,7 +176,7 @@ class Stiffness:
 
     @classmethod
     def from_thesis(cls, matrix: ArrayLike) -> Stiffness:
-        """From eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
+        """Convert eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
 
         Args:
             matrix: (6, 6) [Pa].
@@ -186,7 +186,7 @@ class Stiffness:
         return cls(rows)
 
     def to_thesis(self) -> Floats:
-        """As the thesis writes it in eq. 2.25, (6, 6) [Pa]: for tensor shear, so not symmetric as a rule."""
+        """Matrix of thesis eq. 2.25, (6, 6) [Pa]: for tensor shear, so in general not symmetric."""
         rows = self.matrix.copy()
         rows[:, 3:] *= 2
         return np.asarray(rows[np.ix_(THESIS_ORDER, THESIS_ORDER)])
@@ -201,22 +201,22 @@ class Stiffness:
 
     @property
     def compliance(self) -> Floats:
-        """The other way round, strain from stress (thesis eq. 2.23): the inverse of `matrix`, (6, 6) [1/Pa].
+        """Compliance, from stress to strain (thesis eq. 2.23): the inverse of `matrix`, (6, 6) [1/Pa].
 
-        In the same order, with engineering shear: on its diagonal stand 1 / E and 1 / G.
+        It has the same order and engineering shear: its diagonal has 1 / E and 1 / G.
         """
         return np.asarray(np.linalg.inv(self.matrix))
 
     def rotated(self, rotation: ArrayLike) -> Stiffness:
-        """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w).
+        """Return the stiffness of the rotated material.
 
         Args:
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
         """
-        return Stiffness(turned(self.matrix, as_rotation(rotation)[None])[0])
+        return Stiffness(rotate_stiffness(self.matrix, as_rotation(rotation)[None])[0])
 
     def young_along(self, direction: ArrayLike) -> float:
-        """Young's modulus of a bar cut out along `direction` (3,) [Pa].
+        """Young's modulus of a bar cut along `direction` [Pa].
 
         Args:
             direction: axis of the bar, (3,), of any length but zero.
@@ -231,10 +231,10 @@ class Stiffness:
         return float(1 / (pull @ strain))
 
     def symmetry(self, tolerance: float = 1e-6) -> str:
-        """The narrowest class in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
+        """Narrowest symmetry in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
 
         Args:
-            tolerance: of what counts as zero or equal, over the largest entry.
+            tolerance: limit of what counts as zero or equal, relative to the largest entry.
         """
         c = self.matrix
         small = tolerance * np.abs(c).max()

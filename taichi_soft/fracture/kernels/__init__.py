@@ -1,1 +1,1 @@
-"""Constants and particles of a body whose mesh has changed, and where it is pulled too hard."""
+"""Kernels that rewrite a body whose mesh has changed, and that find overloaded bodies."""

@@ -1,4 +1,4 @@
-"""Which bodies may tear: a bound on the stress of every tetrahedron, cheap enough for every step."""
+"""Bound on the stress of every tetrahedron, cheap enough to find overloaded bodies in every step."""
 
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.core.constants import LANES
@@ -9,7 +9,7 @@ from taichi_soft.elements.kernels.stress import stress_of
 
 @ti.func
 def _pull_bound(state: ti.template(), model: ti.template(), block, lane):
-    """At least the largest principal stress of a tetrahedron [Pa]; it itself in a pull along one axis."""
+    """Upper bound on the largest principal stress of a tetrahedron [Pa]; exact for uniaxial tension."""
     stress = stress_of(state, model, block, lane)
     mean = trace(stress) / 3.0
     d = scaled_plus_identity(stress, 1.0, -mean)
@@ -33,7 +33,7 @@ def find_overloaded(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Mark with 1 each body of which a tetrahedron may bear more than the body's limit [Pa]; 0 for none."""
+    """Write 1 for each body with a tetrahedron whose stress may exceed the body's limit [Pa], else 0."""
     for body in range(limits.shape[0]):
         result = 0
         if limits[body] > 0.0 and state.body_status[body] == ACTIVE:

@@ -1,12 +1,12 @@
-"""A body of a slot written anew, with all that its particles are in the middle of."""
+"""Kernels that read and write a body with the state of its motion."""
 
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 26
-"""Of a row of `read_motion`: position, velocity, both before the last step, inverse mass, floor, touch, mass,
-aim, target, push, reaction."""
+"""Columns of `read_motion`: position, velocity, both before the last step, inverse mass, floor contact,
+touch, mass, aim, target, external force, reaction."""
 
 
 @ti.func
@@ -16,7 +16,7 @@ def _three(rows: ti.template(), i, first):
 
 @ti.kernel
 def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """All that the particles of one body are in the middle of, (n, MOTION_WIDTH), in the caller's order."""
+    """Read the state of one body's particles into (n, MOTION_WIDTH), in the caller's vertex order."""
     ti.loop_config(serialize=True)
     for i in range(out.shape[0]):
         p = state.particle_of_vertex[state.body_particles[body][0] + i]
@@ -57,15 +57,15 @@ def write_body(
     triangles: ti.types.ndarray(dtype=ti.i32, ndim=2),
     outer: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Write a body into its slot; indices count from the slot's first rows.
+    """Write a body into its slot. Indices count from the slot's first rows.
 
     Args:
-        model_of: body whose lag, drives and residual it takes over: itself, or the one it fell off.
-        motion: as `read_motion`, of each vertex in the caller's order.
-        rest: positions of the particles at rest, in kernel order.
-        particles: of each vertex.
+        model_of: body whose lag, drives and residual it takes: itself, or the body it was cut from.
+        motion: as in `read_motion`, one row for each vertex in the caller's order.
+        rest: positions of the particles at rest [m], in kernel order.
+        particles: particle of each vertex.
         tet_vertices, tet_edges: in blocks.
-        rest_inverses: in blocks; as they are, and as they first were.
+        rest_inverses: in blocks; current and original inverse rest shapes.
         edges, edge_damping: with the spare rows.
     """
     ti.loop_config(serialize=True)
@@ -143,7 +143,7 @@ def write_touching(
     carriers: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Write what touches of a body, where any has a hull: see `contact.hull_fields.touching_rows`."""
+    """Write the contact hull of a body, if the world has hulls: see `contact.hull_fields.touching_rows`."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         p0 = state.body_particles[body][0]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.io import refuse_stand_in
+from taichi_soft.meshing.io import reject_placeholder
 
 Entry: TypeAlias = "dict[str, Any]"
 
@@ -31,27 +31,27 @@ COMPONENTS: dict[Any, np.dtype[Any]] = {
 }
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
-MOST_IMPLICIT_ROWS = 2_000_000
-"""Rows of an accessor without a buffer view: its zeros take memory, and no byte of the file backs them."""
+MAX_IMPLICIT_ROWS = 2_000_000
+"""Largest number of rows of an accessor without a buffer view: no byte of the file backs its zeros."""
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
-NO_CHARACTER = "\ufffd".encode()
-"""What text editors and tools write for bytes that are no characters."""
+REPLACEMENT_CHARACTER = "\ufffd".encode()
+"""Written by text editors and tools for bytes that are not characters."""
 
 
 class Document:
     """The JSON of a .glb or .gltf file, with access to its binary data.
 
     Attributes:
-        json: the whole JSON object.
-        path: of the file. Names of other files are relative to its folder.
+        json: the JSON object.
+        path: path of the file. Names of other files are relative to its folder.
     """
 
     def __init__(self, path: Path) -> None:
-        refuse_stand_in(path)
+        reject_placeholder(path)
         data = path.read_bytes()
         self.path = path
         self._is_binary = data[:4] == b"glTF"
@@ -65,7 +65,7 @@ class Document:
             raise MeshError(f"is glTF of version {version[:10]}: {upgrade_command(path)}")
 
     def entry(self, name: str, parent: Entry | None = None) -> Entry:
-        """Return the object of a name, or an empty one."""
+        """Return the object with a given name, or an empty one."""
         found = (self.json if parent is None else parent).get(name, {})
         return found if isinstance(found, dict) else {}
 
@@ -73,40 +73,38 @@ class Document:
         """Return the list of a kind, such as "nodes"."""
         found = self.json.get(kind, [])
         if not isinstance(found, list):
-            raise MeshError(f"cannot be read: its {kind!r} are no list")
+            raise MeshError(f"cannot be read: its {kind!r} are not a list")
         return found
 
     def named(self, kind: str, number: Any) -> Entry:
-        """Return one entry of a kind. Raises: MeshError if there is none of that number."""
+        """Return one entry of a kind. Raises: MeshError if its number does not exist."""
         found = self.entries(kind)
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
-            raise MeshError(f"cannot be read: it refers to {kind}[{number!r}], and has {len(found)} of these")
+            raise MeshError(f"cannot be read: it refers to {kind}[{number!r}] but has {len(found)} of these")
         entry = found[number]
         if not isinstance(entry, dict):
-            raise MeshError(f"cannot be read: its {kind}[{number}] is no object")
+            raise MeshError(f"cannot be read: its {kind}[{number}] is not an object")
         return entry
 
     def rows(self, number: Any, *types: str) -> NDArray[Any]:
-        """Read an accessor as it is stored, shape (count, columns).
+        """Read an accessor as stored, shape (count, columns).
 
         Args:
-            number: of the accessor.
+            number: number of the accessor.
             types: allowed values of its `type`, such as "VEC3".
-        Raises: MeshError for an accessor of another type, and for one that its buffer does not hold, before
-            memory is allocated.
+        Raises: MeshError, before memory is allocated, for an accessor of another type or beyond the end of
+            its buffer.
         """
         entry, name = self.named("accessors", number), f"accessor {number}"
-        kind, count = entry.get("type"), whole(entry, "count", name)
+        kind, count = entry.get("type"), read_count(entry, "count", name)
         if kind not in types:
-            raise MeshError(
-                f"cannot be read: {name} has the type {kind!r}, where {' or '.join(types)} is needed"
-            )
+            raise MeshError(f"cannot be read: {name} has the type {kind!r} instead of {' or '.join(types)}")
         shape, dtype = (count, COLUMNS[kind]), component_type(entry, name)
         if "bufferView" in entry:
             rows = self._stored(entry, shape, dtype, name)
-        elif count > MOST_IMPLICIT_ROWS:
+        elif count > MAX_IMPLICIT_ROWS:
             raise MeshError(
-                f"cannot be read: {name} has {count:,} rows without data: {MOST_IMPLICIT_ROWS:,} at most"
+                f"cannot be read: {name} has {count:,} rows without data: {MAX_IMPLICIT_ROWS:,} at most"
             )
         else:
             rows = np.zeros(shape, dtype)
@@ -118,46 +116,46 @@ class Document:
         return decoded(rows, self.named("accessors", number))
 
     def view(self, number: Any) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view and its stride, 0 where it has none."""
+        """Return the bytes of a buffer view and its stride, 0 if it has none."""
         entry, name = self.named("bufferViews", number), f"buffer view {number}"
-        start, length = whole(entry, "byteOffset", name, 0), whole(entry, "byteLength", name)
+        start, length = read_count(entry, "byteOffset", name, 0), read_count(entry, "byteLength", name)
         data = self._buffer(entry.get("buffer"))
         if start + length > len(data):
             raise MeshError(
                 f"cannot be read: {name} ends at byte {start + length:,} of a buffer of {len(data):,} bytes"
             )
-        return data[start : start + length], whole(entry, "byteStride", name, 0)
+        return data[start : start + length], read_count(entry, "byteStride", name, 0)
 
     def fetch(self, uri: Any) -> bytes:
-        """Return the content of a data: URI or of a file that is named relative to this one.
+        """Return the content of a data: URI, or of a file named relative to this one.
 
-        Raises: MeshError for a missing file, a network address and an absolute path. A .glb must not name
-            files outside its folder either: the live page reads such files of anyone.
+        Raises: MeshError for a missing file, a network address or an absolute path. A .glb must not name
+            files outside its folder either, because the live page reads files from any visitor.
         """
         if not isinstance(uri, str):
-            raise MeshError(f"cannot be read: {uri!r} is no URI")
+            raise MeshError(f"cannot be read: {uri!r} is not a URI")
         if uri[:5].lower() == "data:":
             return _embedded(uri)
         shown = uri[:100]
         if urlsplit(uri).scheme or uri[:1] in ("/", "\\"):
             raise MeshError(
-                f"cannot be read: it refers to {shown!r}: put that file beside it, and its name only"
+                f"cannot be read: it refers to {shown!r}: put that file next to it and use only its name"
             )
-        candidates = dict.fromkeys([unquote(uri), uri])  # some programs do not encode what they write
+        candidates = dict.fromkeys([unquote(uri), uri])  # some programs do not percent-encode names
         for name in candidates:
             if self._is_binary and ".." in Path(name.replace("\\", "/")).parts:
                 raise MeshError(f"cannot be read: it refers to {shown!r}, outside its folder")
             path = self.path.parent / name
             if "\0" not in name and path.is_file():
-                refuse_stand_in(path)
+                reject_placeholder(path)
                 return path.read_bytes()
-        raise MeshError(f"cannot be read: it refers to the file {shown!r}, and there is none")
+        raise MeshError(f"cannot be read: it refers to the file {shown!r}, which does not exist")
 
     def _buffer(self, number: Any) -> memoryview:
         entry, name = self.named("buffers", number), f"buffer {number}"
         if number not in self._buffers:
             data = self._content(number, entry)
-            length = whole(entry, "byteLength", name)
+            length = read_count(entry, "byteLength", name)
             if len(data) < length:
                 raise MeshError(
                     f"cannot be read: it is cut short, {name} has {len(data):,} of {length:,} bytes"
@@ -178,7 +176,7 @@ class Document:
     def _stored(self, entry: Entry, shape: tuple[int, int], dtype: np.dtype[Any], name: str) -> NDArray[Any]:
         """Rows of a buffer view, without a copy."""
         data, stride = self.view(entry["bufferView"])
-        size, start = shape[1] * dtype.itemsize, whole(entry, "byteOffset", name, 0)
+        size, start = shape[1] * dtype.itemsize, read_count(entry, "byteOffset", name, 0)
         stride = stride or size
         end = start + (shape[0] - 1) * stride + size
         if stride < size or (shape[0] and end > len(data)):
@@ -191,19 +189,21 @@ class Document:
         return np.asarray(np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize)))
 
     def _with_sparse(self, rows: NDArray[Any], sparse: Entry, name: str) -> NDArray[Any]:
-        """A copy in which some rows are replaced."""
-        count, name = whole(sparse, "count", name), f"the sparse part of {name}"
+        """Return a copy with the rows of a sparse accessor replaced."""
+        count, name = read_count(sparse, "count", name), f"the sparse part of {name}"
         indices, values = sparse["indices"], sparse["values"]
-        places = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(np.int64)
-        if count and not 0 <= places.min() <= places.max() < len(rows):
-            raise MeshError(f"cannot be read: {name} replaces row {places.max():,} of {len(rows):,}")
+        replaced = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(
+            np.int64
+        )
+        if count and not 0 <= replaced.min() <= replaced.max() < len(rows):
+            raise MeshError(f"cannot be read: {name} replaces row {replaced.max():,} of {len(rows):,}")
         changed: NDArray[Any] = rows.copy()
-        changed[places] = self._stored(values, (count, rows.shape[1]), rows.dtype, name)
+        changed[replaced] = self._stored(values, (count, rows.shape[1]), rows.dtype, name)
         return changed
 
 
 def decoded(rows: NDArray[Any], accessor: Entry) -> FloatArray:
-    """Stored numbers as reals; integers of a normalised accessor become -1 to 1 or 0 to 1 (section 3.11)."""
+    """Convert stored numbers to reals. A normalised accessor's become -1 to 1 or 0 to 1 (section 3.11)."""
     reals = rows.astype(np.float64)
     if accessor.get("normalized") and rows.dtype.kind in "iu":
         reals = np.maximum(reals / np.iinfo(rows.dtype).max, -1.0)
@@ -218,7 +218,7 @@ def component_type(entry: Entry, name: str) -> np.dtype[Any]:
     return COMPONENTS[component]
 
 
-def whole(entry: Entry, key: str, name: str, default: int | None = None) -> int:
+def read_count(entry: Entry, key: str, name: str, default: int | None = None) -> int:
     """Return a count or an offset. Raises: MeshError unless it is a whole number of at least 0."""
     value = entry.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
@@ -227,7 +227,7 @@ def whole(entry: Entry, key: str, name: str, default: int | None = None) -> int:
 
 
 def copy_command(path: Path) -> str:
-    """The command that writes a file without compression."""
+    """Suggest a command that writes a file without compression."""
     return (
         f"run `npx @gltf-transform/cli copy {path.name} {path.stem}-plain.glb` (needs Node.js), or export it "
         "without compression"
@@ -235,20 +235,20 @@ def copy_command(path: Path) -> str:
 
 
 def upgrade_command(path: Path) -> str:
-    """The command that makes glTF 2.0 of an older file."""
+    """Suggest a command that converts an older file to glTF 2.0."""
     return (
-        f"version 2.0 is read. Convert it with `npx gltf-pipeline -i {path.name} -o {path.stem}-2.glb` "
+        f"only version 2.0 is read. Convert it with `npx gltf-pipeline -i {path.name} -o {path.stem}-2.glb` "
         "(needs Node.js)"
     )
 
 
 def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
-    """The JSON and the binary chunk of a .glb file."""
+    """Return the JSON and the binary chunk of a .glb file."""
     if len(data) < 20:
         raise MeshError(f"cannot be read: it is cut short, at {len(data)} bytes")
-    if NO_CHARACTER in data[:20]:
+    if REPLACEMENT_CHARACTER in data[:20]:
         raise MeshError(
-            "cannot be read: a program has converted it as text. Copy the original as a binary file"
+            "cannot be read: a program has treated it as text. Copy the original as a binary file"
         )
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
@@ -256,13 +256,13 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
     if length > len(data):
         raise MeshError(f"cannot be read: it is cut short, {len(data):,} of {length:,} bytes")
     found: dict[int, bytes] = {}
-    at = 12
-    while at + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, at)
-        if at + 8 + size > length:
-            raise MeshError(f"cannot be read: a chunk of {size:,} bytes goes beyond its end")
-        found.setdefault(kind, data[at + 8 : at + 8 + size])
-        at += 8 + size
+    offset = 12
+    while offset + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, offset)
+        if offset + 8 + size > length:
+            raise MeshError(f"cannot be read: a chunk of {size:,} bytes extends beyond its end")
+        found.setdefault(kind, data[offset + 8 : offset + 8 + size])
+        offset += 8 + size
     if JSON_CHUNK not in found:
         raise MeshError("cannot be read: it has no JSON chunk")
     return found[JSON_CHUNK], found.get(BINARY_CHUNK)
@@ -275,7 +275,7 @@ def _parsed(text: bytes) -> Entry:
         reason = " ".join(str(error).split())[:200]
         raise MeshError(f"cannot be read: it is not glTF, or damaged ({reason})") from None
     if not isinstance(found, dict):
-        raise MeshError("cannot be read: it is not glTF: its JSON is no object")
+        raise MeshError("cannot be read: it is not glTF: its JSON is not an object")
     return found
 
 

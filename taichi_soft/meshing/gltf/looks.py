@@ -1,4 +1,4 @@
-"""Materials, textures and colours of a glTF file, as trimesh holds them."""
+"""Materials, textures and colours of a glTF file as trimesh visuals."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ TEXTURES = (
 )
 
 SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
-"""Extensions that name the image of a texture in another format."""
+"""Extensions with an image of a texture in another format."""
 
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM = "KHR_texture_transform"
 READ = (GLOSS, TRANSFORM, *SOURCES)
-ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # whose format pillow may not read
+ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # in a format that pillow cannot always read
 
 
 class Looks:
@@ -54,10 +54,7 @@ class Looks:
         colors = _colors(primitive)
         if number is None and uv is None and colors is None:
             return None
-        from trimesh.visual import (
-            ColorVisuals,
-            TextureVisuals,
-        )  # half a second that a plain file need not wait for
+        from trimesh.visual import ColorVisuals, TextureVisuals  # slow to import
 
         if number is None and uv is None:
             return ColorVisuals(vertex_colors=colors)
@@ -67,19 +64,19 @@ class Looks:
         return visual
 
     def _texture_coordinates(self, primitive: Primitive) -> FloatArray | None:
-        """Where the vertices lie on the base colour's texture, (n, 2), v upwards."""
+        """Coordinates of the vertices on the base colour's texture, (n, 2), v upwards."""
         number = primitive.entry.get("material")
         material = {} if number is None else self.document.named("materials", number)
-        used = _flat(material).get("baseColorTexture", {})
-        change = extension(used, TRANSFORM)
-        uv = primitive.values(f"TEXCOORD_{change.get('texCoord', used.get('texCoord', 0))}", "VEC2")
+        texture = _flat(material).get("baseColorTexture", {})
+        transform = extension(texture, TRANSFORM)
+        uv = primitive.values(f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}", "VEC2")
         if uv is None:
             return None
-        if change:
-            turn = float(change.get("rotation", 0.0))
-            scaled = uv * np.asarray(change.get("scale", (1.0, 1.0)), dtype=np.float64)
-            rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-            uv = scaled @ rotation.T + np.asarray(change.get("offset", (0.0, 0.0)), dtype=np.float64)
+        if transform:
+            angle = float(transform.get("rotation", 0.0))
+            scaled = uv * np.asarray(transform.get("scale", (1.0, 1.0)), dtype=np.float64)
+            rotation = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            uv = scaled @ rotation.T + np.asarray(transform.get("offset", (0.0, 0.0)), dtype=np.float64)
         uv[:, 1] = 1.0 - uv[:, 1]
         return uv
 
@@ -107,9 +104,9 @@ class Looks:
         found.update({name: self._image(flat[name]) for name in TEXTURES if name in flat})
         return found
 
-    def _image(self, used: Entry) -> Any:
-        """pillow's image of a texture, or None with a note."""
-        texture = self.document.named("textures", used.get("index"))
+    def _image(self, reference: Entry) -> Any:
+        """Return pillow's image of a texture, or None with a note."""
+        texture = self.document.named("textures", reference.get("index"))
         sources = [texture.get("source"), *(extension(texture, name).get("source") for name in ALL_SOURCES)]
         reasons = []
         for number in (each for each in sources if each is not None):
@@ -118,11 +115,11 @@ class Looks:
             if not isinstance(self._images[number], str):
                 return self._images[number]
             reasons.append(self._images[number])
-        self._say(reasons[0] if reasons else f"texture {used.get('index')} has no image")
+        self._add_note(reasons[0] if reasons else f"texture {reference.get('index')} has no image")
         return None
 
     def _opened(self, number: int) -> Any:
-        """pillow's image, or what to say of one that is not read."""
+        """Return pillow's image, or a note on why it is not read."""
         if missing_packages("film", "PIL"):
             return "texture images are not read without pillow: run pip install 'taichi-soft[film]'"
         from PIL import Image, UnidentifiedImageError
@@ -139,30 +136,30 @@ class Looks:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", Image.DecompressionBombWarning)
                 opened = Image.open(io.BytesIO(data))
-                opened.load()  # a damaged one fails here, and not while a frame is drawn
+                opened.load()  # a damaged image fails here, not while a frame is drawn
             return opened
         except UnidentifiedImageError:
             return f"texture {name} is not read: its format is unknown to pillow. Save it as .png or .jpg"
-        except Exception as error:  # pillow raises whatever the reader of a format does
+        except Exception as error:  # pillow's readers raise many kinds
             return f"texture {name} is not read ({' '.join(str(error).split())[:150]})"
 
-    def _say(self, note: str) -> None:
+    def _add_note(self, note: str) -> None:
         if note not in self.notes:
             self.notes.append(note)
 
 
 def _colors(primitive: Primitive) -> NDArray[np.uint8] | None:
-    """Red, green, blue and alpha of the vertices up to 255, (n, 4)."""
+    """Red, green, blue and alpha of the vertices, from 0 to 255, (n, 4)."""
     rows = primitive.values("COLOR_0", "VEC3", "VEC4")
     if rows is None:
         return None
-    whole = np.full((len(rows), 4), 255, dtype=np.uint8)
-    whole[:, : rows.shape[1]] = np.rint(np.clip(np.nan_to_num(rows), 0.0, 1.0) * 255.0)
-    return whole
+    rgba = np.full((len(rows), 4), 255, dtype=np.uint8)
+    rgba[:, : rows.shape[1]] = np.rint(np.clip(np.nan_to_num(rows), 0.0, 1.0) * 255.0)
+    return rgba
 
 
 def _flat(material: Entry) -> Entry:
-    """All properties of a material in one object. Specular and glossiness become what is nearest to them."""
+    """All properties of a material in one object. Specular-glossiness is converted approximately."""
     gloss = extension(material, GLOSS)
     flat = {**material, **(material.get("pbrMetallicRoughness") or {})}
     if gloss and "pbrMetallicRoughness" not in material:

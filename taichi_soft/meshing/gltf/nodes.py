@@ -1,4 +1,4 @@
-"""Nodes of a glTF file: their matrices, and which of them the default scene shows."""
+"""Nodes of a glTF file: their matrices, and those that the default scene shows."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ VISIBILITY = "KHR_node_visibility"
 
 
 def world_matrices(document: Document) -> FloatArray:
-    """Matrices from every node to the file's axes, (n, 4, 4).
+    """Matrices from each node to the file's axes, (n, 4, 4).
 
-    Raises: MeshError for a node with two parents or among its own descendants.
+    Raises: MeshError for a node with two parents, or one that is its own descendant.
     """
     nodes = document.entries("nodes")
     parents = np.full(len(nodes), -1)
@@ -30,11 +30,11 @@ def world_matrices(document: Document) -> FloatArray:
                 )
             parents[child] = number
     order = [int(root) for root in np.flatnonzero(parents < 0)]
-    for number in order:  # grows: children follow their parents
+    for number in order:  # the list grows: children follow their parents
         order.extend(nodes[number].get("children", ()))
     if len(order) < len(nodes):
         number = min(set(range(len(nodes))) - set(order))
-        raise MeshError(f"cannot be read: its nodes form a cycle, node {number} is below itself")
+        raise MeshError(f"cannot be read: its nodes form a cycle: node {number} is its own descendant")
     matrices = np.empty((len(nodes), 4, 4))
     for number in order:
         local = _local_matrix(nodes[number], number)
@@ -45,23 +45,23 @@ def world_matrices(document: Document) -> FloatArray:
 def shown_nodes(document: Document) -> list[int]:
     """Numbers of the visible nodes of the default scene, parents before their children.
 
-    Without a default the first scene is taken, and without scenes every node.
+    Without a default scene the first one counts, and without scenes every node.
     """
     nodes = document.entries("nodes")
     if document.entries("scenes"):
         roots = document.named("scenes", document.json.get("scene", 0)).get("nodes", [])
     else:
-        below = {child for node in nodes for child in node.get("children", ())}
-        roots = [number for number in range(len(nodes)) if number not in below]
+        children = {child for node in nodes for child in node.get("children", ())}
+        roots = [number for number in range(len(nodes)) if number not in children]
     found: dict[int, None] = {}
-    waiting = list(reversed(roots))
-    while waiting:
-        number = waiting.pop()
+    stack = list(reversed(roots))
+    while stack:
+        number = stack.pop()
         node = document.named("nodes", number)
         if number in found or extension(node, VISIBILITY).get("visible") is False:
             continue
         found[number] = None
-        waiting.extend(reversed(node.get("children", ())))
+        stack.extend(reversed(node.get("children", ())))
     return list(found)
 
 
@@ -70,19 +70,19 @@ def instance_matrices(document: Document, node: Entry) -> FloatArray | None:
     attributes = extension(node, INSTANCING).get("attributes")
     if not attributes:
         return None
-    wanted = {"TRANSLATION": ("VEC3", 3), "ROTATION": ("VEC4", 4), "SCALE": ("VEC3", 3)}
+    types = {"TRANSLATION": ("VEC3", 3), "ROTATION": ("VEC4", 4), "SCALE": ("VEC3", 3)}
     rows = {
         name: document.values(attributes[name], kind)
-        for name, (kind, _) in wanted.items()
+        for name, (kind, _) in types.items()
         if name in attributes
     }
     counts = {len(each) for each in rows.values()}
     if len(counts) != 1:
         raise MeshError(f"cannot be read: {INSTANCING} has attributes for {sorted(counts)} instances")
     count = counts.pop()
-    turned = rows.get("ROTATION", np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)))
+    rotations = rows.get("ROTATION", np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)))
     return composed(
-        rows.get("TRANSLATION", np.zeros((count, 3))), turned, rows.get("SCALE", np.ones((count, 3)))
+        rows.get("TRANSLATION", np.zeros((count, 3))), rotations, rows.get("SCALE", np.ones((count, 3)))
     )
 
 
@@ -101,7 +101,7 @@ def composed(translations: FloatArray, rotations: FloatArray, scales: FloatArray
     lengths = np.linalg.norm(rotations, axis=1, keepdims=True)
     unit = np.where(lengths > 0.0, rotations / np.where(lengths > 0.0, lengths, 1.0), [0.0, 0.0, 0.0, 1.0])
     x, y, z, w = unit.T
-    turned = np.array(
+    rotation = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -109,7 +109,7 @@ def composed(translations: FloatArray, rotations: FloatArray, scales: FloatArray
         ]
     )
     matrices = np.tile(np.eye(4), (len(unit), 1, 1))
-    matrices[:, :3, :3] = np.moveaxis(turned, 2, 0) * scales[:, None, :]
+    matrices[:, :3, :3] = np.moveaxis(rotation, 2, 0) * scales[:, None, :]
     matrices[:, :3, 3] = translations
     return matrices
 

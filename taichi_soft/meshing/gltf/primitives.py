@@ -1,4 +1,4 @@
-"""Primitives of a glTF mesh: vertices, attributes and triangles, compressed by Draco or not."""
+"""Primitives of a glTF mesh: vertices, attributes and triangles, with or without Draco compression."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from taichi_soft.meshing.gltf.document import (
     component_type,
     copy_command,
     decoded,
-    whole,
+    read_count,
 )
 from taichi_soft.meshing.gltf.nodes import extension
 
 DRACO = "KHR_draco_mesh_compression"
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-"""Modes of primitives with triangles; others have points or lines."""
+"""Modes of primitives with triangles; the other modes are points and lines."""
 
 
 class Primitive:
@@ -33,7 +33,7 @@ class Primitive:
 
     Attributes:
         entry: its JSON.
-        name: of its mesh and its number there, for errors.
+        name: name of its mesh and its number in that mesh, for errors.
     """
 
     def __init__(self, document: Document, entry: Entry, name: str) -> None:
@@ -43,11 +43,11 @@ class Primitive:
 
     @property
     def has_triangles(self) -> bool:
-        """True if it is more than points and lines."""
+        """True if it has triangles and not only points or lines."""
         return "POSITION" in self._attributes and self.entry.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)
 
     def values(self, attribute: str, *types: str) -> FloatArray | None:
-        """Read an attribute as real numbers, (n, columns); None where there is none."""
+        """Read an attribute as real numbers, (n, columns); None if it is missing."""
         rows = self.rows(attribute, *types)
         return (
             None
@@ -56,7 +56,7 @@ class Primitive:
         )
 
     def rows(self, attribute: str, *types: str) -> NDArray[Any] | None:
-        """Read an attribute as it is stored, (n, columns); None where there is none.
+        """Read an attribute as stored, (n, columns); None if it is missing.
 
         Raises: MeshError unless it has a row for every vertex.
         """
@@ -74,17 +74,17 @@ class Primitive:
 
     @property
     def vertex_count(self) -> int:
-        """Number of rows of its positions."""
+        """Number of positions."""
         if "POSITION" in self._compressed:
             return len(self._compressed["POSITION"])
         number = self._attributes["POSITION"]
-        return whole(self.document.named("accessors", number), "count", f"accessor {number}")
+        return read_count(self.document.named("accessors", number), "count", f"accessor {number}")
 
     def vertices(self, weights: Sequence[float]) -> tuple[FloatArray, FloatArray | None]:
         """Positions (n, 3) and normals (n, 3) or None, with the morph targets blended in.
 
         Args:
-            weights: of the morph targets. Missing ones are 0.
+            weights: weights of the morph targets; missing ones are 0.
         """
         positions, normals = self.values("POSITION", "VEC3"), self.values("NORMAL", "VEC3")
         assert positions is not None
@@ -99,11 +99,11 @@ class Primitive:
         return positions, normals
 
     def triangles(self, count: int) -> NDArray[np.int64]:
-        """Indices of the corners of its triangles, (m, 3).
+        """Vertices of the corners of its triangles, (m, 3).
 
         Args:
-            count: of the vertices.
-        Raises: MeshError for an index that is not below it, and for corners that are no whole triangles.
+            count: number of vertices.
+        Raises: MeshError for an index out of range, or corners that do not form complete triangles.
         """
         if self._faces is not None:
             corners = self._faces.astype(np.int64).reshape(-1)
@@ -117,18 +117,18 @@ class Primitive:
         if mode == TRIANGLES:
             if len(corners) % 3:
                 raise MeshError(
-                    f"cannot be read: {self.name} has {len(corners):,} corners of triangles, no multiple of 3"
+                    f"cannot be read: {self.name} has {len(corners):,} triangle corners, not a multiple of 3"
                 )
             return corners.reshape(-1, 3)
         return _strip(corners) if mode == STRIP else _fan(corners)
 
     def _decompress(self) -> tuple[NDArray[Any] | None, dict[str, NDArray[Any]]]:
-        """Triangles and attributes that Draco has compressed; None and none where it has not.
+        """Decompress triangles and attributes with Draco; None and {} if they are not compressed.
 
-        Raises: MeshError for damaged data, and without DracoPy unless the file has an uncompressed copy.
+        Raises: MeshError for damaged data, or if DracoPy is missing and the file has no uncompressed copy.
         """
-        told = extension(self.entry, DRACO)
-        if not told:
+        compression = extension(self.entry, DRACO)
+        if not compression:
             return None, {}
         if missing_packages("io", "DracoPy"):
             if all(
@@ -141,30 +141,30 @@ class Primitive:
             )
         import DracoPy
 
-        data, _ = self.document.view(told.get("bufferView"))
+        data, _ = self.document.view(compression.get("bufferView"))
         try:
             mesh = DracoPy.decode(bytes(data))
-        except Exception as error:  # whatever the package raises for damaged data
+        except Exception as error:  # the package raises many kinds on damaged data
             reason = " ".join(str(error).split())[:100]
             raise MeshError(
                 f"cannot be read: the {DRACO} data of {self.name} is damaged ({reason})"
             ) from None
         found = {each["unique_id"]: each["data"] for each in mesh.attributes}
-        numbers = self.document.entry("attributes", told)
-        lost = [name for name, number in numbers.items() if number not in found]
-        if lost:
-            raise MeshError(f"cannot be read: the {DRACO} data of {self.name} lacks {', '.join(lost)}")
+        numbers = self.document.entry("attributes", compression)
+        missing = [name for name, number in numbers.items() if number not in found]
+        if missing:
+            raise MeshError(f"cannot be read: the {DRACO} data of {self.name} lacks {', '.join(missing)}")
         rows = {}
-        for name, number in numbers.items():  # DracoPy gives integers as reals: the accessor has their type
+        for name, number in numbers.items():  # DracoPy returns integers as reals: restore the accessor's type
             accessor = self.document.named("accessors", self._attributes.get(name))
             rows[name] = found[number].reshape(len(found[number]), -1).astype(component_type(accessor, name))
             if rows[name].shape[1] != COLUMNS.get(accessor.get("type", "")):
-                raise MeshError(f"cannot be read: the {DRACO} data of {self.name} is no {name}")
+                raise MeshError(f"cannot be read: the {DRACO} data of {self.name} does not fit {name}")
         return getattr(mesh, "faces", np.zeros((0, 3), np.int64)), rows
 
 
 def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of a strip, (m, 3). Triangles that repeat a corner only connect strips, and are left out."""
+    """Triangles of a strip, (m, 3). Those that repeat a corner only connect strips and are skipped."""
     found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     found[1::2] = found[1::2, [1, 0, 2]]
     a, b, c = found.T
@@ -172,6 +172,6 @@ def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _fan(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles that share the first corner."""
+    """Triangles of a fan, which share the first corner, (m, 3)."""
     rim = corners[1:]
     return np.stack([np.broadcast_to(corners[:1], max(len(rim) - 1, 0)), rim[:-1], rim[1:]], axis=1)

@@ -1,4 +1,4 @@
-"""Surfaces of .glb and .gltf files, posed as the file's nodes, skins and morph targets rest."""
+"""Surfaces of .glb and .gltf files, in the rest pose of their nodes, skins and morph targets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from taichi_soft.meshing.gltf.primitives import DRACO, Primitive
 from taichi_soft.meshing.surface import Surface, surface_of
 
 READ = (DRACO, "KHR_mesh_quantization", INSTANCING, VISIBILITY, *looks.READ)
-"""Extensions that are read."""
+"""Supported extensions."""
 
 SHAPELESS = (
     "KHR_technique",
@@ -33,33 +33,33 @@ SHAPELESS = (
     "EXT_lights_",
     "KHR_animation_",
 )
-"""Beginnings of the names of extensions that change no shape: a file that requires one of these is read."""
+"""Prefixes of extensions that do not change shapes: files that require them are read."""
 
-MOST_ROWS = 10_000_000
-"""Vertices and triangles in all. Many nodes can show one mesh: a small file could ask for any memory."""
+MAX_ROWS = 10_000_000
+"""Most vertices and triangles in total. Many nodes can show one mesh, so a small file could need a lot."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One primitive where the scene shows it, with all its instances, in the file's own axes."""
+    """One primitive as the scene shows it, with all its instances, in the file's axes."""
 
     name: str
     vertices: FloatArray  # (n, 3) [m]
     triangles: NDArray[np.int64]  # (m, 3)
-    normals: FloatArray | None  # (n, 3), of any length; None where the file has none
+    normals: FloatArray | None  # (n, 3), of any length; None if the file has none
     visual: Any  # trimesh's, or None
 
 
 def read_gltf(path: Path) -> list[Surface]:
-    """Read the default scene of a .glb or .gltf file. Animations are not played.
+    """Read the default scene of a .glb or .gltf file. Animations are ignored.
 
-    Skins are posed by their joints, and morph targets are blended by their default weights: glTF 2.0
-    specification, sections 3.7.2 and 3.7.3.
-    Raises: MeshError, in one line without the file's name, for a damaged file, for one that requires an
-        extension that is not read, and for one without triangles.
+    Joints pose the skins, and default weights blend the morph targets: glTF 2.0 specification, sections 3.7.2
+    and 3.7.3.
+    Raises: MeshError, in one line without the file's name, if the file is damaged, requires an unsupported
+        extension, or has no triangles.
     """
     try:
-        with np.errstate(all="ignore"):  # what overflows is refused as a vertex that is not finite
+        with np.errstate(all="ignore"):  # an overflow is reported as a vertex that is not finite
             return _Reader(Document(path)).surfaces()
     except MeshError:
         raise
@@ -73,10 +73,10 @@ def read_gltf(path: Path) -> list[Surface]:
 class _Reader:
     def __init__(self, document: Document) -> None:
         self.document, self.looks = document, Looks(document)
-        self.counts: Counter[str] = Counter()  # of what the notes tell
+        self.counts: Counter[str] = Counter()  # for the notes
         self.joints: set[int] = set()
         self.primitives: dict[tuple[int, int], Primitive] = {}
-        self.room = MOST_ROWS
+        self.remaining_rows = MAX_ROWS
         self._require_extensions()
 
     def surfaces(self) -> list[Surface]:
@@ -113,12 +113,12 @@ class _Reader:
                 self.counts["blended"] += any(weights)
             primitive = self._primitive(node["mesh"], order, entry)
             if not primitive.has_triangles:
-                self.counts["left out"] += 1
+                self.counts["skipped"] += 1
                 continue
             positions, normals = primitive.vertices(weights)
             triangles = primitive.triangles(len(positions))
             copies = 1 if instances is None else len(instances)
-            self._take_room(copies * (len(positions) + len(triangles)))
+            self._reserve_rows(copies * (len(positions) + len(triangles)))
             skinned = self._skin_matrices(node, primitive, worlds, len(positions))
             if skinned is not None and instances is not None:
                 raise MeshError(
@@ -133,7 +133,7 @@ class _Reader:
                 yield _posed(part, poses)
 
     def _primitive(self, mesh: int, order: int, entry: Entry) -> Primitive:
-        """The same object for all nodes of a mesh: it is decompressed once."""
+        """Return the primitive, shared by all nodes of a mesh so that it is decompressed only once."""
         key = mesh, order
         if key not in self.primitives:
             self.primitives[key] = Primitive(self.document, entry, f"primitive {order} of mesh {mesh}")
@@ -142,7 +142,7 @@ class _Reader:
     def _skin_matrices(
         self, node: Entry, primitive: Primitive, worlds: FloatArray, count: int
     ) -> FloatArray | None:
-        """Matrices from the vertices to the file's axes by a skin, (n, 4, 4), or None without a skin."""
+        """Skinning matrices from the vertices to the file's axes, (n, 4, 4), or None without a skin."""
         joints, weights = _influences(primitive)
         if "skin" not in node or not len(joints):
             return None
@@ -156,7 +156,7 @@ class _Reader:
             inverse = self.document.values(skin["inverseBindMatrices"], "MAT4")
             if len(inverse) < len(matrices):
                 raise MeshError(
-                    f"cannot be read: skin {node['skin']} has {len(inverse)} of {len(matrices)} matrices"
+                    f"cannot be read: skin {node['skin']} has only {len(inverse)} of {len(matrices)} matrices"
                 )
             columns_first = inverse[: len(matrices)].reshape(-1, 4, 4)
             matrices = matrices @ columns_first.transpose(0, 2, 1)
@@ -165,7 +165,7 @@ class _Reader:
             raise MeshError(
                 f"cannot be read: {primitive.name} refers to joint {used.max()} of {len(matrices)}"
             )
-        weights[weights.sum(axis=1) <= 0.0, 0] = 1.0  # a vertex of no joint follows its first
+        weights[weights.sum(axis=1) <= 0.0, 0] = 1.0  # a vertex without weights follows its first joint
         weights /= weights.sum(axis=1, keepdims=True)
         blended = np.zeros((count, 4, 4))
         for column in range(joints.shape[1]):
@@ -173,10 +173,10 @@ class _Reader:
             blended[rows] += weights[rows, column, None, None] * matrices[joints[rows, column]]
         return blended
 
-    def _take_room(self, rows: int) -> None:
-        self.room -= rows
-        if self.room < 0:
-            raise MeshError(f"has more than {MOST_ROWS:,} vertices and triangles: simplify it")
+    def _reserve_rows(self, rows: int) -> None:
+        self.remaining_rows -= rows
+        if self.remaining_rows < 0:
+            raise MeshError(f"has more than {MAX_ROWS:,} vertices and triangles: simplify it")
 
     def _require_extensions(self) -> None:
         required = [str(name) for name in self.document.entries("extensionsRequired")]
@@ -184,7 +184,7 @@ class _Reader:
             if name in MESHOPT:
                 raise MeshError(f"is compressed with {name}: {copy_command(self.document.path)}")
             if name not in READ and not name.startswith(SHAPELESS):
-                raise MeshError(f"requires the extension {name}, which is not read: export it without")
+                raise MeshError(f"requires the extension {name}, which is not supported: export it without")
 
     def _notes(self, shown: list[int]) -> tuple[str, ...]:
         counts, entries = self.counts, self.document.entries
@@ -198,7 +198,7 @@ class _Reader:
             (
                 counts["skinned"],
                 "primitive",
-                f" with a skin, {_many(len(self.joints), 'joint')} in all: posed as the file's joints rest",
+                f" with a skin, {_many(len(self.joints), 'joint')} in total: posed by the file's rest pose",
             ),
             (
                 counts["morphed"],
@@ -207,8 +207,8 @@ class _Reader:
             ),
             (len(animations), "animation", f" ({names[:200]}): not played"),
             (counts["instances"], "instance", f" by {INSTANCING}: read, as one mesh for each node"),
-            (counts["left out"], "primitive", " without triangles (points or lines): left out"),
-            (hidden, "node", " with a mesh outside the default scene or hidden: left out"),
+            (counts["skipped"], "primitive", " without triangles (points or lines): skipped"),
+            (hidden, "node", " with a mesh outside the default scene or hidden: skipped"),
         )
         found = [_many(count, noun) + text for count, noun, text in notes if count]
         return (*found, *_extension_notes(entries("extensionsUsed")), *self.looks.notes)
@@ -219,26 +219,28 @@ def _extension_notes(names: list[Any]) -> list[str]:
         ("read", [str(name) for name in names if name in READ]),
         ("ignored", [str(name) for name in names if name not in READ]),
     )
-    words = [f"{', '.join(each)} ({what})" for what, each in lists if each]
+    words = [f"{', '.join(each)} ({status})" for status, each in lists if each]
     return [f"extensions: {'; '.join(words)}"] if words else []
 
 
 def _posed(part: _Part, poses: FloatArray) -> _Part:
-    """The instances of a part, as one part.
+    """Merge the instances of a part into one part.
 
     Args:
         poses: matrices to the file's axes, (instances, 1 or vertices, 4, 4).
     """
     linear, count = poses[..., :3, :3], len(part.vertices)
     vertices = np.einsum("...ij,...j->...i", linear, part.vertices) + poses[..., :3, 3]
-    turned = np.asarray(np.linalg.det(linear) < 0.0)  # mirrored
+    is_mirrored = np.asarray(np.linalg.det(linear) < 0.0)
     normals = None
-    if part.normals is not None:  # by the inverse transpose, but for the length
+    if part.normals is not None:  # by the inverse transpose, up to the length
         cofactors = np.cross(linear[..., [1, 2, 0], :], linear[..., [2, 0, 1], :])
         moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
-        normals = np.where(turned[..., None], -moved, moved).reshape(-1, 3)
-    mirrored = np.broadcast_to(turned, vertices.shape[:2])[:, part.triangles].all(axis=2, keepdims=True)
-    triangles = np.where(mirrored, part.triangles[:, [0, 2, 1]], part.triangles)
+        normals = np.where(is_mirrored[..., None], -moved, moved).reshape(-1, 3)
+    is_reversed = np.broadcast_to(is_mirrored, vertices.shape[:2])[:, part.triangles].all(
+        axis=2, keepdims=True
+    )
+    triangles = np.where(is_reversed, part.triangles[:, [0, 2, 1]], part.triangles)
     return replace(
         part,
         vertices=vertices.reshape(-1, 3),
@@ -249,36 +251,36 @@ def _posed(part: _Part, poses: FloatArray) -> _Part:
 
 
 def _repeated(visual: Any, count: int) -> Any:
-    """A visual for some copies of its vertices."""
+    """Repeat a visual for `count` copies of its vertices."""
     if visual is None or count == 1:
         return visual
     if visual.kind == "vertex":
         return type(visual)(vertex_colors=np.tile(visual.vertex_colors, (count, 1)))
     uv = None if visual.uv is None else np.tile(visual.uv, (count, 1))
-    made = type(visual)(uv=uv, material=visual.material)
+    result = type(visual)(uv=uv, material=visual.material)
     for name, rows in visual.vertex_attributes.items():
         if name != "uv":
-            made.vertex_attributes[name] = np.tile(rows, (count, 1))
-    return made
+            result.vertex_attributes[name] = np.tile(rows, (count, 1))
+    return result
 
 
 def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
-    """Numbers of joints and their weights, (n, 4 k) each; no columns without any."""
+    """Joints and their weights, (n, 4 k) each; no columns if there are none."""
     joints, weights = [], []
     for group in range(16):
         numbers = primitive.rows(f"JOINTS_{group}", "VEC4")
-        shares = primitive.values(f"WEIGHTS_{group}", "VEC4")
-        if numbers is None or shares is None:
+        group_weights = primitive.values(f"WEIGHTS_{group}", "VEC4")
+        if numbers is None or group_weights is None:
             break
         joints.append(numbers.astype(np.int64))
-        weights.append(np.maximum(shares, 0.0))
+        weights.append(np.maximum(group_weights, 0.0))
     if not joints:
         return np.zeros((0, 0), np.int64), np.zeros((0, 0))
     return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
 
 
 def _unique(parts: list[_Part]) -> list[str]:
-    """Their names, with a number behind those that are there already."""
+    """Names of the parts, made unique by numbers at the end."""
     found: dict[str, None] = {}
     last: Counter[str] = Counter()
     for part in parts:

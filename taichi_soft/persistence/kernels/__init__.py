@@ -1,1 +1,1 @@
-"""All that passes from one step to the next, packed into one array, and hashed."""
+"""Kernels that pack and hash the state that passes from one step to the next."""

@@ -1,4 +1,4 @@
-"""All that passes from one step of a world to the next, in one array and back, bit by bit."""
+"""Pack the state that passes from one step to the next into one array, and unpack it, bit by bit."""
 
 from typing import Any
 
@@ -12,18 +12,18 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
 OWNERS = PARTICLE, BODY, SHAPE, WORLD = range(4)
-"""What a field has a row for: a particle, a body, a number of a rest shape, or the world. Behind these come
-the groups of slices."""
+"""Owner of a field's rows: a particle, a body, an entry of a rest shape, or the world. The groups of slices
+follow."""
 
-LONG = 256
-"""Rows from which on a group takes a part of the time of a snapshot that counts."""
+LONG_GROUP = 256
+"""Rows from which copying a group takes a relevant part of the time of a snapshot."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
-    """Fields that the next step, or a reading before it, depends on: (field, column, width).
+    """Fields that the next step, or a read before it, depends on: (field, column, width).
 
-    All others are constant, follow from what bodies are made of, or are written in each step before they are
-    read: forces, boxes, candidates of contacts, islands.
+    All other fields are constant, follow from the assets, or are written in each step before they are read:
+    forces, boxes, contact candidates, islands.
     """
     is_implicit = state.capacity.implicit
     fields: list[Any] = []
@@ -54,16 +54,16 @@ def slice_groups(state: State) -> list[list[Any]]:
 
 
 def owners(state: State) -> range:
-    """All groups of fields."""
+    """Indices of all groups of fields."""
     return range(len(OWNERS) + len(slice_groups(state)))
 
 
 def row_table(
     state: State, particles: int, bodies: int, blocks: int, of_slices: list[int]
 ) -> NDArray[np.int32]:
-    """Rows of each owner, their width and where they begin: (owners + 1, 3), the last row being the end.
+    """Row count, width and start of each owner, (owners + 1, 3). The last row marks the end.
 
-    Args: of_slices: rows in use of each group of `slice_groups`.
+    Args: of_slices: used rows of each group of `slice_groups`.
     """
     counts = [particles, bodies, blocks * 9 * LANES, 1, *of_slices]
     rows, at = [], 0
@@ -75,8 +75,8 @@ def row_table(
 
 
 def _is_long(state: State, owner: int) -> bool:
-    """Whether copying its rows in vector instructions is worth their longer compile time."""
-    return owner != WORLD and all(field.shape[0] >= LONG for field, _, _ in carried(state, owner))
+    """True if copying the rows with vector instructions is worth the longer compile time."""
+    return owner != WORLD and all(field.shape[0] >= LONG_GROUP for field, _, _ in carried(state, owner))
 
 
 @ti.func
@@ -114,7 +114,7 @@ def copy_state(
     words: ti.types.ndarray(dtype=ti.i32, ndim=1),
     packs: ti.template(),
 ):
-    """Copy everything that is `carried` into `words`, row by row as `table` says; back where not `packs`."""
+    """Copy all `carried` fields to `words` in the layout of `table`, or from `words` if `packs` is False."""
     for owner in ti.static(owners(state)):
         if ti.static(_is_long(state, owner)):
             ti.loop_config(serialize=True)
@@ -134,20 +134,20 @@ def _word(x):
 
 @ti.func
 def _mix(code, word):
-    """Take a word into a hash: FNV-1a (Fowler, Noll, Vo) with 64 bits, word by word, then a shift."""
+    """Add a word to a hash: 64-bit FNV-1a (Fowler, Noll, Vo) on words, followed by a shift."""
     mixed = (code ^ word) * ti.u64(1099511628211)
     return mixed ^ (mixed >> ti.u64(29))
 
 
 @ti.func
 def _mix_two(code, x, y):
-    """Take two numbers of 32 bits into a hash at once."""
+    """Add two 32-bit numbers to a hash at once."""
     return _mix(code, _word(x) | (_word(y) << ti.u64(32)))
 
 
 @ti.kernel
 def hash_bodies(state: ti.template(), body_count: ti.i32) -> ti.i64:
-    """A number that tells states apart: positions, velocities, pins and all of each body that lives."""
+    """Hash of the state: status of all slots; positions, velocities and pins of the bodies in them."""
     code = ti.u64(1469598103934665603)
     ti.loop_config(serialize=True)
     for body in range(body_count):

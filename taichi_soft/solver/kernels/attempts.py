@@ -7,7 +7,7 @@ again with twice as many substeps, and so on. The last attempt brakes vibrations
 stay.
 """
 
-from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_particle, restore_particle
+from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
@@ -61,7 +61,7 @@ def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
-            remember_particle(state, p)
+            save_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
                 if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
@@ -140,7 +140,7 @@ def body_is_sound(state: ti.template(), body):
     particles = state.body_particles[body]
     sound, p = 1, particles[0]
     while p < particles[1]:
-        sound = sound & particle_is_sound(state, p)
+        sound = sound & particle_is_valid(state, p)
         p = row_behind(p)
     return sound
 

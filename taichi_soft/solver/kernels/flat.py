@@ -12,9 +12,9 @@ A GPU has no such barrier: there each substep is a launch of its own.
 
 from taichi_soft.bodies.kernels.particles import (
     gravity_on,
-    particle_is_sound,
-    remember_particle,
+    particle_is_valid,
     restore_particle,
+    save_particle,
 )
 from taichi_soft.bodies.kernels.plasticity import flow_block
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
@@ -45,7 +45,7 @@ def _block_is_active(state: ti.template(), block):
 @ti.func
 def _remember_phase(state: ti.template(), p):
     if _status_of(state, p) != ABSENT:
-        remember_particle(state, p)
+        save_particle(state, p)
 
 
 @ti.func
@@ -160,7 +160,7 @@ def _check_phase(state: ti.template(), p, is_last):
     body = state.particle_body[p]
     if state.body_status[body] == ACTIVE:
         is_jolted = is_last == 0 and state.body_jolted[body] == 1
-        if is_jolted or particle_is_sound(state, p) == 0:
+        if is_jolted or particle_is_valid(state, p) == 0:
             ti.atomic_max(state.body_status[body], _FAILING)
 
 

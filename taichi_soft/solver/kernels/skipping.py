@@ -3,7 +3,7 @@
 As sleepers, they make the step after all where something comes near that moves: see `wake_island`.
 """
 
-from taichi_soft.bodies.kernels.particles import remember_particle
+from taichi_soft.bodies.kernels.particles import save_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.core.math.rows import row_behind
@@ -43,7 +43,7 @@ def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
             particles = state.body_particles[body]
             p = particles[0]
             while p < particles[1]:
-                remember_particle(state, p)
+                save_particle(state, p)
                 p = row_behind(p)
             if ti.static(state.capacity.has_contact):
                 forget_contacts(state, body)

@@ -213,7 +213,7 @@ def test_the_way_to_a_body_that_a_refused_surface_names_runs_as_it_stands(tmp_pa
 
 @pytest.mark.parametrize("source", [CUBE, trimesh.Scene([CUBE])])
 def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way(source):
-    way = r"got (Trimesh|Scene): SoftBodyAsset\.from_surface\(mesh, material\) makes a body of it"
+    way = r"got (Trimesh|Scene): SoftBodyAsset\.from_surface\(mesh, material\) makes a body from it"
     with pytest.raises(MeshError, match=way):
         World().add_body(source, preset("cork"))
     with pytest.raises(MeshError, match=r"got int$"):

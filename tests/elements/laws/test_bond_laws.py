@@ -197,7 +197,7 @@ class TestGivenSprings:
         assert material.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.01 / 3]
         each = SpringMaterial.from_young(2e6, [0.01, 0.02], self.MESH.edge_lengths)
         assert each.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.02 / 3]
-        with pytest.raises(MaterialError, match="area has 3 values and lengths has 2: give one per edge"):
+        with pytest.raises(MaterialError, match=r"area has 3 values and lengths has 2: .*one per edge"):
             SpringMaterial.from_young(2e6, [0.01, 0.02, 0.03], self.MESH.edge_lengths)
 
     def test_a_spring_of_no_length_left_has_no_force(self):
@@ -236,14 +236,14 @@ class TestGivenSprings:
             internal_forces(self.MESH, Material(1e6, 0.3, 1000.0), x, law="springs")
         with pytest.raises(MaterialError, match="law 'cmpm' needs a Material, got SpringMaterial"):
             internal_forces(solid, springs, solid.vertices, law="cmpm")
-        with pytest.raises(MaterialError, match="tells no density"):
+        with pytest.raises(MaterialError, match=r"no density.*ParticleMesh"):
             internal_forces(solid, springs, solid.vertices, law="springs")
 
 
 def test_shear_constants_are_refused_by_laws_without_them():
     mesh = MESHES["ball"]
     for law in ("virial", "springs", "neo_hookean"):
-        with pytest.raises(MaterialError, match=f"law '{law}' takes no shear_modulus"):
+        with pytest.raises(MaterialError, match=f"law '{law}' has no shear_modulus.*leave"):
             internal_forces(mesh, Material(1e6, 0.3, 1e3, shear_modulus=1e5), mesh.vertices, law=law)
 
 
@@ -251,7 +251,7 @@ def test_shear_constants_are_refused_by_laws_without_them():
     ("option", "value"), [("strain", "linear"), ("flips", "recover"), ("damping_model", "tet_mean")]
 )
 def test_options_of_tetrahedral_laws_are_refused(option, value):
-    with pytest.raises(OptionError, match=f"law 'springs' has no {option}='{value}'"):
+    with pytest.raises(OptionError, match=f"'springs'.*{option}='{value}'.*(leave|use)"):
         internal_forces(
             MESHES["ball"], Material(1e6, 0.3, 1e3), MESHES["ball"].vertices, law="springs", **{option: value}
         )

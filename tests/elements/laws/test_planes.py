@@ -88,7 +88,7 @@ def test_cheap_normals_of_the_beam_with_a_hole_are_as_far_from_perpendicular_as_
 @pytest.mark.parametrize(
     ("law", "is_split", "said"),
     [
-        ("cmpm2", True, "fits no planes"),
+        ("cmpm2", True, "leave out is_split"),
         ("best_fitting_plane", 1, "is_split must be True or False"),
     ],
 )
