@@ -40,6 +40,7 @@ class Job:
     phase: ti.i32
     s: ti.i32  # number of the substep, from 0
     substeps: ti.i32  # of the attempt at a step
+    has_pairs: ti.i32  # 1 where bodies of the island may touch each other, or themselves
     forgets: ti.i32  # 1 where a search drops the candidates there are
     h: ti.f32  # length of the substep [s]
     since: ti.f32  # time since the start of the step, and until its end [s]

@@ -9,7 +9,7 @@
     each body by itself     drift: new positions
 
 Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
-of them. A body alone that meets no collider drifts in its kick, in one pass over its particles.
+of them. A body alone drifts in its kick, in one pass over its particles, and collides after it.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -34,7 +34,7 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
+from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted
 from taichi_soft.solver.kernels.implicit_euler import keeps_shape, slow_down
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_among_colliders, kick_time
@@ -162,8 +162,11 @@ def _drive_time(program: ti.template(), job):
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Returns: for how long bodies have drifted with their new velocities already [s]."""
     body = state.contact.island_body[state.contact.island_first[island]]
-    is_free = _is_alone(state, program, island) & is_clear(state, body, run.fastest * now.h)
+    is_free = _is_alone(state, program, island) & can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
+    has_pairs = 0
+    if ti.static(program.has_soft_contact):
+        has_pairs = has_contact_pairs(state, island)
     each_body(
         state,
         program,
@@ -172,6 +175,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
             phase=KICK,
             s=now.s,
             substeps=now.substeps,
+            has_pairs=has_pairs,
             h=now.h,
             since=now.since,
             drift_time=drift_time,
@@ -216,11 +220,11 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """Whether the bodies of an island are at new positions already (1): a body alone that meets nothing."""
+    """Whether the bodies of an island are at new positions already (1): one alone that the kick moved."""
     has_moved = 0
     body = state.contact.island_body[state.contact.island_first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
-        has_moved = has_drifted(state, body, run.fastest, now.h)
+        has_moved = has_drifted(state, body, run.fastest, now.h, now.since)
     return has_moved
 
 
