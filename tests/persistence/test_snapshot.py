@@ -372,7 +372,11 @@ def set_word(at, to):
     return change
 
 
-# From behind: grabs (16), wind (4), ten words for each of the two bodies.
+# Words of joints, then what particles touched, how calm bodies are, and the floor's impulses.
+OF_CONTACT = 610 + 2 * 8 + 2 * 8 + 2 * 7
+
+
+# From behind: contact, grabs (16), wind (4), ten words for each of the two bodies.
 @pytest.mark.parametrize(
     "change",
     [
@@ -398,10 +402,10 @@ def set_word(at, to):
         set_word(12, np.float32(np.nan).view(np.int32)),
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
-        set_word(-16, 99),
-        set_word(-16 - 4 - 20, 9),
-        set_word(-16 - 4 - 6, np.float32(np.nan).view(np.int32)),
-        set_word(-16 - 4 - 1, np.float32(np.nan).view(np.int32)),
+        set_word(-OF_CONTACT - 16, 99),
+        set_word(-OF_CONTACT - 16 - 4 - 20, 9),
+        set_word(-OF_CONTACT - 16 - 4 - 6, np.float32(np.nan).view(np.int32)),
+        set_word(-OF_CONTACT - 16 - 4 - 1, np.float32(np.nan).view(np.int32)),
     ],
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
