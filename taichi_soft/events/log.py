@@ -66,8 +66,8 @@ class EventLog:
             )
         if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
             raise StateError(
-                f"{kind.__name__} is not recorded in a world without colliders and soft_contact: make the "
-                "world with collider_room=1, so that its floor is a collider"
+                f"{kind.__name__} is not recorded by schedule 'flat', which sees no contact: make the "
+                "world with schedule='per_body'"
             )
         return kinds
 

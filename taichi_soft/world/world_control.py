@@ -106,8 +106,7 @@ class WorldControl(WorldParts):
         """
         if self._context.fields is not None and self._context.fields.colliders is None:
             raise StateError(
-                "the world was built without colliders: add one before build(), or make the world with "
-                "collider_room"
+                "schedule 'flat' has no colliders but the floor: make the world with schedule='per_body'"
             )
         collider = self._context.colliders.add(
             shape,

@@ -381,11 +381,9 @@ def test_a_full_world_refuses_and_changes_nothing(soft):
 BY_SOLVES = {"integrator": "implicit_euler", "collider_room": 1}
 
 
-def test_a_world_in_which_bodies_are_stepped_apart_says_what_to_do():
-    apart = "soft_contact=True, or with collider_room=1"
+def test_a_world_without_joints_says_what_to_do():
     for options, advice in (
-        ({}, apart),
-        ({"schedule": "flat"}, apart),
+        ({"schedule": "flat"}, "'flat' has no joints: .*'per_body'"),
         (BY_SOLVES, "no joints: .*'leapfrog'"),
     ):
         world = World(floor=None, **options)

@@ -180,7 +180,7 @@ def test_settings_say_which_schedule_was_chosen(cube, jelly):
     world.add_body(cube, jelly)
     world.build()
     found = world.settings
-    assert (found.schedule, found.floor, found.integrator) == ("per_body", None, "explicit_euler")
+    assert (found.schedule, found.floor, found.integrator) == ("flat", None, "explicit_euler")
     assert found.gravity.tolist() == [0, 0, -1.6]
 
 
