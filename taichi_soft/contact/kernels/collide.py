@@ -117,22 +117,24 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
     contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
         contact.particle_clearance[p] = UNSEEN
-    touches_by_points = 0  # of its hull
+    touches_by_points = False  # of its hull, and by no particle
     if ti.static(state.capacity.contact.hull):
-        touches_by_points = int(state.hull.body_points[body][0] < state.hull.body_points[body][1])
-    if touches_by_points == 0:
+        touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
+    if is_deep and not touches_by_points:
         for i in range(count):
-            c = contact.near[row + i]
-            if is_deep or contact.collider_kind[c] == ShapeKind.PLANE:
-                _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
-        if is_deep:
-            for p in range(particles[0], particles[1]):
-                if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
-                    contact.particle_clearance[p] = UNSEEN
+            if contact.collider_kind[contact.near[row + i]] != ShapeKind.PLANE:
+                _measure_clearance(state, contact.near[row + i], particles[0], particles[1], 0, since, left)
+        for p in range(particles[0], particles[1]):
+            if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
+                contact.particle_clearance[p] = UNSEEN
     for k in range(outer[0], outer[1]):
         contact.particle_clearance[state.touching.outer_particle[k]] = reach
     for i in range(count):
-        _measure_clearance(state, contact.near[row + i], outer[0], outer[1], 1, since, left)
+        c = contact.near[row + i]
+        if contact.collider_kind[c] == ShapeKind.PLANE and not touches_by_points:
+            _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
+        else:
+            _measure_clearance(state, c, outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
@@ -151,16 +153,17 @@ def forget_contacts(state: ti.template(), body: ti.i32):
 
 
 @ti.func
-def collided(state: ti.template(), body, p, start, way_velocity, h, since):
-    """Position and velocity of a particle after a substep among colliders.
+def collide_particle(state: ti.template(), body, p, h, since):
+    """Let a particle that its velocity has moved in a substep collide on that way.
 
+    One that touches nothing stays where it is: the result does not depend on what else is looked at.
     Args:
-        start: where it is [m].
-        way_velocity: with which it would go on [m/s].
         h: substep [s].
-        since: time since the start of the fixed step [s], to which the colliders' poses belong.
+        since: time from the start of the fixed step to that of the substep [s].
     """
-    x, v, way = start, way_velocity, h * way_velocity
+    v = state.particle_velocity[p]
+    way = h * v
+    x = state.particle_position[p] - way
     row = body * state.contact.capacity.colliders
     left = ti.cast(1.0, ti.f32)  # part of the substep still to go
     touches, is_open = 0, 1
@@ -216,4 +219,6 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
                 if state.particle_contact[p] == 0:
                     state.particle_contact[p] = c + 1
             v = v_out
-    return x + way, v
+    if touches > 0:
+        state.particle_position[p] = x + way
+        state.particle_velocity[p] = v

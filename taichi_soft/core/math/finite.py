@@ -17,9 +17,8 @@ def is_finite(v):
 
 @ti.func
 def is_within(v, limit):
-    """True (1) where every component of a vec3 is finite and nearer to zero than `limit`."""
-    good = is_finite(v)
+    """Whether every component of a vec3 is nearer to zero than `limit` (1), which NaN is not."""
+    good = 1
     for i in ti.static(range(3)):
-        if not (ti.abs(v[i]) < limit):
-            good = 0
+        good = good & int(ti.abs(v[i]) < limit)
     return good

@@ -15,6 +15,7 @@ from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
@@ -137,12 +138,13 @@ def brake_island(state: ti.template(), island, is_braked):
 @ti.func
 def body_is_sound(state: ti.template(), body):
     """Whether all of a body can still be computed with (1)."""
-    particles = state.body_particles[body]
-    sound, p = 1, particles[0]
-    while p < particles[1]:
-        sound = sound & particle_is_valid(state, p)
-        p = row_behind(p)
-    return sound
+    particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            is_broken = int(first + lane < particles[1]) & (1 - particle_is_valid(state, first + lane))
+            broken[lane] = broken[lane] | is_broken
+    return 1 - broken.max()
 
 
 @ti.func

@@ -1,6 +1,7 @@
 """Drift among colliders: new positions from velocities, and what colliders in the way make of both."""
 
-from taichi_soft.contact.kernels.collide import collided, find_near_colliders
+from taichi_soft.bodies.kernels.particles import highest_speed
+from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
 from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
 from taichi_soft.contact.kernels.rebound import limit_rebounds
@@ -9,6 +10,14 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.sleep import note_motion
 from taichi_soft.solver.step_fields import Job
+
+
+@ti.func
+def look_for_colliders(state: ti.template(), body, speed, since, left):
+    """List the colliders that a body may meet at a speed [m/s] in what is left of the step, and a quarter
+    beyond."""
+    place_points(state, body)
+    find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
 
 
 @ti.func
@@ -44,15 +53,6 @@ def _move_block(state: ti.template(), first, count, h):
 
 
 @ti.func
-def _collide_particle(state: ti.template(), body, p, h, since):
-    """Let a particle that has moved by its velocity collide on that way."""
-    v = state.particle_velocity[p]
-    x, v_out = collided(state, body, p, state.particle_position[p] - h * v, v, h, since)
-    state.particle_position[p] = x
-    state.particle_velocity[p] = v_out
-
-
-@ti.func
 def _collide_body(state: ti.template(), body, h, since, gone):
     """Let the particles of a body that have moved by their velocities collide on that way.
 
@@ -69,7 +69,7 @@ def _collide_body(state: ti.template(), body, h, since, gone):
             p, end = first, ti.min(first + LANES, particles[1])
             while p < end:
                 if not (state.contact.particle_clearance[p] > gone) and state.particle_inv_mass[p] > 0.0:
-                    _collide_particle(state, body, p, h, since)
+                    collide_particle(state, body, p, h, since)
                 p = row_behind(p)
     limit_rebounds(state, body, since + h)
 
@@ -89,11 +89,7 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone
     if ti.static(state.capacity.contact.hull):
         is_noted = is_noted & int(not has_hull(state, body))  # whose way a step counts: `note_way_of_hulled`
     if is_noted == 1:
-        particles = state.body_particles[body]
-        speed2 = ti.cast(0.0, state.real)
-        for p in range(particles[0], particles[1]):
-            speed2 = ti.max(speed2, state.particle_velocity[p].norm_sqr())
-        note_motion(state, body, ti.sqrt(speed2))
+        note_motion(state, body, highest_speed(state, body))
 
 
 @ti.real_func
@@ -102,9 +98,7 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
     gone = state.contact.gone[body] + job.fastest * job.h
     is_new = int(not (state.contact.reach[body] >= gone))
     if is_new == 1:
-        # A quarter more than the rest of the step needs at this speed.
-        place_points(state, body)
-        find_near_colliders(state, body, 1.25 * job.fastest * job.left + 1e-3, job.since, job.left)
+        look_for_colliders(state, body, job.fastest, job.since, job.left)
         gone = job.fastest * job.h
     if ti.static(state.capacity.contact.hull):
         if state.contact.near_count[body] > 0:

@@ -8,6 +8,7 @@ threads.
 A long step is made in several calls, so that Ctrl-C can come between: each island goes on where it stopped.
 """
 
+from taichi_soft.bodies.kernels.particles import gravity_on, highest_speed
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.parting import find_overlaps, part_bodies
 from taichi_soft.core.math.rows import row_behind
@@ -22,7 +23,16 @@ from taichi_soft.solver.kernels.attempts import (
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
 from taichi_soft.solver.kernels.sleep import settle_island, wake_by_colliders, wake_island
-from taichi_soft.solver.kernels.substep import BEGIN, END, NONE, OUTDATED, do_phase, each_body, substep
+from taichi_soft.solver.kernels.substep import (
+    BEGIN,
+    END,
+    NONE,
+    OUTDATED,
+    do_phase,
+    each_body,
+    is_alone,
+    substep,
+)
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
@@ -53,7 +63,7 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         count, first = finer * least, run.s
         end = ti.min(first + left, count)
         if first == 0:
-            _begin_attempt(state, program, island, run)
+            _begin_attempt(state, program, island, substeps * h, run)
         is_last = int(run.attempt == last)
         _make_substeps(state, program, island, end, count, longest / finer, is_last, run)
         left -= run.s - first
@@ -84,8 +94,12 @@ def _begin(state: ti.template(), program: ti.template(), island):
 
 
 @ti.func
-def _begin_attempt(state: ti.template(), program: ti.template(), island, run: ti.template()):
-    if ti.static(program.has_soft_contact):
+def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
+    if is_alone(state, program, island) == 1:
+        body = state.contact.island_body[state.contact.island_first[island]]
+        # With what it falls in the step: near colliders are listed once.
+        run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
+    elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
 
 

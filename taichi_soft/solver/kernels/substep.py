@@ -34,7 +34,7 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted
+from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, look_for_colliders
 from taichi_soft.solver.kernels.implicit_euler import keeps_shape, slow_down
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_among_colliders, kick_time
@@ -162,7 +162,11 @@ def _drive_time(program: ti.template(), job):
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Returns: for how long bodies have drifted with their new velocities already [s]."""
     body = state.contact.island_body[state.contact.island_first[island]]
-    is_free = _is_alone(state, program, island) & can_drift_at_once(state, body, run.fastest * now.h)
+    is_free = is_alone(state, program, island)
+    if is_free == 1:
+        if not (state.contact.gone[body] + run.fastest * now.h <= state.contact.reach[body]):
+            look_for_colliders(state, body, run.fastest, now.since, now.left)
+        is_free = can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
     has_pairs = 0
     if ti.static(program.has_soft_contact):
@@ -186,7 +190,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 
 @ti.func
-def _is_alone(state: ti.template(), program: ti.template(), island):
+def is_alone(state: ti.template(), program: ti.template(), island):
     """Whether nothing but colliders can touch what is in an island (1); by implicit Euler, never."""
     body = state.contact.island_body[state.contact.island_first[island]]
     bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
