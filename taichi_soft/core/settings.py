@@ -27,11 +27,6 @@ class Settings:
     retries: int  # how often a step that fails is made again, twice as fine each time
     schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open
 
-    @property
-    def is_implicit(self) -> bool:
-        """Whether steps take linear solves."""
-        return self.integrator is Integrator.IMPLICIT_EULER
-
 
 @dataclass(frozen=True)
 class ContactSettings:

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.runtime import Device
-from taichi_soft.core.types import Integrator, Schedule
+from taichi_soft.core.types import Schedule
+from taichi_soft.solver.integrators import IntegratorModel
 from taichi_soft.solver.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
 from taichi_soft.solver.kernels.step import UNFINISHED, step_islands
 from taichi_soft.solver.program import StepProgram
@@ -21,9 +22,6 @@ STRETCH = 2_000_000
 """Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, several times as
 much where bodies touch, and up to 23 times where a step is made again. While a kernel runs, Python hears no
 Ctrl-C. A longer step takes a snapshot first: some 5 % of its time, and it is no step of a game."""
-
-IMPLICIT_WORK = 50
-"""A substep of implicit Euler over one of leapfrog, about: so many products with the matrix it takes."""
 
 ALL = 2**31 - 1
 """Substeps of one call of a kernel that makes the whole step."""
@@ -49,11 +47,10 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
     return Schedule.FLAT
 
 
-def most_substeps(scene: Scene, integrator: Integrator) -> int:
+def most_substeps(scene: Scene, integrator: IntegratorModel) -> int:
     """How many substeps a step of a world may have that one call of a kernel makes."""
-    work = IMPLICIT_WORK if integrator is Integrator.IMPLICIT_EULER else 1
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
-    return max(1, STRETCH // max(1, work * sum(sizes)))
+    return max(1, STRETCH // max(1, integrator.work * sum(sizes)))
 
 
 def make_launch(

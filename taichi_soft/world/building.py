@@ -24,11 +24,12 @@ from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.settings import Settings
-from taichi_soft.core.types import Integrator, Schedule
+from taichi_soft.core.types import Schedule
 from taichi_soft.events import EventLog, Observer
 from taichi_soft.fracture.cutting import warm_up
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
@@ -57,13 +58,8 @@ def build(context: WorldContext) -> Simulation:
         _add_floor(context)
     capacity = _capacity(context, settings, has_contact)
     program = _program(context, settings, device, has_contact)
-    if settings.integrator is Integrator.EXPLICIT_EULER:
-        warnings.warn(
-            "explicit_euler gains energy at every substep, however short, and explodes sooner or later: "
-            "it is here for comparison, leapfrog is for use",
-            UnstableStepWarning,
-            stacklevel=4,
-        )
+    if program.integrator.warning:
+        warnings.warn(program.integrator.warning, UnstableStepWarning, stacklevel=4)
     state = acquire(State, capacity, program)
     weakref.finalize(context, release, state)
     _fill(context, state, program)
@@ -87,7 +83,7 @@ def build(context: WorldContext) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
-        most_substeps(scene, settings.integrator),
+        most_substeps(scene, program.integrator),
         EventLog(Observer(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
@@ -128,7 +124,8 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     """The schedule of a world. Raises: OptionError for what the one asked for cannot do."""
     settings, contact = context.settings, context.contact
     asked = settings.schedule
-    if settings.integrator is Integrator.EXPLICIT_EULER:
+    integrator = INTEGRATORS[settings.integrator]
+    if integrator.only_flat:
         if asked is Schedule.PER_BODY:
             raise OptionError("integrator 'explicit_euler' runs by schedule 'flat' only: it has no colliders")
         asked = Schedule.FLAT
@@ -140,7 +137,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
         "colliders": len(context.colliders.handles) + contact.collider_room > 0,
         "soft contact": contact.soft,
         "sleep": contact.sleep_speed > 0.0,
-        "implicit Euler": settings.is_implicit,
+        "implicit Euler": integrator.takes_solves,
     }.items():
         if is_asked and asked is Schedule.FLAT:
             raise OptionError(
@@ -148,7 +145,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
             )
         if is_asked:
             asked = Schedule.PER_BODY
-    if settings.is_implicit and _has_hulls(context):
+    if not integrator.has_hulls and _has_hulls(context):
         raise OptionError(
             "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
             "without hull"
@@ -165,7 +162,7 @@ def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> C
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,
-        implicit=settings.is_implicit,
+        implicit=INTEGRATORS[settings.integrator].takes_solves,
         contact=contact,
         plastic=_is_plastic(context),
     )
@@ -174,7 +171,7 @@ def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> C
 def _program(context: WorldContext, settings: Settings, device: Device, has_contact: bool) -> StepProgram:
     return StepProgram(
         tuple(dict.fromkeys(asset.description.model for asset in context.slots.kinds)),
-        settings.integrator,
+        INTEGRATORS[settings.integrator],
         settings.floor is not None and not has_contact,
         has_contact,
         context.contact.soft,

@@ -16,7 +16,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
-from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
+from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
@@ -24,6 +24,7 @@ from taichi_soft.core.types import Integrator, IntegratorName, Schedule, Schedul
 from taichi_soft.persistence.recorder import Recorder
 from taichi_soft.persistence.snapshot import restore_snapshot, take_snapshot
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
@@ -118,8 +119,6 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
-        if settings.is_implicit and settings.schedule is Schedule.FLAT:
-            raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
         touching = ContactSettings(
@@ -133,7 +132,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         pools: Pools[SoftBody] = Pools()
         substeps = Substeps(
             pools,
-            is_implicit=settings.is_implicit,
+            has_stable_step=INTEGRATORS[settings.integrator].has_stable_step,
             soft_contact=touching.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )

@@ -383,7 +383,7 @@ BY_SOLVES = {"integrator": "implicit_euler", "collider_room": 1}
 
 def test_a_world_without_joints_says_what_to_do():
     for options, advice in (
-        ({"schedule": "flat"}, "'flat' has no joints: .*'per_body'"),
+        ({"schedule": "flat"}, r"'flat' has no joints: .*'per_body'"),
         (BY_SOLVES, "no joints: .*'leapfrog'"),
     ):
         world = World(floor=None, **options)

@@ -22,7 +22,6 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti
-from taichi_soft.core.types import Integrator
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
 """Motors of one world at a time, and particles that all of them drive together."""
@@ -107,7 +106,7 @@ def _pattern(state: ti.template(), motor, p, point, axis):
 
 
 @ti.func
-def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
+def _run_motor(state: ti.template(), motor, h, kick):
     """Returns: the impulse that it gave [N m s] or [N s]."""
     gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
     point, axis = _axis_now(state, motor)
@@ -119,10 +118,7 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
         if inv_mass > 0.0:
             d = _pattern(state, motor, p, point, axis)
             velocity = state.particle_velocity[p]
-            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):  # which finds its forces later
-                velocity += h * gravity
-            else:
-                velocity += kick * (inv_mass * state.particle_force[p].xyz + gravity)
+            velocity += ti.select(kick > 0.0, kick, h) * (inv_mass * state.particle_force[p].xyz + gravity)
             inertia += state.particle_mass[p] * d.dot(d)
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
@@ -147,12 +143,11 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
 
 
 @ti.real_func
-def run_motors(
-    state: ti.template(), program: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32
-):
+def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32):
     """Let the motors of one body act for a substep of `h` [s], in a world with contact.
 
-    They look at the velocities after a kick of the forces [s]: so they feel what holds against them.
+    They look at the velocities after a kick of the forces [s]: so they feel what holds against them. Without
+    one, forces are found later (0), and gravity alone is felt.
 
     Args:
         is_first: 1 in the first substep of a step.
@@ -162,7 +157,7 @@ def run_motors(
             if state.motors.motor[number].body == body + 1:
                 motor = state.motors.motor[number]
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
-                state.motors.impulse[number] = before + _run_motor(state, program, motor, h, kick)
+                state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
                 if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
                     state.contact.calm[body] = 0.0  # however slowly it begins to move
 

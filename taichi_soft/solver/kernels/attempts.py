@@ -18,9 +18,7 @@ from taichi_soft.contact.kernels.touches import forget_touches
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
 
 
@@ -30,8 +28,8 @@ def attempts_of(state: ti.template(), program: ti.template()):
     and braked, or the same number."""
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        halvings = last = ti.static(MOST_PIECES.bit_length() - 1)
+    if ti.static(program.integrator.halvings > 0):
+        halvings = last = program.integrator.halvings
     return halvings, last
 
 
@@ -40,7 +38,7 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
     """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or as many as the shapes of an
     island's bodies ask for."""
     least = ti.cast(substeps, ti.f32)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+    if ti.static(program.integrator.has_stable_step):
         if state.retries[None] > 0:
             first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
             row = first

@@ -9,8 +9,6 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
-from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
 from taichi_soft.solver.step_fields import Job
 
 JOLT = 1.0
@@ -25,16 +23,6 @@ by what it presses against."""
 EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
 taken to be exploding: others pass through it until it is frozen or calm."""
-
-
-@ti.func
-def kick_time(state: ti.template(), program: ti.template(), body, h, s):
-    """How long forces act before the drift of substep `s` of `h` [s]: by leapfrog, the first ends the lag."""
-    kick = ti.cast(h, state.real)
-    if ti.static(program.integrator != Integrator.LAZY_LEAPFROG):  # whose velocities do not lag
-        if s == 0:
-            kick = 0.5 * (state.body_velocity_lag[body] + h)
-    return kick
 
 
 @ti.func
@@ -114,7 +102,7 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
         # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
         acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
-        x, v = program.advance(
+        x, v = program.integrator.advance(
             state.particle_position[p], state.particle_velocity[p], acceleration.xyz, job.drift_time, kick
         )
         for i in ti.static(range(3)):
@@ -134,11 +122,12 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
 
 @ti.func
-def _kick_body(state: ti.template(), program: ti.template(), body, kick, job):
-    """New velocities from the forces, which are cleared, and positions after the job's `drift_time`.
+def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
+    """New velocities after `kick` [s] of the forces, which are cleared, and positions after the job's
+    `drift_time`.
 
     Returns: the highest speed [m/s]; the highest and the mean with which it may strike another, if it has
-    pairs; and the largest change, which counts less of what something held.
+    pairs; and whether forces changed no velocity by too much at once (1).
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -149,8 +138,8 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, job):
         v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, job)
         speed2, striking2 = ti.max(speed2, v2), ti.max(striking2, b2)
         acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
-    change = kick * ti.sqrt(acceleration2.max())
-    return ti.sqrt(speed2.max()), ti.sqrt(striking2.max()), ti.sqrt(total2.sum() / count), change
+    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= JOLT * state.body_sound_speed[body])
+    return ti.sqrt(speed2.max()), ti.sqrt(striking2.max()), ti.sqrt(total2.sum() / count), is_stable
 
 
 @ti.func
@@ -172,25 +161,15 @@ def _note_speeds(
 
 
 @ti.real_func
-def kick_among_colliders(
-    state: ti.template(), program: ti.template(), body: ti.i32, job: Job, kick: ti.f32
-) -> ti.i32:
-    """New velocities of one body after `kick` [s] of its forces, and positions after the job's `drift_time`.
+def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
+    """New velocities of one body that has felt its forces for so long [s].
 
     Notes the highest speed [m/s], the highest and the mean beside the job's `velocity`, and what it returns.
     Returns: whether forces changed no velocity by too much at once (1).
     """
-    is_stable = 1
-    speed, beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
-    mean_beside = ti.cast(0.0, state.real)
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
-        mean_beside = beside
-    else:
-        speed, beside, mean_beside, change = _kick_body(state, program, body, kick, job)
-        is_stable = int(change <= JOLT * state.body_sound_speed[body])
-        if ti.static(state.capacity.contact.hull):
-            of_points, beside_of_points = note_points(state, body, job.velocity)
-            speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
+    speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
+    if ti.static(state.capacity.contact.hull):
+        of_points, beside_of_points = note_points(state, body, job.velocity)
+        speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
     _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
     return is_stable

@@ -3,7 +3,7 @@
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces
 from taichi_soft.elements.kernels.elastic import accumulate_elastic_forces
-from taichi_soft.solver.kernels.kick import kick_among_colliders
+from taichi_soft.solver.kernels.kick import kick_body
 from taichi_soft.solver.step_fields import Job
 
 PHASES = ("elastic", "damping", "motion")
@@ -31,4 +31,4 @@ def repeat_phase(
                     if state.body_model[body] == m:
                         accumulate_edge_forces(state, model, body)
             if ti.static(phase == "motion"):
-                kick_among_colliders(state, program, body, Job(h=h, drift_time=h), h)
+                kick_body(state, program, body, Job(h=h, drift_time=h), h)

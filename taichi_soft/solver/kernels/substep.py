@@ -24,20 +24,16 @@ from taichi_soft.contact.kernels.broad_phase import (
 from taichi_soft.contact.kernels.contact_solver import solve_island
 from taichi_soft.contact.kernels.narrow_phase import find_gaps
 from taichi_soft.contact.kernels.touches import add_touches
-from taichi_soft.control.kernels.drives import add_reactions, blow_on, push_particles
-from taichi_soft.control.kernels.grabs import pull_grabs
+from taichi_soft.control.kernels.drives import blow_on, push_particles
 from taichi_soft.control.kernels.joints import solve_joints
 from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
-from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
 from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, look_for_colliders
-from taichi_soft.solver.kernels.implicit_euler import keeps_shape, slow_down
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
-from taichi_soft.solver.kernels.kick import kick_among_colliders, kick_time
+from taichi_soft.solver.kernels.kick import kick_body
 from taichi_soft.solver.kernels.vibration import damp_body, to_positions
 from taichi_soft.solver.step_fields import Job
 
@@ -70,23 +66,18 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
 
 
 @ti.func
-def _advance_body(state: ti.template(), program: ti.template(), body, now):
-    """The phases of one body by itself: wind, drives and forces, damping, kick. `now`: a `Job`."""
-    kick = kick_time(state, program, body, now.h, now.s)
-    felt = _felt_time(program, kick, now)
-    blow_on(state, body, now.h)
-    push_particles(state, body, _drive_time(program, now))
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):  # which has these in its equations
-        accumulate_forces(state, program, body)
-        add_reactions(state, body, felt)
-        pull_grabs(state, body, now.h, felt)
-    run_motors(state, program, body, now.h, felt, int(now.s == 0))
-    if now.s == 0:
+def _advance_body(state: ti.template(), program: ti.template(), body, job):
+    """The phases of one body by itself: wind, drives and forces, damping, kick."""
+    felt = program.integrator.felt_time(state.body_velocity_lag[body], job.h, job.s)
+    blow_on(state, body, job.h)
+    push_particles(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
+    program.integrator.hold(state, program, body, job.h, felt)
+    run_motors(state, body, job.h, felt, int(job.s == 0))
+    if job.s == 0:
         update_rest_state(state, body)
-    damp_body(state, program, body, felt, now.h, now.s, now.substeps)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        calm_body(state, program, body, to_positions(program, felt, now.h), now.h, now.s, now.substeps)
-    kick_among_colliders(state, program, body, now, kick)
+    damp_body(state, program, body, felt, job.h, job.s, job.substeps)
+    calm_body(state, program, body, to_positions(program, felt, job.h), job.h, job.s, job.substeps)
+    kick_body(state, program, body, job, felt)
 
 
 @ti.func
@@ -142,23 +133,6 @@ def each_body(state: ti.template(), program: ti.template(), island, job):
 
 
 @ti.func
-def _felt_time(program: ti.template(), kick, job):
-    """How long pins and grabs feel that [s]."""
-    felt = ti.cast(0.0, ti.f32)
-    if ti.static(program.integrator == Integrator.LEAPFROG):
-        felt = kick
-    elif ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        felt = job.h
-    return felt
-
-
-@ti.func
-def _drive_time(program: ti.template(), job):
-    """For how long drives act before a substep [s]: by leapfrog the last half comes after the last one."""
-    return 0.5 * job.h if ti.static(program.integrator == Integrator.LEAPFROG) and job.s == 0 else job.h
-
-
-@ti.func
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Returns: for how long bodies have drifted with their new velocities already [s]."""
     body = state.contact.island_body[state.contact.island_first[island]]
@@ -191,11 +165,11 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
-    """Whether nothing but colliders can touch what is in an island (1); by implicit Euler, never."""
+    """Whether nothing but colliders can touch what is in an island, and its kick can move it (1)."""
     body = state.contact.island_body[state.contact.island_first[island]]
     bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
-    is_explicit = ti.static(program.integrator != Integrator.IMPLICIT_EULER)
-    alone = int(is_explicit) & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
+    drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
+    alone = drifts_at_once & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
     if ti.static(program.has_soft_contact):
         alone = alone & (1 - has_contact_pairs(state, island))
     return alone
@@ -236,7 +210,7 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
 def _solve_joints(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Returns: the highest speed of what joints hold [m/s], and the highest beside what the island shares."""
     speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+    if ti.static(program.integrator.has_joints):
         found = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
         speed, beside = found.x, found.y
     return speed, beside
@@ -279,14 +253,8 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 
 @ti.func
 def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """By implicit Euler, which takes forces as linear: whether no body changed its shape by too much.
-
-    What changes too much in the last attempt loses speed: it would be thrown apart.
-    """
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-            body = state.contact.island_body[i]
-            if state.body_status[body] == ACTIVE:
-                if now.is_last == 1:
-                    slow_down(state, body, now.h)
-                run.is_stable = run.is_stable & int(keeps_shape(state, body))
+    """Whether the integrator takes the new shape of every body."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            run.is_stable = run.is_stable & program.integrator.check(state, body, now.h, now.is_last)
