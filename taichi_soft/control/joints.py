@@ -118,8 +118,7 @@ class Joints(Numbered[Joint]):
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Join two bodies, where they can be."""
         context = self.context
-        program = context.built.program
-        if other is None or not (program.integrator.has_joints and program.has_contact):
+        if other is None or not context.built.program.has_contact:
             return
         with contextlib.suppress(StateError):  # all are in use already
             joint = self.join(body, other, [0], [0])
@@ -195,8 +194,6 @@ class Joints(Numbered[Joint]):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
         require_alive(other)
         vertices, places = _find_places(body, other, particles, onto)
-        if not context.built.program.integrator.has_joints:
-            raise StateError("implicit_euler has no joints: make the world with integrator='leapfrog'")
         if not context.built.program.has_contact:
             raise StateError("schedule 'flat' has no joints: make the world with schedule='per_body'")
         free = self.free_number()

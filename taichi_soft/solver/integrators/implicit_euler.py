@@ -47,7 +47,6 @@ IMPLICIT_EULER = IntegratorModel(
     predict=predict,
     check=check,
     has_stable_step=False,
-    has_joints=False,
     has_hulls=False,  # it holds vertices
     drifts_at_once=False,
     halvings=MOST_PIECES.bit_length() - 1,

@@ -34,7 +34,6 @@ class IntegratorModel:
     lag: float = 0.0  # of velocities behind positions, over the substep
     is_lag_told: bool = False  # those that are read are brought to the time of the positions
     has_stable_step: bool = True  # longer substeps explode
-    has_joints: bool = True
     has_hulls: bool = True
     drifts_at_once: bool = True  # a body alone, with its new velocities
     halvings: int = 0  # of substeps that fail; 0: as the world says by `retries`

@@ -59,9 +59,9 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
     drift_time = _kick_bodies(state, program, island, now, run)
     speed, impact_speed = _compare_speeds(state, island, now, run)
     if _has_drifted(state, island, now, run, drift_time) == 0:
-        joint_speed, joint_impact = _solve_joints(state, program, island, now, run)
-        _solve_contact(state, program, island, now, run, ti.max(impact_speed, joint_impact))
-        _drift_bodies(state, program, island, now, run, ti.max(speed, joint_speed))
+        of_joints = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
+        _solve_contact(state, program, island, now, run, ti.max(impact_speed, of_joints.y))
+        _drift_bodies(state, program, island, now, run, ti.max(speed, of_joints.x))
     _check_shapes(state, program, island, now, run)
 
 
@@ -204,16 +204,6 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
         has_moved = has_drifted(state, body, run.fastest, now.h, now.since)
     return has_moved
-
-
-@ti.func
-def _solve_joints(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Returns: the highest speed of what joints hold [m/s], and the highest beside what the island shares."""
-    speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
-    if ti.static(program.integrator.has_joints):
-        found = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
-        speed, beside = found.x, found.y
-    return speed, beside
 
 
 @ti.func
