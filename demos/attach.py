@@ -1,7 +1,7 @@
-"""A soft bar hangs from a swinging plate: the engine moves the plate and is told what pulls at it.
+"""A soft bar hangs from a swinging plate: the game moves the plate and reads the load on it.
 
-The bar is longest at the lowest point of each swing, where it pulls most at the plate. At both ends it pulls
-with less than its weight.
+The bar is longest at the lowest point of each swing, where the load is largest. At both ends of the swing
+the load is less than its weight.
 """
 
 import numpy as np
@@ -18,24 +18,24 @@ from taichi_soft.render.props import Prop
 MATERIAL = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 SIZE = (0.5, 0.5, 1.4)  # of the bar [m]
 PIVOT = np.array([0.0, 0.0, 3.8])  # [m]
-ROD = 1.8  # from there to the plate [m]
-LENGTH = ROD + SIZE[2] / 2  # from there to the middle of the bar [m]
+ROD = 1.8  # from the pivot to the plate [m]
+LENGTH = ROD + SIZE[2] / 2  # from the pivot to the centre of the bar [m]
 WIDEST = np.radians(50.0)
 STRESS = ColorScale("von Mises stress", 0.0, 3.0e4, "Pa")
 STEP = FixedStep(dt=1 / 50)
 
 
 class Swing:
-    """The engine's pendulum: carries the plate through every step, and keeps what it felt along the rod."""
+    """The game's pendulum: moves the plate in every step, and records the load along the rod."""
 
     def __init__(self, frame: Frame, hold: Attachment) -> None:
-        """At the end of a swing."""
+        """Start at the end of a swing."""
         self.frame, self.hold = frame, hold
         self.angle, self.speed = WIDEST, 0.0  # [rad], [rad/s]
         self.loads: list[float] = []  # of each step [N]
 
     def __call__(self, world: World) -> None:
-        """Before a step."""
+        """Move the plate before a step."""
         if world.step_count:
             self.loads.append(self.load())
         for _ in range(100):
@@ -45,17 +45,17 @@ class Swing:
         self.frame.move_to(PIVOT - ROD * axes[:, 2], axes)
 
     def load(self) -> float:
-        """What pulled at the plate in the last step, along the rod [N]."""
+        """Load on the plate in the last step, along the rod [N]."""
         return float(-self.hold.force @ self.frame.rotation[:, 2])
 
     def caption(self) -> str:
-        """For the picture."""
+        """Text for each frame."""
         weight = float(self.hold.body.masses.sum()) * GRAVITY_EARTH
         return f"load {self.load() / 1e3:.1f} kN, weight {weight / 1e3:.1f} kN"
 
 
 def stage() -> Stage:
-    """The bar at the end of a swing, not stretched yet."""
+    """The bar at the end of a swing, unstretched."""
     mesh = box(SIZE, (4, 4, 11))
     start = _turn(WIDEST)
     world = World()
@@ -77,7 +77,7 @@ def stage() -> Stage:
 
 
 def _turn(angle: float) -> NDArray[np.float64]:
-    """About y, so that what hangs down swings towards -x."""
+    """Rotation about y that swings the bar towards -x."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
@@ -96,7 +96,7 @@ def proof(stage: Stage) -> float:
 
 
 def period() -> float:
-    """Of the swing there and back [s]: Legendre's arithmetic-geometric mean."""
+    """Period of the swing [s], by Legendre's arithmetic-geometric mean."""
     a, b = 1.0, float(np.cos(WIDEST / 2))
     while a - b > 1e-12:
         a, b = (a + b) / 2, float(np.sqrt(a * b))

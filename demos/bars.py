@@ -1,6 +1,6 @@
-"""A complex object of bars falls on its corner, bends and rings on after it lifts off (fig. 6.2).
+"""A complex object of bars falls on its corner, bends, and keeps vibrating after it lifts off (fig. 6.2).
 
-The arms go on bending to and fro long after the blow, and where the bars cross they turn red each time.
+The arms vibrate long after the impact, and the crossings of the bars turn red each time.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Volume over the volume at rest."""
+    """Volume over the rest volume."""
     body = stage.actors[0].body
     return body.volume() / body.mesh.volume
 

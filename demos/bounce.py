@@ -1,6 +1,6 @@
 """The thesis's sphere: 4 m^3 of E = 1 MPa fall from 7 m, at 700 steps per second (section 6.6).
 
-It lands with a flat foot, and its shape goes on swinging between flat and long while it flies up again.
+It flattens at the impact, and its shape oscillates between flat and long while it flies up again.
 """
 
 from engine_adapter import FixedStep
@@ -14,14 +14,14 @@ HEIGHT = 7.0  # of the lowest point [m]
 
 
 def stage() -> Stage:
-    """The sphere, about to fall."""
+    """The sphere before its fall."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     body = world.add_body(
         mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]), law="virial"
     )
     world.build()
-    # From close to where it lands: it fills a quarter of the picture there, and still fits in at the top.
+    # Close to the landing: there it fills a quarter of the image, and at the top it still fits in.
     camera = Camera(eye=(1.1, -5.3, 1.2), target=(0.0, 0.0, 3.4), fov_degrees=82.0)
     step = FixedStep(dt=1 / 50, substeps=14)
     title = f"E = 1 MPa, falls {HEIGHT:g} m"

@@ -1,6 +1,6 @@
 """Twenty soft bodies are dropped into a bowl, a collider made of triangles, and fall asleep in a heap.
 
-Bodies slide down the wall and press each other out of shape, but none gets into another.
+Bodies slide down the wall and deform each other, but do not penetrate each other.
 """
 
 import numpy as np
@@ -15,10 +15,10 @@ from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
-RADIUS, WALL = 2.0, 0.2  # of the inside of the bowl, and how thick it is [m]
+RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
 SLEEP_SPEED = 0.02  # [m/s]
-DRAG = 1.0  # [1/s]: nothing else stops a ball that rolls to and fro between others
+DRAG = 1.0  # damping rate [1/s]: nothing else stops a ball that rolls between others
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -34,7 +34,7 @@ def stage() -> Stage:
     world.add_collider(MeshShape(_bowl()), position=(0, 0, RADIUS + WALL + 0.01), friction=0.4)
     actors = []
     for i in range(BODIES):
-        layer, number = divmod(i, 7)  # one in the middle, six round it
+        layer, number = divmod(i, 7)  # one in the centre, six around it
         angle, reach = np.pi / 3 * number + 0.5 * layer, 0.95 if number else 0.0
         place = (reach * np.cos(angle), reach * np.sin(angle), 1.9 + 0.9 * layer)
         mesh = shapes[(i + layer) % 4]
@@ -49,7 +49,7 @@ def stage() -> Stage:
 
 
 def _bowl() -> trimesh.Trimesh:
-    """Half a hollow ball with a round rim, open at the top, about the middle of that."""
+    """Lower half of a hollow ball with a round rim, centred at the opening."""
     angles = np.linspace(0, np.pi / 2, 25)
     outer = (RADIUS + WALL) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = RADIUS * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
@@ -59,7 +59,7 @@ def _bowl() -> trimesh.Trimesh:
 
 
 def proof(stage: Stage) -> float:
-    """How deep the deepest vertex lies in another body [m]; 0 where none lies in another."""
+    """Depth of the deepest vertex inside another body [m]; 0 if there is none."""
     depths = [
         near.distance
         for body in stage.world.bodies

@@ -12,33 +12,41 @@ from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-PLANKS, PLANK, GAP = 13, 0.3, 0.12  # how many, how long along the bridge, and how far apart [m]
-WIDTH, ROPE, THICKNESS = 1.7, 0.12, 0.12  # of the bridge, of the ropes at its sides, of both [m]
-EDGE = 0.16  # by which the ropes rise outwards, so that nothing rolls off [m]
-HEIGHT = 1.5  # of the bridge when it hangs straight [m]
+PLANKS, PLANK, GAP = (
+    13,
+    0.3,
+    0.12,
+)  # number of planks, their length along the bridge, and the gap between them [m]
+WIDTH, ROPE, THICKNESS = (
+    1.7,
+    0.12,
+    0.12,
+)  # width of the bridge, width of its side ropes, thickness of both [m]
+EDGE = 0.16  # rise of the ropes towards the outside, so that nothing rolls off [m]
+HEIGHT = 1.5  # height of the straight bridge [m]
 WOOD, HEMP = 1.5e6, 1.0e6  # Young's moduli of planks and ropes [Pa]
 SOFT = Material(young=3.0e4, poisson=0.3, density=400.0, damping_ratio=0.1)
-DRAG = 1.0  # [1/s]: what swings comes to rest
+DRAG = 1.0  # damping rate of swinging [1/s]
 LENGTH = PLANKS * PLANK + (PLANKS - 1) * GAP
 STEP = FixedStep(dt=1 / 50)
 
 
 class Carriers:
-    """What both ends of the bridge are held with, step by step."""
+    """Records the load on both ends of the bridge in each step."""
 
     def __init__(self, holds: list[Attachment]) -> None:
-        """Before the first step."""
+        """Start before the first step."""
         self.holds = holds
         self.loads: list[float] = []  # [N], downwards
 
     def __call__(self, world: World) -> None:
-        """Before a step, of what the last one did."""
+        """Record the load of the last step."""
         if world.step_count:
             self.loads.append(-sum(float(hold.force[2]) for hold in self.holds))
 
 
 def stage() -> Stage:
-    """The bridge hangs straight between two pillars, and bodies are above it."""
+    """The straight bridge between two pillars, with bodies above it."""
     mesh = _bridge()
     columns = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] % (PLANK + GAP)
     material = Material(np.where(columns < PLANK, WOOD, HEMP), 0.2, 300.0, damping_ratio=0.1)
@@ -86,7 +94,7 @@ def _bridge() -> TetMesh:
 
 
 def proof(stage: Stage) -> float:
-    """What the ends carried in the last two seconds, over the weight of the bridge and all on it."""
+    """Mean load on the ends in the last 2 s, over the weight of the bridge and all bodies on it."""
     carriers = stage.act
     assert isinstance(carriers, Carriers)
     mass = sum(float(body.masses.sum()) for body in stage.world.bodies)

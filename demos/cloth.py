@@ -1,6 +1,6 @@
-"""A cloth of springs pinned at two corners swings down, one implicit step a frame.
+"""A cloth of springs pinned at two corners swings down, with one implicit step per frame.
 
-The free edge stays behind, and whips round whenever the cloth swings back.
+The free edge lags behind, and whips around whenever the cloth swings back.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ SIDE, MASS = 2.0, 0.5  # [m], [kg]
 
 
 def stage() -> Stage:
-    """The cloth lies flat in the air at first."""
+    """The cloth, initially horizontal."""
     mesh = cloth((SIDE, SIDE), CELLS, MASS)
     stiffness = cloth_constants(mesh, CELLS, tensile=400.0, shear=150.0, bend=3.0)
     world = World(integrator="implicit_euler")
@@ -38,7 +38,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Longest stretch of a thread, over its length at rest."""
+    """Largest length of a thread over its rest length."""
     (actor,) = stage.actors
     mesh = actor.body.mesh
     threads = mesh.edge_lengths < 1.01 * SIDE / CELLS[0]

@@ -1,7 +1,7 @@
-"""The same sphere under every law, with what a step of each costs.
+"""The same sphere under every law, with the cost of a step.
 
-On tetrahedra the laws agree while strains are small. Along edges they know Poisson's ratio at most by its
-effect on volume, and CMPM and its variants take strain by the direction of each edge (thesis section 4.3).
+Laws on tetrahedra agree for small strains. Laws along edges include Poisson's ratio at most through its
+effect on volume, and CMPM and its variants read strain along each edge (thesis section 4.3).
 """
 
 from functools import partial
@@ -21,11 +21,11 @@ STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 3
 COLORS = (*PALETTE, (0.93, 0.92, 0.88), (0.58, 0.16, 0.24), (0.70, 0.85, 0.30))
 NO_BODY = (0.09, 0.10, 0.13)  # colour of a line of the legend without a sphere
-PITCH, DEPTH = 2.8, 3.2  # between spheres, across and away from the eye [m]
+PITCH, DEPTH = 2.8, 3.2  # distance between spheres, across and along the view [m]
 
 
 def stage() -> Stage:
-    """Spheres of 540 tetrahedra 4 m above the floor, one for each law."""
+    """Spheres of 540 tetrahedra 4 m above the floor, one per law."""
     mesh = sphere(1.0, 3)
     world = World()
     actors = []
@@ -60,7 +60,7 @@ def _cost(mesh: TetMesh, law: str) -> float:
 
 
 def proof(stage: Stage) -> float:
-    """How many spheres are whole: sound, and no tetrahedron inside out."""
+    """Number of valid spheres: not frozen, and without inverted tetrahedra."""
     return float(sum(not actor.body.is_frozen and actor.body.flipped_count() == 0 for actor in stage.actors))
 
 

@@ -1,6 +1,6 @@
-"""A bar hangs from its upper end and is cut in two: the lower part falls, and lies where it came down.
+"""A bar hangs from its upper end and is cut in two: the lower part falls and comes to rest on the floor.
 
-The upper part springs up once the weight below it is gone. Both parts are closed where the blade went.
+The upper part springs up without the weight below it. Both parts have closed surfaces at the cut.
 """
 
 import numpy as np
@@ -17,33 +17,33 @@ from taichi_soft.render.stage import Paint
 
 MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
-HEIGHT = 2.05  # of its middle [m]
+HEIGHT = 2.05  # height of its centre [m]
 SEAM, SLOPE = (
     -0.3,
     0.1,
-)  # height of the layer's edge over the middle that the blade follows [m], and its slope
-CUT = np.array([0.0, 0.0, 1.53])  # where the blade crosses the middle of the stretched bar [m]
-ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # its way
-ASIDE = np.array([0.0, 1.0, 0.0])  # its edge
-WAY, WIDTH = 2.6, 0.3  # how far it goes, and from its edge to its back [m]
-BEGIN, PASSING = 0.9, 0.5  # when it sets out, and how long it takes [s]
+)  # height above the centre of the layer's edge that the blade follows [m], and its slope
+CUT = np.array([0.0, 0.0, 1.53])  # point where the blade crosses the axis of the stretched bar [m]
+ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # direction of the blade's motion
+ASIDE = np.array([0.0, 1.0, 0.0])  # direction of the blade's edge
+WAY, WIDTH = 2.6, 0.3  # distance that it travels, and width from its edge to its back [m]
+BEGIN, PASSING = 0.9, 0.5  # start time, and duration of the pass [s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 
 class Knife:
-    """Goes through the bar; when half of it is out on the other side the bar is cut."""
+    """Moves through the bar; when half of it is on the other side, the bar is cut."""
 
     def __init__(self, blade: Frame, stage: Stage) -> None:
-        """Beside the bar, which is whole."""
+        """Start next to the uncut bar."""
         self.blade, self.stage = blade, stage
         self.bar = stage.actors[0].body
         self.start = blade.position.astype(np.float64)
         self.fallen: Body | None = None
-        self.parted = 0.0  # when the bar was cut [s]
-        self.whole = self.below = 0.0  # mass of the bar then, and of what lay below the blade [kg]
+        self.parted = 0.0  # time of the cut [s]
+        self.whole = self.below = 0.0  # mass of the bar at that time, and of the part below the blade [kg]
 
     def __call__(self, world: World) -> None:
-        """Before a step."""
+        """Move the blade before a step."""
         way = min(max((world.time - BEGIN) / PASSING, 0.0), 1.0) * WAY
         self.blade.move_to(self.start + way * ALONG)
         is_through = way > WAY / 2 + SIZE[0] / 2
@@ -56,13 +56,13 @@ class Knife:
             self.stage.actors.append(Actor(self.fallen, paint=_flesh(PALETTE[1])))
 
     def caption(self) -> str:
-        """For the picture."""
+        """Text for each frame."""
         pieces = [self.bar] if self.fallen is None else [self.bar, self.fallen]
         return " + ".join(f"{piece.masses.sum():.0f} kg" for piece in pieces)
 
 
 def stage() -> Stage:
-    """The bar at rest by its upper end, not stretched yet."""
+    """The bar held at its upper end, unstretched."""
     mesh = _leaning(box(SIZE, (8, 8, 20)))
     top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
     asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=600)
@@ -86,14 +86,14 @@ def stage() -> Stage:
 
 
 def _leaning(bar: TetMesh) -> TetMesh:
-    """With layers that lean as the blade does where it passes: it parts them and leaves smooth faces."""
+    """Shear the mesh so that its layers are parallel to the blade, which leaves smooth faces."""
     x, y, z = bar.vertices.T
     nearness = np.clip(1.0 - np.abs(z - SEAM) / 0.6, 0.0, 1.0)
     return TetMesh(np.stack([x, y, z + SLOPE * x * nearness], axis=1), bar.tets)
 
 
 def _flesh(color: Color) -> Paint:
-    """Paler where the blade went."""
+    """Paint the faces of the cut paler."""
 
     def paint(body: Body) -> NDArray[np.float32]:
         x, y, z = body.mesh.vertices.T
@@ -105,14 +105,14 @@ def _flesh(color: Color) -> Paint:
 
 
 def _mass_below(body: Body) -> float:
-    """Of what lies below the blade [kg]: of a tetrahedron across it as much as of its height."""
+    """Mass below the blade [kg]; a tetrahedron across it counts in proportion to its height below."""
     heights = np.sort((body.positions()[body.tets] - CUT) @ np.cross(ALONG, ASIDE), axis=1)
     share = np.clip(-heights[:, 0] / (heights[:, 3] - heights[:, 0]), 0.0, 1.0)
     return float(body.material.density * body.mesh.volumes @ share)
 
 
 def proof(stage: Stage) -> float:
-    """Mass of what fell over that of what lay below the blade."""
+    """Mass of the fallen part over the mass below the blade."""
     knife = stage.act
     assert isinstance(knife, Knife)
     assert knife.fallen is not None

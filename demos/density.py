@@ -1,6 +1,7 @@
-"""A block that grows denser to the right: its heavy side is pressed most, rises last and least (fig. 6.3).
+"""A block with increasing density to the right: its heavy side deforms most, and rises last and least (fig.
+6.3).
 
-The light side is in the air while the heavy one is still pressed flat, so the block turns as it rises.
+The light side is in the air while the heavy side is still compressed, so the block rotates as it rises.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
 
 
 def stage() -> Stage:
-    """The block, level, above the floor."""
+    """The horizontal block above the floor."""
     mesh = box((3.0, 1.5, 1.5), (8, 4, 4))
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 1.5) / 3.0
@@ -33,7 +34,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """How much higher the light end is than the heavy one [m]."""
+    """Height of the light end above the heavy one [m]."""
     body = stage.actors[0].body
     x, now = body.mesh.vertices[:, 0], body.positions()[:, 2]
     return float(now[x < x.min() + 0.1].mean() - now[x > x.max() - 0.1].mean())

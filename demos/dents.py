@@ -1,6 +1,6 @@
-"""A soft sphere hits the floor hard. Left the thesis's way with flips, right they are driven back.
+"""A soft sphere hits the floor hard. Left: flips are tolerated, as in the thesis. Right: flips recover.
 
-Flipped tetrahedra are at rest in their mirrored shape when tolerated: the dent stays (section 6.6).
+Tolerated inverted tetrahedra are at rest in their mirrored shape, so the dent stays (section 6.6).
 """
 
 import numpy as np
@@ -52,7 +52,7 @@ def _mark_flips(color: tuple[float, float, float]):  # type: ignore[no-untyped-d
 
 
 def proof(stage: Stage) -> float:
-    """Flipped tetrahedra of the tolerant sphere less those of the recovering one."""
+    """Number of inverted tetrahedra of the tolerant sphere minus that of the recovering one."""
     tolerant, recover = (actor.body.flipped_count() for actor in stage.actors)
     return float(tolerant - recover)
 

@@ -1,6 +1,6 @@
-"""A cloth falls over a ball that moves to and fro, and is carried along by friction.
+"""A cloth falls over a ball that moves back and forth, and friction carries it along.
 
-It hangs round the ball in folds, and its corners swing on when the ball turns back.
+It hangs in folds around the ball, and its corners keep swinging when the ball reverses.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 CELLS = (32, 32)
-SIDE, MASS, SKIN = 2.4, 0.6, 0.02  # of the cloth [m], [kg], [m]
-RADIUS, HEIGHT = 0.55, 1.15  # of the ball, and of its middle [m]
+SIDE, MASS, SKIN = 2.4, 0.6, 0.02  # side [m], mass [kg] and thickness [m] of the cloth
+RADIUS, HEIGHT = 0.55, 1.15  # radius of the ball, and height of its centre [m]
 REACH, PERIOD, BEGIN = (
     0.5,
     3.0,
     1.2,
-)  # how far it moves to each side [m], how long there and back, from when [s]
-FALL = 0.35  # from the cloth to the ball [m]
+)  # amplitude of its motion [m], period and start time [s]
+FALL = 0.35  # initial distance from the cloth to the ball [m]
 STEP = FixedStep(dt=1 / 60, substeps=2)
 
 
@@ -28,30 +28,30 @@ class Mover:
     """Moves the ball before every step."""
 
     def __init__(self, ball: Collider) -> None:
-        """In the middle."""
+        """Start in the centre."""
         self.ball = ball
 
     def __call__(self, world: World) -> None:
-        """To where it is at the end of the coming step."""
+        """Move the ball to its position at the end of the next step."""
         self.ball.move_to(_place(world.time + STEP.dt))
 
 
 def _place(time: float) -> NDArray[np.float64]:
-    """Of the middle of the ball [m]: it sets out slowly."""
+    """Position of the ball's centre [m], with a smooth start."""
     since = max(time - BEGIN, 0.0)
     sway = REACH * min(since / PERIOD, 1.0) * np.sin(2.0 * np.pi * since / PERIOD)
     return np.array([sway, 0.0, HEIGHT])
 
 
 def stage() -> Stage:
-    """The cloth flat above the ball."""
+    """The horizontal cloth above the ball."""
     world = World(integrator="implicit_euler")
     ball = world.add_collider(SphereShape(RADIUS), position=_place(0.0), friction=0.6, thickness=SKIN)
     mesh = cloth((SIDE, SIDE), CELLS, MASS)
     material = SpringMaterial(
         cloth_constants(mesh, CELLS, tensile=400.0, shear=100.0, bend=1.0), damping=0.05
     )
-    place = (0.1, 0.0, HEIGHT + RADIUS + FALL)  # a little aside, as thrown
+    place = (0.1, 0.0, HEIGHT + RADIUS + FALL)  # slightly off centre
     body = world.add_body(mesh, material, law="springs", position=place)
     world.build()
     camera = Camera.framing(
@@ -70,7 +70,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """How near the nearest vertex of the cloth is to the ball [m]; below 0 where one is inside."""
+    """Smallest distance of a cloth vertex from the ball [m]; negative if one is inside."""
     mover = stage.act
     assert isinstance(mover, Mover)
     away = stage.actors[0].body.positions() - mover.ball.position

@@ -1,6 +1,6 @@
-"""Toy elephants fall down steps and flap their ears: an artist's textured mesh on cages of tetrahedra.
+"""Toy elephants fall down steps and flap their ears: an artist's textured mesh on tetrahedral cages.
 
-Ears and trunks go on swinging when the body has landed; the picture on the skin goes with it.
+Ears and trunks keep swinging after the body has landed, and the texture follows the skin.
 """
 
 import numpy as np
@@ -16,15 +16,15 @@ from taichi_soft.render import Camera
 from taichi_soft.render.film import Actor, Stage
 
 TOY = ASSETS / "elephant.glb"
-HEIGHT = 0.5  # of the toy in that file [m]
-CELLS = 8  # of the cages along their longest side
-DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all of them [kg/m^3], -, share of critical
-STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # how many, and of each: height, depth, width [m]
-STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, from the lowest
+HEIGHT = 0.5  # height of the toy in its file [m]
+CELLS = 8  # cells of the cages along their longest side
+DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all toys: density [kg/m^3], Poisson's ratio, damping ratio
+STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # number of steps, and their height, depth and width [m]
+STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, lowest step first
 THICKNESS = 0.01  # of the skins of the bodies [m]
 DRAG = 0.8  # [1/s]
-STILL = 0.3  # what lies, rolls or rocks more slowly than this [m/s]; they land at some 4
-STEP = FixedStep(dt=1 / 200)  # short: what has to be made again, where one is squashed far, is little
+STILL = 0.3  # speed below which a toy counts as resting [m/s]; they land at about 4 m/s
+STEP = FixedStep(dt=1 / 200)  # short, so that retries after strong compression are cheap
 
 HERD = (
     (0.76, 3.0e4, "rgb", (0.0, 0.22, 0.06), (0.0, -0.45, 0.0), -0.3),
@@ -33,13 +33,13 @@ HERD = (
     (0.46, 2.0e4, "bgr", (-0.34, -0.30, 0.90), (0.1, -0.2, 0.0), -1.0),
     (0.46, 2.0e4, "rbg", (0.36, 0.05, 1.10), (0.1, -0.6, 0.0), 0.5),
 )
-"""Each one's height [m], Young's modulus [Pa], dye, place over the top step, first velocity [m/s] and turn
-forward [rad/s]."""
+"""Height [m], Young's modulus [Pa], dye, position above the top step, initial velocity [m/s] and forward
+spin [rad/s] of each toy."""
 
 
 def toy(height: float, dye: str) -> trimesh.Scene:
-    """The toy of that height [m], its cloth in another colour: what is bluer than red gets its channels in
-    the order of `dye`."""
+    """Load the toy with a height [m], and recolour its cloth: pixels with more blue than red get their
+    channels in the order of `dye`."""
     scene = trimesh.load_scene(TOY, process=False)
     for mesh in scene.geometry.values():
         mesh.apply_scale(height / HEIGHT)
@@ -52,7 +52,7 @@ def toy(height: float, dye: str) -> trimesh.Scene:
 
 
 def stage() -> Stage:
-    """The elephants over the steps, upright."""
+    """The elephants upright above the steps."""
     world = World(soft_contact=True, friction=0.8)
     colors = {}
     for i in range(STEPS):
@@ -78,7 +78,7 @@ def stage() -> Stage:
 
 
 def ear_span(body: Body) -> float:
-    """From the tip of one ear to that of the other, over what it is at rest."""
+    """Distance between the tips of the ears, over the rest distance."""
     rest, now = body.mesh.vertices, body.positions()
     x = rest[:, 0]
     left, right = x < 0.85 * x.min(), x > 0.85 * x.max()
@@ -87,14 +87,14 @@ def ear_span(body: Body) -> float:
 
 
 def ground_below(places: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Height of the step or the floor below places (n, 3), (n,) [m]."""
+    """Height of the step or the floor below positions (n, 3), (n,) [m]."""
     x, y, _ = places.T
     is_over = (np.abs(x) < WIDTH / 2) & (y < 0.0) & (y > -STEPS * TREAD)
     return np.where(is_over, RISE * np.ceil(STEPS + y / TREAD), 0.0)
 
 
 def proof(stage: Stage) -> float:
-    """How many elephants lie on the steps or on the floor, no part of them within, and hardly move."""
+    """Number of elephants that rest on the steps or the floor without penetrating them."""
     count = 0
     for body in stage.world.bodies:
         rows = body.positions()

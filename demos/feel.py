@@ -1,6 +1,6 @@
-"""Three puddings on a tray that is jerked aside: each sags, wobbles and settles as it was wished for.
+"""Three puddings on a tray that is jerked aside: each has the requested sag, frequency and settling time.
 
-The same jerk makes the left one shiver for a moment, and the right one sway for seconds.
+The same jerk makes the left one shiver briefly, and the right one sway for seconds.
 """
 
 import numpy as np
@@ -17,20 +17,20 @@ WISHES = (
     {"sag": 0.030, "wobble_hz": 7.0, "settle_s": 1.0},
     {"sag": 0.055, "wobble_hz": 4.0, "settle_s": 3.0},
 )
-"""Of each: share of its height that it sags, frequency in the air [Hz], time until it is still [s]."""
+"""Requests: sag over height, frequency in free flight [Hz], settling time [s]."""
 
 PROFILE = ((0.0, 0.0), (0.50, 0.0), (0.52, 0.05), (0.40, 0.45), (0.36, 0.52), (0.28, 0.55), (0.0, 0.55))
-"""Radius and height of its outline [m]."""
+"""Radius and height of the profile [m]."""
 
 CELLS, DENSITY, POISSON = 9, 300.0, 0.4
-SPACE = 1.5  # from one to the next [m]
+SPACE = 1.5  # distance between puddings [m]
 TRAY = (4.6, 1.5, 0.1)  # length, width, thickness [m]
-JERK_AT, JERK, JERK_TIME = 0.5, 0.12, 0.12  # when, how far and for how long the tray goes aside [s, m, s]
+JERK_AT, JERK, JERK_TIME = 0.5, 0.12, 0.12  # time, distance and duration of the jerk [s, m, s]
 STEP = FixedStep(dt=1 / 100)
 
 
 def stage() -> Stage:
-    """The puddings on the tray, each of the material that was found for it."""
+    """The puddings on the tray, each of the material found for its request."""
     pudding = trimesh.creation.revolve(np.array(PROFILE), sections=64)
     plain = Material(1e5, POISSON, DENSITY)
     cage = SoftBodyAsset.from_surface(pudding, plain, cells=CELLS)
@@ -52,11 +52,11 @@ def stage() -> Stage:
         for color, wish in zip(colors, WISHES, strict=True)
     ]
     camera = Camera.framing((-2.2, -0.7, 0.2), (2.2, 0.7, 1.0), aspect=16 / 9, azimuth=-75, elevation=14)
-    return Stage("as wished for", world, actors, camera, STEP, 5.0, act=Jerk(tray, feels), legend=legend)
+    return Stage("as requested", world, actors, camera, STEP, 5.0, act=Jerk(tray, feels), legend=legend)
 
 
 class Jerk:
-    """Of the tray, there and back, and what the puddings on it are made of."""
+    """Moves the tray there and back, and stores the materials of the puddings."""
 
     def __init__(self, tray: Collider, feels: list[Feel]) -> None:
         self.tray, self.feels = tray, feels
@@ -69,7 +69,7 @@ class Jerk:
 
 
 def proof(stage: Stage) -> float:
-    """By which share the wish was missed most that was missed most."""
+    """Largest relative deviation from a request."""
     assert isinstance(stage.act, Jerk)
     misses = [
         abs(getattr(feel.simulated, name) / wish - 1)

@@ -1,6 +1,6 @@
-"""A hand picks bodies up, one after the other, and throws them into a crate.
+"""A hand picks up bodies one by one and throws them into a crate.
 
-What is held hangs from the place where the hand took it, and sways behind the hand.
+A held body hangs from the grabbed point and sways behind the hand.
 """
 
 import numpy as np
@@ -27,27 +27,27 @@ from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.4)
-CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]
-INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # of the crate: width, thickness and height of its walls [m]
-FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
-LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
-LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
+CRATE = np.array([2.4, 0.0, 0.0])  # centre of its bottom [m]
+INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # inner width of the crate, thickness and height of its walls [m]
+FIRST, EVERY = 0.8, 1.7  # time of the first grab, and interval between grabs [s]
+LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # displacement of the lift [m]; steepness of the throw
+LIFTING, PULL = 0.7, 10.0  # duration of the lift [s], acceleration of the throw [m/s^2]
 UP = np.array([0.0, 0.0, 1.0])
 STEP = FixedStep(dt=1 / 50)
 
 
 class Hand:
-    """Reaches, lifts, swings, and lets go where what it holds would fly into the crate."""
+    """Reaches, lifts, swings, and releases the body when it would fly into the crate."""
 
     def __init__(self, frame: Frame) -> None:
-        """At rest, holding nothing."""
+        """Start at rest without a body."""
         self.frame, self.rest = frame, frame.position.astype(np.float64)
         self.taken = 0
         self.grab: Grab | None = None
-        self.start = self.rest  # where it took hold
+        self.start = self.rest  # position of the grab
 
     def __call__(self, world: World) -> None:
-        """Before a step."""
+        """Move the hand before a step."""
         since = world.time - FIRST - EVERY * self.taken
         if self.grab is None:
             if self.taken < len(world.bodies):
@@ -66,7 +66,7 @@ class Hand:
         self.frame.move_to(place)
 
     def _reach(self, world: World, since: float) -> None:
-        """Go to the top of the next body, and take hold of it when it is time."""
+        """Move to the top of the next body, and grab it in time."""
         body = world.bodies[self.taken]
         over = body.center_of_mass() + 2.0 * UP
         near = world.closest_point(over, bodies=[body])
@@ -77,13 +77,13 @@ class Hand:
 
 
 def _smooth(share: float) -> float:
-    """From 0 to 1 without a jolt."""
+    """Smooth step from 0 to 1."""
     s = min(max(share, 0.0), 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def _flies_into_crate(body: Body) -> bool:
-    """Whether it would come down to the rim of the crate beyond its middle, if let go now."""
+    """True if the body, released now, would reach the height of the crate's rim beyond its centre."""
     share = body.masses / body.masses.sum()
     place, velocity = share @ body.positions(), share @ body.velocities()
     root = np.sqrt(max(velocity[2] ** 2 + 2.0 * GRAVITY_EARTH * (place[2] - HEIGHT), 0.0))
@@ -125,7 +125,7 @@ def _add_crate(world: World) -> None:
 
 
 def proof(stage: Stage) -> float:
-    """How many bodies lie in the crate, whole."""
+    """Number of valid bodies in the crate."""
     half = np.array([INSIDE / 2 + 0.02, INSIDE / 2 + 0.02])
     return float(sum((np.abs(a.body.positions()[:, :2] - CRATE[:2]) < half).all() for a in stage.actors))
 

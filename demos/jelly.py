@@ -1,7 +1,7 @@
-"""A ball drops onto a stack of jelly blocks: they squash under it, wobble, and carry it.
+"""A ball drops onto a stack of jelly blocks: they compress, wobble, and carry it.
 
-The top block gives way first, and bulges. The blow then goes down through the others, and they lift the ball
-again.
+The top block deforms first, and bulges. The impact then travels down through the others, and they push the
+ball up again.
 """
 
 import numpy as np
@@ -15,23 +15,23 @@ from taichi_soft.render.film import Actor, Stage
 
 JELLY = Material(young=2.5e4, poisson=0.4, density=500.0, damping_ratio=0.08)
 RUBBER = Material(young=4.0e5, poisson=0.3, density=1300.0, damping_ratio=0.3)
-SIZE, LAYERS = (1.8, 1.8, 0.5), 3  # of a block [m], and how many there are
-SKIN = 0.02  # between them [m]
-RADIUS, DROP = 0.5, 0.9  # of the ball, and how high above the stack it begins [m]
-TURN = 0.12  # of each block against the one below [rad]
+SIZE, LAYERS = (1.8, 1.8, 0.5), 3  # size of a block [m], and number of blocks
+SKIN = 0.02  # distance between blocks [m]
+RADIUS, DROP = 0.5, 0.9  # radius of the ball, and its initial height above the stack [m]
+TURN = 0.12  # rotation of each block relative to the one below [rad]
 STEP = FixedStep(dt=1 / 50)
 
 
 class Scale:
-    """Weighs all that lies on the floor, and sees how far the stack is squashed."""
+    """Records the load on the floor and the compression of the stack."""
 
     def __init__(self) -> None:
-        """Before the first step."""
-        self.loads: list[float] = []  # on the floor in each step [N]
-        self.lowest = np.inf  # that the top of the stack has been [m]
+        """Start before the first step."""
+        self.loads: list[float] = []  # load on the floor in each step [N]
+        self.lowest = np.inf  # lowest height of the stack's top [m]
 
     def __call__(self, world: World) -> None:
-        """Before a step, of what the last one did."""
+        """Record the results of the last step."""
         if world.step_count:
             assert world.floor_collider is not None
             self.loads.append(-float(world.floor_collider.impulse[2]) / STEP.dt)
@@ -40,7 +40,7 @@ class Scale:
 
 
 def stage() -> Stage:
-    """The blocks on each other, not squashed yet, and the ball above them."""
+    """The undeformed stack of blocks, and the ball above it."""
     world = World(soft_contact=True, friction=0.8)
     contact = Contact(friction=0.8, thickness=SKIN)
     block = box(SIZE, (7, 7, 3))
@@ -65,7 +65,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Mean load on the floor in the last second, over the weight of all."""
+    """Mean load on the floor in the last second, over the total weight."""
     scale = stage.act
     assert isinstance(scale, Scale)
     weight = sum(float(body.masses.sum()) for body in stage.world.bodies) * GRAVITY_EARTH

@@ -1,7 +1,6 @@
-"""Soft balls roll down a chute towards the camera, of more tetrahedra the nearer they are.
+"""Soft balls roll down a chute towards the camera; closer ones have more tetrahedra.
 
-Where a ball changes its colour it has other tetrahedra from that step on, and rolls on as if nothing had
-happened.
+When a ball changes its colour, its level of detail has changed, and its motion continues unchanged.
 """
 
 import numpy as np
@@ -14,18 +13,18 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-CELLS = (10, 6, 4)  # of the levels along a ball, the finest first
-DISTANCES = (10.3, 13.8)  # from the camera, beyond which the second and the third level do [m]
-SLACK = 0.5  # that a body must come nearer before it is finer again [m]
+CELLS = (10, 6, 4)  # cells of the levels along a ball, the finest first
+DISTANCES = (10.3, 13.8)  # distances from the camera above which the second and the third level are used [m]
+HYSTERESIS = 0.5  # distance that a body must come closer before its level is raised [m]
 JELLY = Material(young=3.0e4, poisson=0.4, density=200.0)
 RADIUS, COUNT = 0.5, 5
 SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # [rad], [m], [m]
-COLORS = tuple(PALETTE[i] for i in (0, 2, 3))  # of the levels
+COLORS = tuple(PALETTE[i] for i in (0, 2, 3))  # colours of the levels
 STEP = FixedStep(dt=1 / 50)
 
 
 def stage() -> Stage:
-    """The balls above the upper end of the chute; at its lower end is a wall."""
+    """The balls above the upper end of the chute, which has a wall at its lower end."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     asset = SoftBodyAsset.from_surface(ball, JELLY, cells=CELLS, contact=Contact(friction=0.8))
     world = World(friction=0.8)
@@ -55,7 +54,7 @@ def stage() -> Stage:
 
 
 class Choice:
-    """Of a level for each ball before every step, and which levels each has had."""
+    """Chooses a level for each ball before every step, and records the levels of each."""
 
     def __init__(self, eye: NDArray[np.float64]) -> None:
         self.eye = eye
@@ -68,20 +67,20 @@ class Choice:
 
 
 def level_of(body: Body, eye: NDArray[np.float64]) -> int:
-    """By distance, and by what it has: a body on a border does not change in every step."""
+    """Choose a level by distance, with hysteresis."""
     apart = float(np.linalg.norm(body.center_of_mass() - eye))
     coarser = sum(apart > each for each in DISTANCES)
-    finer = sum(apart > each - SLACK for each in DISTANCES)
+    finer = sum(apart > each - HYSTERESIS for each in DISTANCES)
     return min(max(body.level, coarser), finer)
 
 
 def paint(body: Body) -> NDArray[np.float32]:
-    """The colour of its level at every vertex."""
+    """Colour all vertices by level."""
     return np.tile(np.array(COLORS[body.level], dtype=np.float32), (body.vertex_count, 1))
 
 
 def proof(stage: Stage) -> float:
-    """How many balls have had every level on their way."""
+    """Number of balls that had every level."""
     assert isinstance(stage.act, Choice)
     return float(sum(levels == set(range(len(CELLS))) for levels in stage.act.seen.values()))
 

@@ -1,6 +1,6 @@
-"""Sixty-four soft spheres rain down: bodies run side by side, one per processor core at a time.
+"""Sixty-four soft spheres rain down: bodies run in parallel, one per CPU core at a time.
 
-They land at different moments, and each is squashed and thrown up by itself.
+They land at different times, and each deforms and bounces independently.
 """
 
 from engine_adapter import FixedStep
@@ -11,13 +11,13 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 ROWS = 8
-PITCH = 2.8  # between spheres [m]
-LOWEST, SPREAD = 1.3, 4.5  # of the heights they fall from [m]
+PITCH = 2.8  # distance between spheres [m]
+LOWEST, SPREAD = 1.3, 4.5  # lowest initial height, and range above it [m]
 SOFT = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.03)
 
 
 def stage() -> Stage:
-    """A square of spheres, at heights without a pattern."""
+    """A square grid of spheres at irregular heights."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     actors = []
@@ -38,7 +38,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Number of spheres that are whole: no flipped tetrahedron, not frozen."""
+    """Number of valid spheres: not frozen, and without inverted tetrahedra."""
     return float(sum(a.body.flipped_count() == 0 and not a.body.is_frozen for a in stage.actors))
 
 

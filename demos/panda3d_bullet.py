@@ -1,4 +1,4 @@
-"""A game in Panda3D: rigid crates of Bullet fall onto a soft block. A file name asks for a picture only."""
+"""A game in Panda3D: rigid crates of Bullet fall onto a soft block. With a file name, only write an image."""
 
 import sys
 
@@ -30,14 +30,14 @@ soft.build()
 
 
 def step_bullet(soft):
-    """What the last soft step gave pushes the crates, and colliders follow them: see docs/coupling.md."""
+    """Apply the impulses of the last soft step to the crates, then let colliders follow (docs/coupling.md)."""
     now = np.array([(collider.impulse, collider.angular_impulse) for _, collider in crates])
     for (crate, _), (impulse, angular) in zip(crates, 1.5 * now - 0.5 * last, strict=True):
         crate.node().set_active(True)
         crate.node().apply_central_impulse(core.LVector3(*impulse))
         crate.node().apply_torque_impulse(core.LVector3(*angular))
     last[:] = now
-    rigid.do_physics(DT, 0)  # with substeps Bullet would show its bodies one step late
+    rigid.do_physics(DT, 0)  # with substeps Bullet would report poses one step late
     for crate, collider in crates:
         collider.move_to(tuple(crate.get_pos()), tuple(np.roll(crate.get_quat(), -1)))
 
@@ -61,7 +61,7 @@ for light in (sun, sky):
 
 
 def draw(task):
-    """One frame: time goes on, and positions and normals go into Panda3D's own buffer."""
+    """Advance the world by a frame, and write positions and normals into Panda3D's buffer."""
     adapter.advance(DT if PICTURE else game.clock.dt)
     adapter.render_mesh(skin, vertices, normals)
     memoryview(data.modify_array(0)).cast("B")[:] = np.hstack((vertices, normals)).tobytes()

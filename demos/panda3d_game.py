@@ -1,7 +1,7 @@
-"""A small game in Panda3D: toys fall onto a platform that moves, and crates of Bullet onto a soft block.
+"""A small game in Panda3D: toys fall onto a moving platform, and Bullet's crates onto a soft block.
 
-Mouse: take hold of what is soft. Space: another toy. Arrows: turn the camera. R: begin again. D: what physics
-sees. Escape: end. `--headless A.png B.png C.png` plays by itself, without a window, and takes pictures.
+Mouse: grab soft bodies. Space: drop a toy. Arrows: rotate the camera. R: restart. D: debug lines. Escape:
+quit. `--headless A.png B.png C.png` plays automatically without a window, and writes images.
 """
 
 import argparse
@@ -18,14 +18,14 @@ from engine_adapter import panda3d as soft
 from taichi_soft import Contact, Material, SoftBodyAsset, World, box
 from taichi_soft.core.package_data import ASSETS
 
-DT, TOYS = 1 / 60, 6  # length of a step [s]; how many toys there may be at once
-EDGE, MASS = 0.5, 60.0  # of a crate [m], [kg]
-MIDDLE, SWING = -1.1, 0.4  # of the platform's way, and how far it goes to both sides [m]
-KEYS = "mouse: grab   space: another toy   arrows: turn   R: again   D: debug"
+DT, TOYS = 1 / 60, 6  # length of a step [s]; largest number of toys
+EDGE, MASS = 0.5, 60.0  # edge [m] and mass [kg] of a crate
+MIDDLE, SWING = -1.1, 0.4  # centre and amplitude of the platform's motion [m]
+KEYS = "mouse: grab   space: drop a toy   arrows: rotate   R: restart   D: debug"
 
 
 class Game(ShowBase):
-    """The level, what moves it, and what keys do to it."""
+    """The level, its motion and its controls."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ class Game(ShowBase):
         OnscreenText(KEYS, pos=(0, -0.94), scale=0.06)
 
     def build_level(self) -> None:
-        """The ground and crates are Bullet's, the platform is a collision solid of the scene."""
+        """Build the level: ground and crates in Bullet, the platform as a collision solid."""
         ground = self.add_rigid("ground", bullet.BulletPlaneShape(core.LVector3(0, 0, 1), 0), 0.0)
         soft.add_colliders(self.world, ground)
         self.add_look(ground, (14, 14, 0.1), (0.62, 0.68, 0.6, 1)).set_z(-0.1)
@@ -84,7 +84,7 @@ class Game(ShowBase):
             self.render.set_light(self.render.attach_new_node(light))
 
     def add_rigid(self, name: str, shape: bullet.BulletShape, mass: float) -> core.NodePath:
-        """A rigid body of Bullet."""
+        """Add a rigid body to Bullet."""
         path = self.render.attach_new_node(bullet.BulletRigidBodyNode(name))
         path.node().add_shape(shape)
         path.node().set_mass(mass)
@@ -92,7 +92,7 @@ class Game(ShowBase):
         return path
 
     def add_look(self, path: core.NodePath, size: tuple, color: tuple) -> core.NodePath:
-        """A box about a node, as it is seen."""
+        """Add a visible box to a node."""
         look = self.loader.load_model("models/box").copy_to(path)
         look.set_texture_off(1)
         look.set_color(color)
@@ -100,27 +100,27 @@ class Game(ShowBase):
         return look
 
     def draw(self, node: core.NodePath) -> core.NodePath:
-        """Let a node be drawn every frame."""
+        """Draw a node in every frame."""
         node.reparent_to(self.render)
         self.task.nodes.append(node)
         return node
 
     def before_step(self, world: World) -> None:
-        """All that has to happen once for each fixed step."""
+        """Update the level once per fixed step."""
         self.platform.set_x(MIDDLE + SWING * math.sin(world.time + DT))
         for mover in self.movers:
             mover.follow()
         self.coupling.step(DT)
 
     def drop(self) -> None:
-        """Another toy over the platform, if there is one left."""
+        """Drop another toy onto the platform, if one is left."""
         if len(self.toys) < TOYS:
             place = self.platform.get_pos() + core.LVector3(0.3 * (len(self.toys) % 3 - 1), 0, 0.9)
             body = self.world.spawn(self.toy, position=tuple(place))
             self.toys.append(self.draw(soft.SoftBodyNode(self.adapter, body)))
 
     def begin(self) -> None:
-        """All as it was at the start, with a first toy."""
+        """Restore the initial state, with a first toy."""
         self.hand.release()
         self.adapter.restore(self.start[0])
         self.coupling.restore(self.start[1])
@@ -131,17 +131,17 @@ class Game(ShowBase):
         self.drop()
 
     def show_debug(self) -> None:
-        """Lines of what physics sees, on or off."""
+        """Toggle the debug lines."""
         self.debug.show() if self.debug.is_hidden() else self.debug.hide()
 
     def turn(self, degrees: float) -> None:
-        """Turn the camera round the middle of the level."""
+        """Rotate the camera around the centre of the level."""
         self.angle += math.radians(degrees)
         self.camera.set_pos(6 * math.sin(self.angle), -6 * math.cos(self.angle), 2.6)
         self.camera.look_at(0, 0, 0.5)
 
     def play(self, pictures: list[str]) -> None:
-        """A second before each picture: a toy falls; it is pulled up, another one falls; debug lines."""
+        """Play 1 s before each image: a toy falls; it is pulled up while another one falls; debug lines."""
         clock, spot = core.ClockObject.get_global_clock(), core.LPoint2()
         clock.mode, clock.dt = core.ClockObject.M_non_real_time, DT
         for number, picture in enumerate(pictures):
@@ -161,9 +161,7 @@ class Game(ShowBase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--headless", nargs="+", metavar="PNG", help="play without a window; pictures to take"
-    )
+    parser.add_argument("--headless", nargs="+", metavar="PNG", help="play without a window; images to write")
     PICTURES = parser.parse_args().headless
     core.load_prc_file_data("", "audio-library-name null\nbackground-color 0.8 0.85 0.9")
     core.load_prc_file_data("", "window-type offscreen\nload-display p3tinydisplay" if PICTURES else "")

@@ -1,6 +1,6 @@
-"""Soft bodies tumble through a course of every kind of collider, some of which move, and end in a hollow.
+"""Soft bodies tumble through a course of all kinds of colliders, some of them moving, and end in a hollow.
 
-Bodies squeeze through between rods, paddles and each other, and take back their shapes behind them.
+Bodies squeeze between rods, paddles and each other, and recover their shapes afterwards.
 """
 
 import numpy as np
@@ -26,21 +26,21 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=8.0e4, poisson=0.3, density=400.0, damping_ratio=0.3)
-LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp
-SLOPE = 0.32  # of the ramp [rad]
-HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
-HOLLOW = np.array([1.7, 0.0, 0.0])  # its middle [m]
+LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies above the ramp
+SLOPE = 0.32  # slope of the ramp [rad]
+HUB = np.array([1.85, 0.0, 3.6])  # centre of the wheel [m]
+HOLLOW = np.array([1.7, 0.0, 0.0])  # centre of the hollow [m]
 UP = np.array([0.0, 0.0, 1.0])
-RIM = 2.4  # radius of its rim [m]
+RIM = 2.4  # radius of the hollow's rim [m]
 GROUND, MOVING = (0.52, 0.52, 0.40), (0.92, 0.90, 0.85)  # colours of colliders
 STEP = FixedStep(dt=1 / 50)
 
 
 class Course:
-    """All colliders. Those that move are moved before every step: a wheel, and bars that go up and down."""
+    """All colliders. Before every step it moves a wheel, and bars that go up and down."""
 
     def __init__(self, world: World) -> None:
-        """Add them."""
+        """Add all colliders."""
         top, tilt = np.array([-1.4, 0.0, 4.85]), _turn(SLOPE)
         world.add_collider(BoxShape((3.6, 2.4, 0.14)), position=top, rotation=tilt, friction=0.1)
         for side in (-1.2, 1.2):
@@ -57,7 +57,7 @@ class Course:
             bar.teleport(self._bar(i, 0.0))
 
     def __call__(self, world: World) -> None:
-        """Move them to where they are at the end of the coming step."""
+        """Move colliders to their poses at the end of the next step."""
         time = world.time + STEP.dt
         for i, paddle in enumerate(self.paddles):
             paddle.move_to(HUB, _turn(1.1 * time + i * np.pi / 2))
@@ -70,27 +70,27 @@ class Course:
 
 
 def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
-    """First about x, then about y [rad]: the x axis towards -z."""
+    """Rotation first about x, then about y [rad], which turns the x axis towards -z."""
     c, s, k, w = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, k, -w], [0, w, k]])
 
 
 def _funnel() -> trimesh.Trimesh:
-    """A cone with a hole, its wall 16 cm thick."""
+    """A cone with a hole and a wall of 16 cm."""
     inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.85, 1.55)])
     outer = inner + np.array([0.13, -0.1])
     return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
 
 
 def _ground() -> NDArray[np.float64]:
-    """A ring-shaped wall round a hollow, on a square of 6.8 m."""
+    """Heights of a ring-shaped wall around a hollow, on a square of 6.8 m."""
     x, y = np.meshgrid(*2 * [np.linspace(-3.4, 3.4, 35)], indexing="ij")
     away = (np.hypot(x, y) - RIM) / 0.6
     return np.asarray(0.03 + 1.0 * np.exp(-(away**2)))
 
 
 def stage() -> Stage:
-    """Bodies in a block over the ramp."""
+    """A block of bodies above the ramp."""
     shapes = [
         sphere(0.34, 3),
         box((0.56, 0.56, 0.56), (4, 4, 4)),
@@ -124,7 +124,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """How many bodies lie in the hollow, no part of them below the ground."""
+    """Number of bodies in the hollow that do not penetrate the ground."""
     inside = 0
     for actor in stage.actors:
         rows = actor.body.positions()

@@ -1,6 +1,6 @@
-"""Two machines play one game: each sees the other's inputs late, goes back, and makes the steps again.
+"""Two machines play one game: each receives the other's inputs late, rewinds, and repeats the steps.
 
-Each side is the picture of one machine. After a key the two differ for some frames, and then agree again.
+Each side shows one machine. After a key press the two differ for a few frames, and then agree again.
 """
 
 from dataclasses import dataclass, field
@@ -18,17 +18,17 @@ from taichi_soft.render.props import Prop
 MATERIAL = Material(young=2.5e4, poisson=0.3, density=300.0, damping_ratio=0.1)
 CONTACT = Contact(friction=0.3)
 ROOM, WALL, HEIGHT = 4.0, 0.12, 0.5  # width of the arena, thickness and height of its walls [m]
-BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # where the second machine's picture is drawn [m]
-LATE = 8  # ticks that an input takes to the other machine
+BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # offset of the second machine's view [m]
+LATE = 8  # latency of an input to the other machine [ticks]
 PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # [m/s^2], [m/s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 Keys = tuple[float, float, float]
-"""What a player presses in a tick: where to, (2,), and whether to jump, 0 or 1."""
+"""Input of a player in a tick: direction, (2,), and 1 to jump or 0."""
 
 
 def make_world() -> World:
-    """An arena with the two players' bodies in it, and four loose ones."""
+    """Make an arena with the two players' bodies and four free ones."""
     world = World(soft_contact=True, friction=0.3)
     reach = (ROOM + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -47,32 +47,34 @@ def make_world() -> World:
 
 @dataclass
 class Machine:
-    """One player's computer: a world, all inputs that it knows, and guesses for those it does not."""
+    """One player's machine: a world, known inputs, and predictions for unknown ones."""
 
     player: int
     world: World
     known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # by tick and player
     used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # by tick
-    names: dict[int, str] = field(default_factory=dict)  # hashes of the states before each tick
+    names: dict[int, str] = field(default_factory=dict)  # hash of the state before each tick
     rewinds: int = 0
-    wrong: int = 0  # ticks that were made again and came out differently
+    wrong: int = 0  # number of repeated ticks with another result
 
     def __post_init__(self) -> None:
         self.rollback = Rollback(self.world, LATE + 1)
 
     def press(self) -> None:
-        """What the player presses in this tick, given the picture: a chase, with a jump now and then."""
+        """Choose the player's input in this tick from the current state: a chase with occasional jumps."""
         tick, me = self.world.step_count, self.player
         x, y, _ = self._keys(tick, me)
         if tick % (17 + 6 * me) == 0:
             turn = tick // (17 + 6 * me)
-            goal = 1 if me == 0 and turn % 3 else 2 + turn % 4  # now at the other, now at what lies about
+            goal = (
+                1 if me == 0 and turn % 3 else 2 + turn % 4
+            )  # sometimes the other player, sometimes a free body
             way = (self.world.bodies[goal].center_of_mass() - self.world.bodies[me].center_of_mass())[:2]
             x, y = (way / max(float(np.linalg.norm(way)), 1e-3)).tolist()
         self.known[tick, me] = (x, y, float(tick % (61 + 12 * me) == 40))
 
     def receive(self, tick: int, keys: Keys) -> None:
-        """Learn what the other has pressed, and make the ticks since again where the guess was wrong."""
+        """Receive the other's input, and repeat the ticks since then if its prediction was wrong."""
         self.known[tick, 1 - self.player] = keys
         if self.used[tick][1 - self.player] == keys:
             return
@@ -84,7 +86,7 @@ class Machine:
             self.world.step(STEP.dt, STEP.substeps)
 
     def begin_tick(self) -> None:
-        """Keep the state, and do what the players press."""
+        """Save the state, and apply the players' inputs."""
         tick = self.world.step_count
         self.rollback.save()
         name = self.world.state_hash()
@@ -98,7 +100,7 @@ class Machine:
                 body.apply_impulse((0.0, 0.0, mass * JUMP))
 
     def _keys(self, tick: int, player: int) -> Keys:
-        """What is known, or the guess that the other still presses what was last heard of."""
+        """Return the known input, or predict that the other player repeats the last known one."""
         if (tick, player) in self.known:
             return self.known[tick, player]
         x, y, _ = self.known.get((tick - 1, player)) or self.used.get(tick - 1, (_NONE, _NONE))[player]
@@ -109,14 +111,14 @@ _NONE: Keys = (0.0, 0.0, 0.0)
 
 
 class Match:
-    """Both machines, and the slow line between them."""
+    """Both machines and the slow connection between them."""
 
     def __init__(self, worlds: tuple[World, World]) -> None:
-        """Before the first tick."""
+        """Start before the first tick."""
         self.machines = [Machine(player, world) for player, world in enumerate(worlds)]
 
     def __call__(self, world: World) -> None:
-        """Before a step of the first world: all that both do in a tick, but that step."""
+        """Run a tick of both machines, except the step of the first world that follows."""
         tick = world.step_count
         for machine in self.machines:
             if tick >= LATE:
@@ -128,23 +130,23 @@ class Match:
         second.step(STEP.dt, STEP.substeps)
 
     def settled(self) -> list[int]:
-        """Ticks before which both know all inputs."""
+        """Ticks for which both machines know all inputs."""
         return sorted(self.machines[0].names)[: -LATE or None]
 
     def agreed(self) -> int:
-        """How many of them both machines have begun in the same state, bit by bit."""
+        """Number of these ticks that both machines began in bit-identical states."""
         first, second = (machine.names for machine in self.machines)
         return sum(first[tick] == second[tick] for tick in self.settled())
 
     def caption(self) -> str:
-        """For the picture."""
+        """Text for each frame."""
         rewinds = sum(machine.rewinds for machine in self.machines)
         agreed = f"{self.agreed()} of {len(self.settled())} hashes agree"
         return f"inputs {LATE} ticks late, {rewinds} rollbacks, {agreed}"
 
 
 def stage() -> Stage:
-    """The first machine's world, and beside it the second one's."""
+    """The worlds of both machines, side by side."""
     first, second = make_world(), make_world()
     match = Match((first, second))
     colors = [PALETTE[0], PALETTE[1], *[PALETTE[2]] * 4]
@@ -163,7 +165,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Share of the settled ticks that both machines have begun in the same state; 0 without a rollback."""
+    """Fraction of settled ticks that both machines began in the same state; 0 without a rollback."""
     match = stage.act
     assert isinstance(match, Match)
     if not all(machine.rewinds and machine.wrong for machine in match.machines):

@@ -1,6 +1,6 @@
-"""A ball on a rope swings into a tower of soft blocks and brings it down.
+"""A ball on a rope swings into a tower of soft blocks and knocks it over.
 
-The blocks that the ball hits are dented first; then the tower breaks in two, and its upper half topples.
+The ball dents the blocks that it hits; then the tower breaks in two, and its upper half topples.
 """
 
 import numpy as np
@@ -15,12 +15,12 @@ from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
 RUBBER = Material(young=8.0e4, poisson=0.35, density=300.0, damping_ratio=0.2)
-SIZE, LAYERS = (0.8, 0.8, 0.5), 7  # of a block [m], and how many there are
-SKIN = 0.02  # between them [m]
-RADIUS, ROPE = 0.45, 3.4  # of the ball, and from its middle to where the rope hangs [m]
-TOP = 5.2  # height at which the rope hangs [m]
+SIZE, LAYERS = (0.8, 0.8, 0.5), 7  # size of a block [m], and number of blocks
+SKIN = 0.02  # distance between blocks [m]
+RADIUS, ROPE = 0.45, 3.4  # radius of the ball, and length of the rope from its centre [m]
+TOP = 5.2  # height of the rope's upper end [m]
 WIDEST = np.radians(36.0)  # angle at which the ball is released
-BEGIN = 0.5  # when it is released [s]
+BEGIN = 0.5  # time of the release [s]
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -28,12 +28,12 @@ class Ball:
     """Swings like a pendulum that the tower does not slow down."""
 
     def __init__(self, collider: Collider, rope: Frame) -> None:
-        """Held aside."""
+        """Start displaced and held."""
         self.collider, self.rope = collider, rope
         self.angle, self.rate = -WIDEST, 0.0
 
     def __call__(self, world: World) -> None:
-        """Before a step."""
+        """Move the ball before a step."""
         if world.time >= BEGIN:
             for _ in range(10):
                 self.rate -= GRAVITY_EARTH / ROPE * np.sin(self.angle) * STEP.dt / 10
@@ -43,7 +43,7 @@ class Ball:
 
 
 def stage() -> Stage:
-    """The tower, and the ball held aside."""
+    """The tower, and the displaced ball."""
     world = World(soft_contact=True, friction=0.6)
     contact = Contact(friction=0.6, thickness=SKIN)
     block = box(SIZE, (5, 5, 3))
@@ -59,7 +59,7 @@ def stage() -> Stage:
     actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
     camera = Camera.framing((-2.6, -1.0, 0.0), (3.4, 1.0, 3.9), aspect=16 / 9, azimuth=-72, elevation=7)
     return Stage(
-        "a tower is brought down",
+        "a tower is knocked over",
         world,
         actors,
         camera,
@@ -72,20 +72,20 @@ def stage() -> Stage:
 
 
 def _pose(angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the place [m] and the axes of the ball and of the rope above it."""
+    """Position [m] and axes of the ball and the rope."""
     c, s = np.cos(angle), np.sin(angle)
     place = np.array([ROPE * s, 0.0, TOP - ROPE * c])
     return place, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
 
 
 def _rope_surface() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """A thin bar from the ball's middle up."""
+    """A thin bar upwards from the ball's centre."""
     rod = box((0.05, 0.05, ROPE), (1, 1, 1))
     return rod.vertices - np.mean(rod.bounds, axis=0) + (0.0, 0.0, ROPE / 2), rod.surface
 
 
 def proof(stage: Stage) -> float:
-    """How many blocks lie lower than they stood, by more than half of their height."""
+    """Number of blocks that are lower than initially by more than half of their height."""
     heights = [body.center_of_mass()[2] for body in stage.world.bodies]
     stood = [SIZE[2] / 2 + 0.01 + i * (SIZE[2] + SKIN) for i in range(LAYERS)]
     return float(np.sum(np.subtract(stood, heights) > SIZE[2] / 2))

@@ -1,6 +1,6 @@
-"""Soft wheels, driven at their hubs, climb a flight of steps and are braked at the top.
+"""Soft wheels with motors at their hubs climb steps and brake at the top.
 
-The softest wheel stands on a flat foot and folds round the edge of each step; the firmest rolls over it.
+The softest wheel has a large contact area and folds around the edge of each step; the stiffest rolls over it.
 """
 
 import numpy as np
@@ -14,21 +14,21 @@ from taichi_soft.render.colors import Color
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.stage import Paint
 
-STIFFNESSES = (1.6e4, 4e4, 4e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
-RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]
+STIFFNESSES = (1.6e4, 4e4, 4e5)  # Young's moduli of the wheels, softest first [Pa]
+RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # radius and width of the wheels; radius of the driven hub [m]
 SPEED, TORQUE = 3.0, 1500.0  # [rad/s] and [N m]
-LANE, ASIDE = 1.4, 0.3  # from wheel to wheel, and how much wider than these the steps are on each side [m]
-RISE, TREAD, STEPS = 0.14, 0.9, 3  # of the steps [m], and how many there are
-FOOT, TOP = 1.4, 2.8  # where the first step begins, and how long the last one is [m]
-GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # where the motors brake [m]
-BEGIN = 0.4  # when they set out [s]
-DRAG = 2.0  # [1/s] of a wheel that brakes, or it would rock to and fro about its hub
-SMOOTHING = 0.04  # of the torques that are shown, per step
+LANE, ASIDE = 1.4, 0.3  # distance between wheels, and additional width of the steps on each side [m]
+RISE, TREAD, STEPS = 0.14, 0.9, 3  # height and depth of the steps [m], and their number
+FOOT, TOP = 1.4, 2.8  # start of the first step, and length of the last one [m]
+GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # position at which the motors brake [m]
+BEGIN = 0.4  # start time [s]
+DRAG = 2.0  # damping rate of a braking wheel, which would otherwise rock about its hub [1/s]
+SMOOTHING = 0.04  # smoothing of the displayed torques, per step
 STEP = FixedStep(dt=1 / 50)
 
 
 class Drivers:
-    """Start the motors, and brake each at the top."""
+    """Starts the motors, and brakes each at the top."""
 
     def __init__(self, motors: list[Motor]) -> None:
         """Waiting."""
@@ -36,7 +36,7 @@ class Drivers:
         self.torques = np.zeros(len(motors))  # running means [N m]
 
     def __call__(self, world: World) -> None:
-        """Before a step."""
+        """Update the motors before a step."""
         self.torques += SMOOTHING * ([motor.effort for motor in self.motors] - self.torques)
         for motor in self.motors:
             is_there = motor.body.center_of_mass()[0] > GOAL
@@ -46,12 +46,12 @@ class Drivers:
                 motor.body.set_linear_damping(DRAG if is_there else 0.0)
 
     def caption(self) -> str:
-        """For the picture."""
+        """Text for each frame."""
         return "torque " + "  ".join(f"{10 * round(t / 10):5.0f}" for t in self.torques) + " N m"
 
 
 def stage() -> Stage:
-    """Wheels side by side before the steps."""
+    """Wheels side by side in front of the steps."""
     world = World(soft_contact=True)
     width = LANE * len(STIFFNESSES) + 2 * ASIDE
     for i in range(STEPS):
@@ -60,7 +60,7 @@ def stage() -> Stage:
         middle = FOOT + i * TREAD + length / 2
         world.add_collider(BoxShape(size), position=(middle, 0.0, size[2] / 2), friction=0.9)
     mesh = cylinder(RADIUS, WIDTH, rings=4, layers=5)
-    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # its axis along y
+    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # wheel axis along y
     actors = []
     for i, young in enumerate(STIFFNESSES):
         body = world.add_body(
@@ -76,7 +76,7 @@ def stage() -> Stage:
     motors = [
         world.add_motor(body, hub, (0.0, 1.0, 0.0), speed=0.0, max_torque=TORQUE) for body in world.bodies
     ]
-    for body in world.bodies:  # or the tetrahedra, which all lean to one side, would steer
+    for body in world.bodies:  # prevents steering by the asymmetric tetrahedra
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
     camera = Camera.framing(
@@ -89,7 +89,7 @@ def stage() -> Stage:
 
 
 def _sectors(color: Color) -> Paint:
-    """Every other twelfth of a wheel is paler, so that one sees it turn."""
+    """Paint every other twelfth of a wheel paler, to show its rotation."""
 
     def paint(body: Body) -> NDArray[np.float32]:
         x, y, _ = body.mesh.vertices.T
@@ -101,7 +101,7 @@ def _sectors(color: Color) -> Paint:
 
 
 def proof(stage: Stage) -> float:
-    """How many wheels stand on the last step."""
+    """Number of wheels on the last step."""
     height = STEPS * RISE
     begin = FOOT + (STEPS - 1) * TREAD
     places = [actor.body.center_of_mass() for actor in stage.actors]

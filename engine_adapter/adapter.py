@@ -1,4 +1,4 @@
-"""A world inside a game loop."""
+"""Run a world inside a game loop."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from engine_adapter.budget import Budget, GivenUp
+from engine_adapter.budget import Budget, BudgetStatus
 from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, RenderMesh, StateError, World
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.handles import handles_of
+from taichi_soft.core.renamed import warn_renamed
 from taichi_soft.core.threads import one_thread
 
 
 class EngineAdapter:
-    """Runs a built world in fixed steps, whatever the frame rate, and gives the positions to draw.
+    """Runs a built world in fixed steps at any frame rate, and interpolates the positions to draw.
 
-    While an adapter is in use, only the adapter steps and restores its world: `alpha` and `time` count its
-    steps. As a world, it takes calls of one thread at a time.
+    While an adapter is in use, only the adapter must step and restore its world, because `alpha` and `time`
+    count its steps. Only one thread at a time can call it, as for a world.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -30,15 +31,15 @@ class EngineAdapter:
             adapter.positions(body, out=vertex_buffer)
 
     Args:
-        world: built.
-        fixed_step: length of a step, its substeps, and how many one frame may make.
-        before_step: called with the world before every fixed step: the place to move colliders and frames,
-            to push and to grab, so that it happens at the same moments whatever the frame rate.
-        rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
-        budget_ms: what a fixed step may take [ms], with changes before it. Where it takes longer, bodies with
-            levels of detail get coarser, the farthest first (see `see_from`), and the farthest skip steps
-            where that is not enough. They get all back when there is time. See `given_up`. None: all stay as
-            they are.
+        world: a built world.
+        fixed_step: length of a step, its substeps, and the largest number of steps per frame.
+        before_step: called with the world before every fixed step. Move colliders and frames, apply forces
+            and grab here, so that the result does not depend on the frame rate.
+        rewind_ticks: number of steps that `rewind` can go back; 0 stores none.
+        budget_ms: time budget of a fixed step including changes of level [ms]. If steps take longer, bodies
+            with levels of detail get coarser, the farthest first (see `see_from`), and if that is not enough,
+            the farthest bodies skip steps. Both are reverted when there is time. See `budget_status`. None
+            turns the budget off.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
     Example:
@@ -83,30 +84,30 @@ class EngineAdapter:
 
     @property
     def world(self) -> World:
-        """The world that is stepped."""
+        """World of the adapter."""
         return self._world
 
     @property
     def fixed_step(self) -> FixedStep:
-        """How time is cut into steps."""
+        """Length of a step, its substeps, and the largest number of steps per frame."""
         return self._fixed_step
 
     @property
     def alpha(self) -> float:
-        """How far the picture is from the previous step to the last one, at least 0 and below 1."""
+        """Interpolation factor between the previous step and the last one, at least 0 and below 1."""
         return self._accumulator.alpha
 
     @property
     def time(self) -> float:
-        """Simulated time of the interpolated positions [s]: `alpha` of the way through the last step.
+        """Simulated time of the interpolated positions [s].
 
-        It is one step behind all the time put in. Before the first step it is the world's time.
+        It is one step behind the sum of all frame times. Before the first step it is the world's time.
         """
         return self._world.time - (1.0 - self.alpha) * self._world.last_dt
 
     @property
     def dropped_time(self) -> float:
-        """Time that the last `advance` dropped [s], 0 where the machine keeps up."""
+        """Time that the last `advance` dropped [s]; 0 if the machine keeps up."""
         return self._dropped_time
 
     @property
@@ -116,10 +117,10 @@ class EngineAdapter:
 
     @one_thread
     def step(self) -> None:
-        """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
+        """Make exactly one fixed step without the accumulator, for replays, tests and servers.
 
-        Raises: what `before_step` and `World.step` raise. If the step was not made, nothing has changed but
-            what `before_step` itself has done.
+        Raises: errors of `before_step` and `World.step`. If the step was not made, only the changes of
+            `before_step` remain.
         """
         if self._before_step is not None:
             self._before_step(self._world)
@@ -131,28 +132,28 @@ class EngineAdapter:
             self._rollback.save()
 
     def _step_within(self, budget: Budget) -> None:
-        """Make a step for which a budget chooses what is given up."""
+        """Make a step with the levels and skipped bodies that a budget chooses."""
         step = self._world.step_count
         try:
             budget.prepare(self._rewind_ticks)
             start = perf_counter()
             self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
-            budget.note(perf_counter() - start)
+            budget.record(perf_counter() - start)
         except BaseException:
             if self._world.step_count == step:
-                budget.take_back()
+                budget.revert()
             raise
 
     @one_thread
     def advance(self, frame_dt: float) -> int:
-        """Put in the time of one frame and make the steps that are due.
+        """Add the time of one frame and make the steps that are due.
 
         Args:
             frame_dt: time since the last frame [s], 0 or more.
-        Returns: how many steps were made, at most `max_steps`. Time for more is dropped, the part of a step
-            included (see `dropped_time`).
-        Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; what
-            `step` raises: the steps not made then count as dropped.
+        Returns: number of steps made, at most `max_steps`. Time for further steps is dropped, including the
+            fraction of a step (see `dropped_time`).
+        Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; errors of
+            `step`. The time of the steps that were not made then counts as dropped.
         """
         seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
         steps, dropped = self._accumulator.put(seconds)
@@ -162,62 +163,68 @@ class EngineAdapter:
             for _ in range(steps):
                 self.step()
         finally:
-            made = self._world.step_count - before  # also a step whose warning was raised
+            made = self._world.step_count - before  # counts a step whose warning was raised as an error
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
 
     def see_from(self, viewer: ArrayLike) -> None:
-        """Say where the camera is, (3,) [m]: a budget takes from the farthest bodies first.
+        """Set the position of the camera, (3,) [m]: a budget reduces the farthest bodies first.
 
         Args:
-            viewer: place of the camera, (3,) [m].
-        Raises: OptionError for what is no place; StateError without `budget_ms`.
+            viewer: position of the camera, (3,) [m].
+        Raises: OptionError for an invalid position; StateError without `budget_ms`.
         """
         self._required_budget.see_from(viewer)
 
     @property
-    def given_up(self) -> GivenUp:
-        """Which bodies are coarser than they could be, which skip steps, and whether the budget is met.
+    def budget_status(self) -> BudgetStatus:
+        """Bodies with reduced detail, bodies that skip steps, and whether the budget is met.
 
         Raises: StateError without `budget_ms`.
         """
-        return self._required_budget.given_up
+        return self._required_budget.status
+
+    @property
+    def given_up(self) -> BudgetStatus:
+        """Deprecated name of `budget_status`."""
+        warn_renamed("EngineAdapter.given_up", "EngineAdapter.budget_status")
+        return self.budget_status
 
     @property
     def _required_budget(self) -> Budget:
         if self._budget is None:
-            raise StateError("this adapter has no budget: make it with budget_ms")
+            raise StateError("this adapter has no budget: create it with budget_ms")
         return self._budget
 
     @one_thread
     def rewind(self, steps: int) -> None:
-        """Go back by that many steps, to where the world was before the inputs of the first of them.
+        """Restore the state before the inputs of the step that is `steps` back.
 
-        `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
-        picture goes on where it was.
+        `alpha` does not change: repeat the steps with `step` and the corrected inputs, and drawing continues
+        at the same time.
         Args:
             steps: number of fixed steps, from 1 to `rewind_ticks`.
         Raises: OptionError for more steps than `rewind_ticks`, or than were made since the last `restore`;
-            StateError where nothing is kept.
+            StateError without `rewind_ticks`.
         """
         if self._rollback is None:
-            raise StateError("this adapter keeps no steps: make it with rewind_ticks")
+            raise StateError("this adapter stores no steps: create it with rewind_ticks")
         back = as_count(steps, "steps")
         if back > self._world.step_count:
             raise OptionError(f"steps is {back}: the world has made {self._world.step_count}")
         self._rollback.rewind_to(self._world.step_count - back)
 
     def snapshot(self) -> bytes:
-        """See `World.snapshot`. The part of a step that `alpha` says is not in it."""
+        """See `World.snapshot`. The snapshot does not contain `alpha`."""
         return self._world.snapshot()
 
     @one_thread
     def restore(self, data: bytes) -> None:
-        """Load a state: as `World.restore`, with `alpha` 0, and `rewind` as far as to here.
+        """Restore a state as `World.restore` does. `alpha` becomes 0, and `rewind` cannot go back further.
 
         Args:
-            data: made by `snapshot`, of this world or one that was built of the same things.
+            data: result of `snapshot`, from this world or one that was built equally.
         Raises: as `World.restore`, with nothing changed.
         """
         self._world.restore(data)
@@ -232,14 +239,14 @@ class EngineAdapter:
         return self._world.state_hash()
 
     def drain_events(self) -> list[Event]:
-        """What happened in all fixed steps since the last call: see `World.drain_events`."""
+        """Return the events of all fixed steps since the last call, see `World.drain_events`."""
         return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].
+        """Positions of a body, interpolated between the previous step and the last one, float32 (n, 3) [m].
 
         Args:
-            body: of this adapter's world.
+            body: body of this adapter's world.
             out: C-contiguous float32 array to fill and return; None makes a new one.
         Raises: OptionError if `out` does not fit or the body belongs to another world; StateError if it was
             removed.
@@ -252,11 +259,12 @@ class EngineAdapter:
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Positions [m] and normals to draw, between the previous step and the last one, float32 (k, 3) each.
+        """Positions [m] and normals, interpolated between the previous and the last step, float32 (k, 3)
+        each.
 
         Args:
-            mesh: of a body of this adapter's world, see `Body.render_mesh`; a body stands for the first of
-                its `render_meshes`.
+            mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; a body stands for the
+                first of its `render_meshes`.
             positions, normals: C-contiguous float32 arrays to fill and return; None makes a new one.
         Raises: as `World.read_render_mesh`.
         """

@@ -1,4 +1,4 @@
-"""A budget of milliseconds for the steps of a world: kept by levels of detail, and by skipped steps."""
+"""Keep a time budget for the steps of a world with levels of detail and skipped steps."""
 
 from __future__ import annotations
 
@@ -16,78 +16,77 @@ from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
-"""Of the budget: what a long step is expected to take where something is given up, until it is expected to
-take FULL, and what it may take at most after levels were raised. The gaps keep levels from going up and down
-for ever."""
+"""Fractions of the budget, for the expected time of a long step: above TIGHT detail is reduced, until it is
+below FULL; detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
 
 REMEMBERED = 8
-"""Steps of which the median says what a tetrahedron costs: one that was interrupted does not count."""
+"""Number of recent steps for the median cost of a tetrahedron, which ignores interrupted steps."""
 
 SPREAD, LONG, LEAST_LONG, MOST_LONG = 240, 0.97, 1.15, 1.5
-"""A long step: of so many it is longer than this part, over the median; between these limits. Where other
-programs interrupt steps all the time, more is given up, and no more than for half as long again."""
+"""A long step is the quantile LONG of the last SPREAD steps, as a multiple of the median, clamped to
+[LEAST_LONG, MOST_LONG]. The upper limit bounds the reduction when other programs interrupt many steps."""
 
 PATIENCE = 30
-"""Steps in which nothing was given up before levels are raised: half a second of a game."""
+"""Steps without a reduction before levels are raised: 0.5 s of a game."""
 
 TRY_AGAIN = 8
-"""Steps after which it is looked again where no level could be lowered: looking takes time, too."""
+"""Steps between attempts to lower levels after an attempt found none, because the search takes time."""
 
 CHANGING = 0.25
-"""Of the budget: what changes of level may take before one step. One is made in any case."""
+"""Largest fraction of the budget for changes of level before a step. At least one change is made."""
 
 
 @dataclass(frozen=True)
-class GivenUp:
-    """What a budget has cost in detail."""
+class BudgetStatus:
+    """Detail that a time budget has reduced."""
 
-    levels: dict[Body, int]  # of bodies that are coarser than they could be
+    levels: dict[Body, int]  # levels of bodies that are coarser than their finest level
     skipping: tuple[Body, ...]  # bodies that skip steps, the farthest first: see `World.skip_step`
-    step_ms: float  # what a step takes, by the last ones
-    is_met: bool  # False where all that can be given up is, and steps take longer still
+    step_ms: float  # expected time of a step, from recent steps [ms]
+    is_met: bool  # False if steps exceed the budget although all detail is reduced
 
 
 @dataclass
 class _Decision:
-    """Of one step, by handles."""
+    """Changes for one step, by handle."""
 
     levels: list[tuple[int, int]]
     skipping: list[int]
 
 
 class Budget:
-    """Lowers the levels of the farthest bodies where steps take too long, lets the farthest skip steps where
-    that is not enough, or not yet, and gives back in the other order."""
+    """Lowers the levels of the farthest bodies if steps take too long, and lets the farthest bodies skip
+    steps if that is not enough or takes effect later. Both are reverted in reverse order."""
 
     def __init__(self, world: World, milliseconds: float) -> None:
-        """Raises: OptionError for a number that is not above 0."""
+        """Set the budget [ms]. Raises: OptionError for a number that is not above 0."""
         self.seconds = 1e-3 * as_positive(milliseconds, "budget_ms", "ms")
         self._world = world
         self._viewer: NDArray[np.float64] | None = None
-        self._costs: deque[float] = deque(maxlen=REMEMBERED)  # of a tetrahedron in a step [s]
-        self._spread: deque[float] = deque(maxlen=SPREAD)  # the same, over the median before
-        self._load = 0  # tetrahedra that move in the coming step, or moved in the last one
-        self._calm = 0  # steps since something was given up, or levels could not be raised
-        self._waits = 0  # steps until it is looked again what could be lowered
+        self._costs: deque[float] = deque(maxlen=REMEMBERED)  # cost of a tetrahedron in recent steps [s]
+        self._spread: deque[float] = deque(maxlen=SPREAD)  # the same over the median before
+        self._load = 0  # tetrahedra that move in the next step, or moved in the last one
+        self._calm = 0  # steps since a reduction, or since levels could not be raised
+        self._waits = 0  # steps until the next attempt to lower levels
         self._skips = Skips(world, self._from_near)
         self._decided: dict[int, _Decision] = {}  # by step
-        self._newest = -1  # step that was decided last
-        self._before: bytes | None = None  # the world before the present choice, where it may be taken back
+        self._newest = -1  # last decided step
+        self._before: bytes | None = None  # state before the current choice, to revert it
 
     def see_from(self, viewer: ArrayLike) -> None:
-        """Where distances are measured from, (3,) [m]."""
+        """Set the point from which distances are measured, (3,) [m]."""
         self._viewer = as_vector(viewer, "viewer", "m")
 
     @property
-    def given_up(self) -> GivenUp:
-        """As things are."""
+    def status(self) -> BudgetStatus:
+        """Current status."""
         levels = {body: body.level for body in self._world.bodies if body.level}
         skipping = tuple(body for body in self._skips.slow if body.is_alive)
         expected = self._expected(self._load if skipping else self._tets())
-        return GivenUp(levels, skipping, 1e3 * expected, expected <= self.seconds)
+        return BudgetStatus(levels, skipping, 1e3 * expected, expected <= self.seconds)
 
-    def note(self, seconds: float) -> None:
-        """Take note of what the last step took [s]."""
+    def record(self, seconds: float) -> None:
+        """Record the time of the last step [s]."""
         if self._load:
             cost = seconds / self._load
             usual = median(self._costs) if len(self._costs) == REMEMBERED else 0.0
@@ -96,10 +95,9 @@ class Budget:
             self._costs.append(cost)
 
     def prepare(self, ticks: int) -> None:
-        """Choose levels for the coming step and who skips it; keep the choice for as long as `ticks` steps.
+        """Choose levels and skipped bodies for the next step, and store the choice for `ticks` steps.
 
-        A step that was made before and is made again, after `rewind`, gets the levels that it had then: the
-        clock decides once.
+        A step that is repeated after `rewind` gets its earlier levels, so that the clock decides only once.
         """
         step, self._before = self._world.step_count, None
         if step <= self._newest:
@@ -116,8 +114,8 @@ class Budget:
         for old in [each for each in self._decided if each < step - ticks]:
             del self._decided[old]
 
-    def take_back(self) -> None:
-        """Undo what the last `prepare` changed: its step was refused, and is chosen for anew."""
+    def revert(self) -> None:
+        """Undo the changes of the last `prepare`, because its step was refused."""
         if self._before is not None:
             undo(self._world, self._before)
         step = self._world.step_count
@@ -126,12 +124,12 @@ class Budget:
             self._decided.pop(step, None)
 
     def _keep(self) -> None:
-        """Before a change: keep the world as it is, where the coming step may be refused."""
+        """Store the state before a change, because the next step may be refused."""
         if self._before is None:
             self._before = keep(self._world)
 
     def restart(self) -> None:
-        """The world was put to another state: what was decided belongs to another course of events."""
+        """Discard all decisions, because the world was restored to another state."""
         self._decided.clear()
         self._skips.restart()
         self._newest, self._calm, self._waits = -1, 0, 0
@@ -141,7 +139,7 @@ class Budget:
         skipping: list[Body] = []
         if decision is not None:
             for serial, level in decision.levels:
-                if serial in bodies:  # with other inputs something may hold it now
+                if serial in bodies:  # other inputs may have removed it
                     self._has_changed(bodies[serial], level)
             skipping = [bodies[serial] for serial in decision.skipping if serial in bodies]
         self._let_skip(skipping)
@@ -153,22 +151,22 @@ class Budget:
         self._load = self._tets() - sum(len(body.tets) for body in skipping)
 
     def _tets(self) -> int:
-        """Tetrahedra of all bodies."""
+        """Number of tetrahedra of all bodies."""
         return sum(len(body.tets) for body in self._world.bodies)
 
     def _expected(self, load: float) -> float:
-        """What a step takes with so many tetrahedra [s]."""
+        """Expected time of a step with `load` tetrahedra [s]."""
         return load * median(self._costs) if self._costs else 0.0
 
     def _long(self, load: float) -> float:
-        """What a long step takes with so many tetrahedra [s]."""
+        """Expected time of a long step with `load` tetrahedra [s]."""
         longer = LEAST_LONG
         if len(self._spread) >= PATIENCE:
             longer = sorted(self._spread)[int(LONG * len(self._spread))]
         return self._expected(load) * min(max(longer, LEAST_LONG), MOST_LONG)
 
     def _skip(self, load: int, spent: float) -> list[Body]:
-        """Let bodies skip the coming step, where changes have taken so long before it [s]."""
+        """Let bodies skip the next step. `spent` is the time of changes before it [s]."""
         left = self.seconds - min(spent, 2 * CHANGING * self.seconds)
         long = self._long(load)
         is_full = long > (FULL if self._skips.slow else TIGHT) * left
@@ -177,13 +175,16 @@ class Budget:
         return skipping
 
     def _changes(self, load: int, start: float) -> list[tuple[Body, int]]:
-        """Make those that are due."""
+        """Make the changes of level that are due."""
         if self._long(load) > (FULL if self._skips.slow else TIGHT) * self.seconds:
             return self._lowered(load, start)
         return self._raised(load, start) if self._calm >= PATIENCE else []
 
     def _lowered(self, load: float, start: float) -> list[tuple[Body, int]]:
-        """The farthest first, by one level each, until a step is expected to fit. Sleepers cost nothing."""
+        """Lower the farthest bodies first, by one level each, until a step is expected to fit the budget.
+
+        Sleeping bodies are skipped, because they cost nothing.
+        """
         if self._waits:
             self._waits -= 1
             return []
@@ -199,7 +200,7 @@ class Budget:
         return changes
 
     def _raised(self, load: float, start: float) -> list[tuple[Body, int]]:
-        """The nearest first, by one level each, as long as a step is expected to fit."""
+        """Raise the nearest bodies first, by one level each, while a step is expected to fit the budget."""
         changes: list[tuple[Body, int]] = []
         for body in self._from_near(self._with_levels(-1)):
             finer = body.level - 1
@@ -213,24 +214,24 @@ class Budget:
         return changes
 
     def _is_late(self, start: float) -> bool:
-        """Whether changes since a moment take too long for one frame."""
+        """True if the changes since `start` take too long for one frame."""
         return perf_counter() - start > CHANGING * self.seconds
 
     def _with_levels(self, change: int) -> list[Body]:
-        """Bodies whose level may change by 1 or -1, by slot."""
+        """Bodies whose level can change by `change` (1 or -1), by slot."""
         return [body for body in self._world.bodies if 0 <= body.level + change < len(body.asset.levels)]
 
     def _from_near(self, bodies: list[Body]) -> list[Body]:
-        """From the nearest to the farthest; by slot where nobody looks."""
+        """Sort bodies from the nearest to the farthest, or by slot without a viewer."""
         if self._viewer is None:
             return sorted(bodies, key=lambda body: body.index)
         apart = [float(np.linalg.norm(body.center_of_mass() - self._viewer)) for body in bodies]
         return [bodies[i] for i in np.argsort(apart, kind="stable")]
 
     def _has_changed(self, body: Body, level: int) -> bool:
-        """Change the level of a body, unless something bars it: see `Body.set_level`.
+        """Change the level of a body, and return False if that is refused, see `Body.set_level`.
 
-        What is held gets no coarser: a player may have it in hand.
+        Bodies that are held do not get coarser, because a player may be holding them.
         """
         if body.is_held and level > body.level:
             return False

@@ -1,4 +1,4 @@
-"""Fixed steps out of frames of any length."""
+"""Convert frames of any length to fixed steps."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from taichi_soft.core.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
-"""Part of a step that may be missing when the step is due. Sums of frame times are rounded: six frames of
-1/60 s are not quite 1/10 s. A billionth covers the rounding of years of frames and is never seen."""
+"""Tolerance for when a step is due [steps]. Sums of frame times are rounded: six frames of 1/60 s are not
+exactly 1/10 s. A billionth covers the rounding of years of frames and is invisible."""
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """How a game loop's time is cut into steps.
+    """Division of a game loop's time into steps.
 
     Args:
-        dt: length of one step [s], as `World.step` takes it.
-        substeps: equal parts of a step, 1 or more; None: the world chooses what is stable.
-        max_steps: most steps that one frame may make, 1 or more. Time beyond is dropped: a machine too slow
-            for the simulation then shows slow motion, not ever longer frames.
+        dt: length of a step [s], see `World.step`.
+        substeps: number of equal substeps of a step, 1 or more; None lets the world choose a stable number.
+        max_steps: largest number of steps per frame, 1 or more. Further time is dropped: a machine too slow
+            for the simulation then shows slow motion instead of longer and longer frames.
     Raises: OptionError for a value out of range.
     """
 
@@ -35,9 +35,9 @@ class FixedStep:
 
 
 class Accumulator:
-    """Time put in, given out again in whole steps.
+    """Accumulates frame times and divides them into steps.
 
-    At any moment: time put in = steps given out * dt + time dropped + `remainder`.
+    Invariant: sum of frame times = steps * dt + dropped time + `remainder`.
     """
 
     def __init__(self, fixed_step: FixedStep) -> None:
@@ -47,11 +47,11 @@ class Accumulator:
 
     @property
     def alpha(self) -> float:
-        """`remainder` as a part of dt, at least 0 and below 1."""
+        """`remainder` over dt, at least 0 and below 1."""
         return max(self.remainder / self._dt, 0.0)
 
     def put(self, frame_dt: float) -> tuple[int, float]:
-        """Put in a frame [s], 0 or more and finite. Returns: steps that are due, time dropped [s]."""
+        """Add a frame time [s], 0 or more and finite. Returns: number of due steps, and dropped time [s]."""
         waiting = self.remainder + frame_dt
         due = waiting / self._dt + ROUND_OFF
         if due >= self._max_steps + 1:

@@ -1,4 +1,4 @@
-"""Going back a few steps, to make them again with inputs that came late."""
+"""Go back a few steps, to repeat them with inputs that arrived late."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from taichi_soft.core.checks import as_count
 class Rollback:
     """Snapshots of the last steps of a world.
 
-    What is kept is one course of events. Where others call `World.restore`, to load a game say, it is not
-    what led to the present state: `steps` is empty then, and `save` begins anew.
+    If other code calls `World.restore`, for example to load a game, the snapshots no longer lead to the
+    current state. `steps` is then empty, and `save` starts again.
 
     Args:
-        world: built.
-        ticks: how many steps it is possible to go back, 1 or more. Each takes the size of a snapshot.
-    Raises: OptionError for what is no world or no count; StateError if the world is not built.
+        world: a built world.
+        ticks: number of steps to store, 1 or more. Each takes the memory of a snapshot.
+    Raises: OptionError for wrong arguments; StateError if the world is not built.
     Example:
         rollback = Rollback(world, ticks=30)
         for tick in range(10):
@@ -32,47 +32,45 @@ class Rollback:
         self._world = world
         self._ticks = as_count(ticks, "ticks")
         self._snapshots: dict[int, bytes] = {}  # by the world's step count, ascending
-        self._restore_count = world.restore_count  # of the world when they were all of its own past
+        self._restore_count = world.restore_count  # the world's, while the snapshots are its past
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """Step counts that it is possible to go back to, ascending."""
+        """Step counts that can be restored, ascending."""
         return tuple(self._snapshots) if self._is_past else ()
 
     @property
     def _is_past(self) -> bool:
-        """Whether what is kept led to the present state."""
+        """True if the snapshots lead to the current state."""
         return self._restore_count == self._world.restore_count
 
     def save(self) -> None:
-        """Keep the state as it is now: between a step and the inputs of the next."""
+        """Store the current state. Call it between a step and the inputs of the next one."""
         if not self._is_past:
             self._snapshots.clear()
             self._restore_count = self._world.restore_count
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks + 1:  # the present one is not a step back
+        while len(self._snapshots) > self._ticks + 1:  # the current state is not a step back
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:
-        """Put the world back to where `save` was called at that step count; what was saved later is dropped.
+        """Restore the state that `save` stored at a step count, and drop later ones.
 
         Args:
             step: one of `steps`.
-        Raises: OptionError for a step that is not among `steps`, with nothing changed.
+        Raises: OptionError for a step that is not in `steps`, with nothing changed.
         """
         wanted = as_count(step, "step", 0)
         if not self._is_past:
             raise OptionError(
-                f"step {wanted} is not kept: the world was restored since, to where other steps led. Rewind "
-                "after the next save"
+                f"step {wanted} is not stored: the world was restored to another state since. "
+                "Rewind after the next save"
             )
         if wanted not in self._snapshots:
             kept = f"{self.steps[0]} to {self.steps[-1]}" if self._snapshots else "none yet"
-            raise OptionError(
-                f"step {wanted} is not kept (kept: {kept}): save more ticks, or rewind less far"
-            )
+            raise OptionError(f"step {wanted} is not stored (stored: {kept}): use more ticks, or rewind less")
         self._world.restore(self._snapshots[wanted])
         self._restore_count = self._world.restore_count
         for later in [each for each in self._snapshots if each > wanted]:

@@ -1,4 +1,4 @@
-"""One machine's side of a game of several players, whose inputs come late over a network."""
+"""Rollback netcode: one machine's side of a game whose inputs arrive late over a network."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class SessionError(TaichiSoftError, ValueError):
 
 
 class _Message(NamedTuple):
-    """The fields of `HEAD`, then for each player how many of his ticks the sender knows, then inputs."""
+    """The fields of `HEAD`, then the number of known ticks of each player, then inputs."""
 
     mark: bytes
-    start: int  # hash of the state in which the session began
+    start: int  # hash of the session's initial state
     player: int
     players: int
     input_size: int
     ticks: int
     hash_every: int
-    tick: int  # that the sender makes next
-    hash_tick: int  # of the newest hash that no late input can change, or NO_TICK
+    tick: int  # next tick of the sender
+    hash_tick: int  # tick of the newest hash that no late input can change, or NO_TICK
     hash: int
     first: int  # tick of the first input
     input_count: int
@@ -43,7 +43,7 @@ class _Message(NamedTuple):
 
 
 class RollbackSession:
-    """Make ticks with predicted inputs, and make them again where a prediction was wrong.
+    """Makes ticks with predicted inputs, and repeats them if a prediction was wrong.
 
     Each machine runs the same world and has its own session. `advance` makes a tick with the input of the
     own player. It predicts that the others repeat their last known inputs. `message` returns a datagram for
@@ -52,18 +52,19 @@ class RollbackSession:
     arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
-        world: built of the same script on all machines, at the same step.
+        world: world built by the same script on all machines, at the same step.
         act: function that applies the inputs of all players, by player, before each step. It must depend on
-            these and the world only: a tick may be made several times.
+            these and the world only, because a tick can be made several times.
         player: number of the own player, from 0.
-        players: how many there are, 2 to 16.
-        input_size: bytes of each input, 1 to 64. Before the first one of a player, zeros are used.
+        players: number of players, 2 to 16.
+        input_size: size of an input [bytes], 1 to 64. Zeros stand for inputs before a player's first one.
         step: length and substeps of each tick.
         ticks: largest number of ticks made on predictions, 1 to 1000. Each takes the memory of a snapshot.
-        delay: ticks after which an own input is used, 0 to `ticks`. A larger delay makes rewinds shorter, and
-            the own player's answer later.
-        hash_every: ticks between two comparisons of hashes, 1 to 10000.
-        patience: calls of `advance` in a row that may wait for another player before it raises an error.
+        delay: ticks until an own input takes effect, 0 to `ticks`. A larger delay shortens rewinds and
+            increases input latency.
+        hash_every: ticks between comparisons of hashes, 1 to 10000.
+        patience: largest number of consecutive `advance` calls that wait for another player; after it,
+            `advance` raises an error.
     Raises: OptionError for an argument out of range; StateError if the world is not built.
     Example:
         session = RollbackSession(world, lambda inputs: None, player=0, input_size=1)
@@ -105,11 +106,11 @@ class RollbackSession:
         blank = bytes(self._input_size)
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # known ones, by player and tick
         self._used: dict[int, Inputs] = {}  # by tick
-        self._heard = [first] * self._players  # of each player all inputs before this tick are known
-        self._acknowledged = [first] * self._players  # tick up to which each other knows the own inputs
+        self._heard = [first] * self._players  # by player: all inputs before this tick are known
+        self._acknowledged = [first] * self._players  # by player: tick up to which it knows our inputs
         for _ in range(self._delay):
             self._learn(self._player, blank)
-        self._wrong: int | None = None  # first tick that was made with a wrong prediction
+        self._wrong: int | None = None  # first tick with a wrong prediction
         self._hashes: dict[int, int] = {}  # own ones, by tick
         self._their_hashes: dict[tuple[int, int], int] = {}  # not compared yet, by tick and player
         self._newest = [first] * self._players  # tick of the newest message
@@ -132,13 +133,13 @@ class RollbackSession:
     def ahead(self) -> float:
         """Ticks by which this machine is ahead of the slowest other one, estimated; negative if it is behind.
 
-        A game that skips a tick now and then while this is above 1 spares itself and the others long rewinds.
+        A game that occasionally skips a tick while this is above 1 avoids long rewinds for all machines.
         """
         return max(self._leads[each] for each in self._others)
 
     @property
     def desync(self) -> int | None:
-        """First compared tick that began in another state on another machine; None if all states agreed."""
+        """First compared tick whose initial state differs on another machine; None if all states agree."""
         return self._desync
 
     @property
@@ -148,18 +149,18 @@ class RollbackSession:
 
     @property
     def longest_rewind(self) -> int:
-        """The most ticks that one rewind went back."""
+        """Largest number of ticks that one rewind went back."""
         return self._longest_rewind
 
     def advance(self, own_input: bytes) -> bool:
         """Correct wrong predictions, then make a tick.
 
         Args:
-            own_input: what the own player does, `input_size` bytes. It is used `delay` ticks later.
-        Returns: False if no tick was made, because `ticks` are made on predictions already. Call it again in
-            the next frame, and go on sending messages.
-        Raises: OptionError for an input of another size; SessionError after `patience` calls in a row that
-            made no tick; what `act` and `World.step` raise: the tick was not made then.
+            own_input: input of the own player, `input_size` bytes. It takes effect `delay` ticks later.
+        Returns: False if no tick was made, because `ticks` ticks are already predicted. Call it again in the
+            next frame, and keep sending messages.
+        Raises: OptionError for an input of another size; SessionError after `patience` consecutive calls
+            without a tick; errors of `act` and `World.step`, which leave the tick unmade.
         """
         if not isinstance(own_input, bytes) or len(own_input) != self._input_size:
             raise OptionError(f"own_input must be {self._input_size} bytes, got {own_input!r}")
@@ -181,11 +182,11 @@ class RollbackSession:
         return True
 
     def settle(self) -> int:
-        """Make again the ticks that were made with wrong predictions, as `advance` does first.
+        """Repeat the ticks with wrong predictions. `advance` does this first.
 
-        Returns: how many ticks were repeated.
-        Raises: SessionError if the world was stepped by others; what `act` and `World.step` raise: the next
-            call goes on with the tick that was not made.
+        Returns: number of repeated ticks.
+        Raises: SessionError if other code stepped the world; errors of `act` and `World.step`. The next call
+            continues with the tick that failed.
         """
         if self._wrong is not None:
             self._rollback.rewind_to(self._wrong)
@@ -195,7 +196,7 @@ class RollbackSession:
         missing = self._tick - self._world.step_count
         if missing < 0:
             raise SessionError(
-                f"the world made {-missing} steps outside its session: call RollbackSession.advance only"
+                f"the world made {-missing} steps outside its session: call only RollbackSession.advance"
             )
         while self._world.step_count < self._tick:
             self._make_tick()
@@ -203,10 +204,11 @@ class RollbackSession:
         return missing
 
     def message(self) -> bytes:
-        """A datagram for all other machines. Send one after each call of `advance`, whatever it returned."""
+        """Return a datagram for all other machines. Send one after each call of `advance`, even if it
+        returned False."""
         first, end = min(self._acknowledged[each] for each in self._others), self._heard[self._player]
         own = [self._inputs[self._player][tick] for tick in range(first, end)]
-        # A state that a rewind is going to change, or some later input can change, has no hash to send.
+        # Send no hash of a state that a rewind or a late input can still change.
         final = min(self.confirmed, self._tick if self._wrong is None else self._wrong)
         tick = max((each for each in self._hashes if each <= final), default=NO_TICK)
         settings = self._player, self._players, self._input_size, self._ticks, self._hash_every
@@ -214,13 +216,13 @@ class RollbackSession:
         return HEAD.pack(*head) + struct.pack(f"<{self._players}I", *self._heard) + b"".join(own)
 
     def receive(self, data: bytes) -> None:
-        """Take a message of another machine. It may be late, a copy, or out of order.
+        """Read a message of another machine. It can be late, repeated or out of order.
 
-        The next call of `advance` or `settle` repeats the ticks that it proves wrong.
+        The next call of `advance` or `settle` repeats the ticks that it corrects.
         Args:
-            data: what `message` returned there.
+            data: result of `message` on the other machine.
         Raises: SessionError for a message that is damaged, belongs to another session, world or version, or
-            contradicts an earlier message of its player. The text says which, and nothing is changed.
+            contradicts an earlier message of its player. The text says which. Nothing is changed.
         """
         message = self._read(data)
         other = message.player
@@ -236,8 +238,8 @@ class RollbackSession:
             self._their_hashes[message.hash_tick, other] = message.hash
         if message.tick > self._newest[other]:
             self._newest[other] = message.tick
-            # Each machine sees the other one late. If the network is as slow in both directions, half of the
-            # difference is the lead of this machine.
+            # Each machine sees the other one late. If the latency is equal in both directions, half of the
+            # difference is this machine's lead.
             lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 
@@ -245,8 +247,8 @@ class RollbackSession:
         """Parse and check a message. Raises: SessionError."""
         body = HEAD.size + 4 * self._players
         if not isinstance(data, (bytes, bytearray)) or len(data) < body or data[:4] != MARK:
-            raise SessionError("these bytes are no message of a session of this version")
-        data = bytes(data)  # a copy: the buffer may be used again
+            raise SessionError("these bytes are not a message of a session of this version")
+        data = bytes(data)  # a copy, because the caller may reuse the buffer
         size = self._input_size
         parts: list[Any] = [*HEAD.unpack_from(data)]
         parts.append(struct.unpack_from(f"<{self._players}I", data, HEAD.size))
@@ -256,14 +258,18 @@ class RollbackSession:
         ours = self._players, self._input_size, self._ticks, self._hash_every
         if theirs != ours:
             names = "players, input_size, ticks, hash_every"
-            raise SessionError(f"{names} are {theirs} there and {ours} here: give all sessions the same")
+            raise SessionError(
+                f"{names} are {theirs} there and {ours} here: use the same values on all machines"
+            )
         if message.start != self._start:
             raise SessionError(
-                f"the other world began in the state {message.start:016x}, this one in {self._start:016x}: "
+                f"the other world's initial state is {message.start:016x}, this one's is {self._start:016x}: "
                 "run the same script, of the same version, on all machines"
             )
         if message.player not in self._others:
-            raise SessionError(f"player {message.player} is no other player: here is player {self._player}")
+            raise SessionError(
+                f"player {message.player} is not another player: this machine is player {self._player}"
+            )
         if len(data) != body + size * message.input_count:
             raise SessionError(
                 f"a message of {message.input_count} inputs has {len(data)} bytes: it is damaged"
@@ -272,30 +278,32 @@ class RollbackSession:
         return message
 
     def _require_order(self, message: _Message) -> None:
-        """Compare a message with what is known. Raises: SessionError."""
+        """Check that a message agrees with earlier ones. Raises: SessionError."""
         who, known = f"player {message.player}", self._inputs[message.player]
         due = self._heard[message.player]
         if message.first > due:
             raise SessionError(
                 f"{who} sends no input before tick {message.first}, and that of {due} is missing"
             )
-        most = self._heard[self._player] + 2 * self._ticks  # a machine that waits as it has to is not beyond
+        most = self._heard[self._player] + 2 * self._ticks  # a correct machine waits before it
         hash_tick = -1 if message.hash_tick == NO_TICK else message.hash_tick
         if max(message.first + message.input_count, message.tick, hash_tick) > most:
-            raise SessionError(f"{who} is beyond tick {most}, which no machine of this session can be yet")
+            raise SessionError(
+                f"{who} is beyond tick {most}, which no machine of this session can have reached"
+            )
         if message.heard[self._player] > self._heard[self._player]:
-            raise SessionError(f"{who} acknowledges an input that was not sent yet: the message is damaged")
+            raise SessionError(f"{who} acknowledges an input that was not sent: the message is damaged")
         for tick, each in enumerate(message.inputs, message.first):
             if known.get(tick, each) != each:
                 raise SessionError(f"{who} sends another input for tick {tick} than before")
 
     def _learn(self, player: int, value: bytes) -> None:
-        """Keep the next input of a player."""
+        """Store the next input of a player."""
         self._inputs[player][self._heard[player]] = value
         self._heard[player] += 1
 
     def _make_tick(self) -> None:
-        """Keep the state, apply what is known or predicted, and make a step; or change nothing."""
+        """Save the state, apply known or predicted inputs, and make a step. An error changes nothing."""
         tick = self._world.step_count
         self._rollback.save()
         if tick % self._hash_every == 0:
@@ -319,7 +327,7 @@ class RollbackSession:
             silent = [str(each) for each in self._others if self._heard[each] == tick]
             raise SessionError(
                 f"no input of player {' and '.join(silent)} for tick {tick} came in {self._waits} frames, "
-                f"and {self._ticks} ticks are predicted already: end the session, or go on waiting"
+                f"and {self._ticks} ticks are already predicted: end the session, or keep waiting"
             )
 
     def _compare(self) -> None:
@@ -331,7 +339,7 @@ class RollbackSession:
                     self._desync = tick if self._desync is None else min(self._desync, tick)
 
     def _forget(self) -> None:
-        """Drop what no rewind and no message can ask for."""
+        """Drop data that no rewind and no message needs."""
         confirmed = self.confirmed
         for player, known in enumerate(self._inputs):
             needed = (
@@ -348,6 +356,6 @@ class RollbackSession:
 
 
 def _drop_before(rows: dict[int, bytes] | dict[int, Inputs] | dict[int, int], tick: int) -> None:
-    """Delete what belongs to earlier ticks."""
+    """Delete entries of earlier ticks."""
     for each in [each for each in rows if each < tick]:
         del rows[each]

@@ -1,4 +1,4 @@
-"""Which bodies stand still in a step, where there is no time for all: the farthest, in turn."""
+"""Choose the bodies that skip a step when there is no time for all: the farthest ones, in turn."""
 
 from __future__ import annotations
 
@@ -9,41 +9,43 @@ from taichi_soft import Body, World
 from taichi_soft.core.handles import serial_of
 
 LEAST = 0.25
-"""Of the tetrahedra that skip steps, what moves in each: nobody skips more than three steps in a row."""
+"""Smallest fraction of skipping tetrahedra that move in each step, so that no body skips more than three
+steps in a row."""
 
 LOOK_AGAIN = 8
-"""Steps after which it is looked again who touches whom, and who is how far away."""
+"""Steps between updates of islands and distances."""
 
 
 @dataclass(frozen=True)
 class _Island:
-    """Bodies that move together or not at all."""
+    """Connected bodies, which skip a step together."""
 
     bodies: tuple[Body, ...]
     tets: int
 
 
 class Skips:
-    """Chooses islands that skip a step: half of the steps of the farthest, and more where that is not enough.
+    """Chooses islands that skip a step: the farthest skip half of their steps, and more if that is not
+    enough.
 
-    The nearest island never skips, nor does one of which something holds a body: see `Body.is_held`.
+    The nearest island and islands with a held body never skip, see `Body.is_held`.
     """
 
     def __init__(self, world: World, from_near: Callable[[list[Body]], list[Body]]) -> None:
-        """Args: from_near: puts bodies in the order of their distances."""
-        self.slow: tuple[Body, ...] = ()  # bodies that skip steps now, the farthest first
+        """Args: from_near: sorts bodies by distance, nearest first."""
+        self.slow: tuple[Body, ...] = ()  # bodies that currently skip steps, the farthest first
         self._world, self._from_near = world, from_near
-        self._islands: list[_Island] = []  # that may skip, the farthest first
-        self._looked = 0  # steps until it is looked again
-        self._waited: dict[int, int] = {}  # steps that a body has skipped in a row, by its handle
+        self._islands: list[_Island] = []  # islands that can skip, the farthest first
+        self._looked = 0  # steps until the next update of islands
+        self._waited: dict[int, int] = {}  # consecutive skipped steps of a body, by handle
 
     def restart(self) -> None:
-        """Nobody skips."""
+        """Let no body skip."""
         self.slow, self._looked = (), 0
         self._waited.clear()
 
     def choose(self, load: int, limit: float) -> list[Body]:
-        """Bodies that are to stand still, so that of `load` tetrahedra about `limit` move in a step."""
+        """Choose bodies to skip the next step, so that about `limit` of `load` tetrahedra move."""
         if load <= limit:
             self.restart()
             return []
@@ -51,7 +53,7 @@ class Skips:
         slow = self._slowed(load, limit)
         total, moving = sum(each.tets for each in slow), 0
         skipping: list[Body] = []
-        # Who has waited longest goes first, and of those who waited as long the nearest.
+        # Islands that have waited longest move first; among equals the nearest.
         for island in sorted(reversed(slow), key=self._wait, reverse=True):
             if moving < LEAST * total or load - total + moving + island.tets <= limit:
                 moving += island.tets
@@ -63,7 +65,7 @@ class Skips:
         return skipping
 
     def _look(self) -> None:
-        """Find out who touches whom."""
+        """Update the islands and their order."""
         self._looked -= 1
         if self._looked >= 0 and all(body.is_alive for island in self._islands for body in island.bodies):
             return
@@ -77,7 +79,7 @@ class Skips:
         ]
 
     def _slowed(self, load: int, limit: float) -> list[_Island]:
-        """The farthest, as many as it takes where each makes half of the steps."""
+        """Farthest islands, as many as needed if each makes half of the steps."""
         slow, mean = [], float(load)
         for island in self._islands:
             if mean <= limit:

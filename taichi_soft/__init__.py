@@ -103,12 +103,24 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 if TYPE_CHECKING:
-    from engine_adapter import EngineAdapter, FixedStep, GivenUp, Rollback, RollbackSession, SessionError
+    from engine_adapter import BudgetStatus, EngineAdapter, FixedStep, Rollback, RollbackSession, SessionError
 else:
-    _OF_ADAPTER = ("EngineAdapter", "FixedStep", "GivenUp", "Rollback", "RollbackSession", "SessionError")
+    _OF_ADAPTER = (
+        "BudgetStatus",
+        "EngineAdapter",
+        "FixedStep",
+        "Rollback",
+        "RollbackSession",
+        "SessionError",
+    )
 
     def __getattr__(name):
-        """Import the names of `engine_adapter` when one is asked for: that package imports this one."""
+        """Import `engine_adapter` at the first use of one of its names, because it imports this package."""
+        if name == "GivenUp":
+            from taichi_soft.core.renamed import warn_renamed
+
+            warn_renamed("taichi_soft.GivenUp", "taichi_soft.BudgetStatus")
+            name = "BudgetStatus"
         if name not in _OF_ADAPTER:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         import engine_adapter
@@ -124,6 +136,7 @@ __all__ = [
     "Behaviour",
     "Body",
     "BoxShape",
+    "BudgetStatus",
     "CageMesh",
     "CapsuleShape",
     "ClosestPoint",
@@ -143,7 +156,6 @@ __all__ = [
     "Frame",
     "Froze",
     "FrozenBodyWarning",
-    "GivenUp",
     "Grab",
     "HeightFieldShape",
     "Joint",

@@ -1,4 +1,4 @@
-"""Panda3D: nodes that draw soft bodies, a task that drives them, colliders and rigid bodies of a scene."""
+"""Panda3D integration: nodes that draw soft bodies, a task that steps them, colliders and rigid bodies."""
 
 from taichi_soft.core.extras import require_extra
 

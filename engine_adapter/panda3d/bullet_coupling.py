@@ -1,4 +1,4 @@
-"""Rigid bodies of Bullet and soft bodies that push each other."""
+"""Two-way coupling of Bullet's rigid bodies and soft bodies."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BulletState:
-    """Where rigid bodies were and how they moved. Made by `BulletCoupling.snapshot`."""
+    """Poses and velocities of rigid bodies. Returned by `BulletCoupling.snapshot`."""
 
-    rows: tuple[tuple[Any, ...], ...]  # one for each rigid body
+    rows: tuple[tuple[Any, ...], ...]  # one per rigid body
 
 
 class _Rigid:
-    """One rigid body, with the colliders of its shapes."""
+    """A rigid body and the colliders of its shapes."""
 
     def __init__(self, path: Any, colliders: tuple[NodeCollider, ...]) -> None:
         self.path, self.colliders = path, colliders
@@ -36,21 +36,21 @@ class _Rigid:
         return bool(node.get_mass() > 0.0 and not node.is_kinematic())
 
     def push(self) -> None:
-        """Give Bullet's body what soft bodies gave its colliders in the last step."""
+        """Apply the impulses on the colliders in the last step to Bullet's body."""
         now = self._impulses()
         if self.is_pushed:
-            # Bullet feels an impulse one step late. Half of it more, taken back in the next step, is about
-            # what it will get in the coming one: without it soft and rigid bodies would gain energy.
+            # Bullet receives impulses one step late. Adding half of the impulse now, and subtracting it in
+            # the next step, predicts the coming impulse; without it the coupled bodies gain energy.
             linear, angular = 1.5 * now - 0.5 * self.last
             node = self.path.node()
             if linear.any() or angular.any():
-                node.set_active(True)  # a sleeping one would take no notice
+                node.set_active(True)  # a sleeping body ignores impulses
                 node.apply_central_impulse(core.LVector3(*linear))
                 node.apply_torque_impulse(core.LVector3(*angular))
         self.last = now
 
     def _impulses(self) -> Floats:
-        """Sums over its colliders, about the body's own origin, (2, 3)."""
+        """Total impulse and angular impulse of its colliders, about the body's origin, (2, 3)."""
         total = np.zeros((2, 3))
         for each in self.colliders:
             collider = each.collider
@@ -61,7 +61,7 @@ class _Rigid:
 
 
 class BulletCoupling:
-    """Steps a world of Bullet together with a soft one: their bodies push each other.
+    """Steps a world of Bullet together with a soft world, with two-way coupling.
 
         coupling = BulletCoupling(world, bullet_world)
         coupling.add(crate)
@@ -69,12 +69,12 @@ class BulletCoupling:
         step = FixedStep(dt=1 / 60)
         adapter = EngineAdapter(world, step, before_step=lambda world: coupling.step(step.dt))
 
-    A rigid body has to be heavier than the soft vertices that it touches: docs/coupling.md has a table.
+    A rigid body must be heavier than the soft vertices that it touches, see the table in docs/coupling.md.
 
     Args:
-        world: of soft bodies.
-        bullet_world: BulletWorld. Nothing else may step it.
-    Raises: OptionError for other things.
+        world: world of the soft bodies.
+        bullet_world: a BulletWorld. Nothing else must step it.
+    Raises: OptionError for other arguments.
     """
 
     def __init__(self, world: World, bullet_world: Any) -> None:
@@ -93,19 +93,19 @@ class BulletCoupling:
         restitution: float | None = None,
         thickness: float = 0.0,
     ) -> tuple[NodeCollider, ...]:
-        """Let soft bodies and a rigid body push each other. One without mass, or kinematic, only pushes.
+        """Couple a rigid body to the soft bodies. A static or kinematic body pushes but is not pushed.
 
         Args:
             path: NodePath of a BulletRigidBodyNode that is attached to the Bullet world.
-            friction, restitution, thickness: as in `add_colliders`.
+            friction, restitution, thickness: see `add_colliders`.
         Returns: the colliders of its shapes.
-        Raises: as `add_colliders`; OptionError for another node or one that was added before.
+        Raises: as `add_colliders`; OptionError for another node, or one that was already added.
         """
         node = path.node()
         if not isinstance(node, bullet.BulletRigidBodyNode):
             raise OptionError(f"node {node.name!r} must be a BulletRigidBodyNode, got {type(node).__name__}")
         if any(each.path == path for each in self._rigid):
-            raise OptionError(f"node {node.name!r} was added before")
+            raise OptionError(f"node {node.name!r} was already added")
         colliders = add_colliders(
             self._world, path, friction=friction, restitution=restitution, thickness=thickness
         )
@@ -116,8 +116,8 @@ class BulletCoupling:
         """Remove the colliders of a rigid body.
 
         Args:
-            path: node path of the rigid body, as `add` was given it.
-        Raises: OptionError for one that was not added.
+            path: node path that was passed to `add`.
+        Raises: OptionError for a body that was not added.
         """
         for each in self._rigid:
             if each.path == path:
@@ -128,26 +128,25 @@ class BulletCoupling:
         raise OptionError(f"node {path.get_name()!r} was not added")
 
     def step(self, dt: float) -> None:
-        """One step of Bullet of `dt` [s], to call in `before_step`.
+        """Step Bullet by `dt` [s]. Call this in `before_step`.
 
-        Rigid bodies first get what soft ones gave them in the last step. Colliders then go where Bullet took
-        their bodies.
+        First, the rigid bodies receive the impulses of soft bodies from the last step. After Bullet's step,
+        the colliders follow their bodies.
         Args:
             dt: length of the step [s].
         """
         for each in self._rigid:
             each.push()
-        # No substeps: with them Bullet shows its bodies one step late, and what is pushed late gains energy.
+        # No substeps: with them Bullet reports poses one step late, and late contacts gain energy.
         self._bullet.do_physics(dt, 0)
         for each in self._rigid:
             for one in each.colliders:
                 one.follow()
 
     def snapshot(self) -> BulletState:
-        """Where the rigid bodies are and how they move. Take it together with `World.snapshot`.
+        """Return poses and velocities of the rigid bodies. Call it together with `World.snapshot`.
 
-        What Bullet remembers of its own contacts is not in it: what follows is the same to the eye, not to
-        the bit.
+        It does not contain Bullet's contact cache, so a restored run looks the same but is not bit-identical.
         """
         rows = []
         for each in self._rigid:
@@ -157,14 +156,16 @@ class BulletCoupling:
         return BulletState(tuple(rows))
 
     def restore(self, state: BulletState) -> None:
-        """Put the rigid bodies back, after `World.restore` has put their colliders back.
+        """Restore the rigid bodies. Call it after `World.restore`, which restores their colliders.
 
         Args:
-            state: made by `snapshot`.
-        Raises: OptionError where others were added or removed since, with nothing changed.
+            state: result of `snapshot`.
+        Raises: OptionError if rigid bodies were added or removed since, with nothing changed.
         """
         if [row[0] for row in state.rows] != [each.path for each in self._rigid]:
-            raise OptionError("the coupling has other rigid bodies than at its snapshot: add or remove them")
+            raise OptionError(
+                "rigid bodies were added or removed since the snapshot: restore the same set first"
+            )
         for each, (path, transform, linear, angular, last) in zip(self._rigid, state.rows, strict=True):
             node = path.node()
             path.set_transform(transform)

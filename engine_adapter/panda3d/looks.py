@@ -1,4 +1,4 @@
-"""How an artist's mesh looks in Panda3D: its texture and its colour, from trimesh's `visual`."""
+"""Convert texture and colour of an artist's mesh from trimesh's `visual` to Panda3D."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from panda3d import core
 
-_UNSAID = np.full(3, 102 / 255)
-"""The grey that trimesh gives a material without a colour."""
+_UNSET = np.full(3, 102 / 255)
+"""The grey that trimesh assigns to a material without a colour."""
 
-_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material: bodies of one asset share them
+_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material, shared by the bodies of an asset
 
 
 def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
-    """Where each of `count` vertices lies on the texture, float32 (count, 2) from 0 to 1, v upwards.
+    """Texture coordinates of `count` vertices, float32 (count, 2) from 0 to 1, v upwards.
 
-    None where there is no texture. trimesh and Panda3D both count v from the lowest row.
+    None without a texture. In trimesh and in Panda3D, v starts at the lowest row.
     """
     if getattr(visual, "kind", None) != "texture" or _picture(visual.material) is None:
         return None
@@ -28,16 +28,16 @@ def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
 
 
 def vertex_colors(visual: Any, count: int) -> NDArray[np.float32] | None:
-    """Colour of each of `count` vertices, float32 (count, 4) from 0 to 1; None where the mesh has none."""
+    """Colours of `count` vertices, float32 (count, 4) from 0 to 1; None if the mesh has none."""
     if getattr(visual, "kind", None) not in ("vertex", "face") or len(visual.vertex_colors) != count:
         return None
     return np.asarray(np.asarray(visual.vertex_colors) / 255.0, dtype=np.float32)
 
 
 def render_state(visual: Any, is_textured: bool) -> Any:
-    """Panda3D's RenderState with the texture and the colour of a material, empty where there is neither.
+    """RenderState of Panda3D with the texture and the colour of a material, empty if it has neither.
 
-    A game that wants another colour gives it a priority: `node.set_color(red, 1)`.
+    To override the colour, set one with a priority: `node.set_color(red, 1)`.
     """
     state = core.RenderState.make_empty()
     if getattr(visual, "kind", None) != "texture":
@@ -50,19 +50,19 @@ def render_state(visual: Any, is_textured: bool) -> Any:
         scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
         color = np.ones(4)
         color[: len(factor)] = np.asarray(factor, dtype=np.float64) / scale
-        if is_textured or not np.allclose(color[:3], _UNSAID):
+        if is_textured or not np.allclose(color[:3], _UNSET):
             state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(*color)))
     return state
 
 
 def _picture(material: Any) -> Any:
-    """Pillow's image of a material, or None."""
+    """Image of a material (Pillow), or None."""
     found = getattr(material, "baseColorTexture", None)
     return getattr(material, "image", None) if found is None else found
 
 
 def _texture(material: Any) -> Any:
-    """Its core.Texture, made once for each material that lives."""
+    """core.Texture of a material, cached while the material exists."""
     kept = _textures.get(id(material))
     if kept is not None and kept[0]() is material:
         return kept[1]

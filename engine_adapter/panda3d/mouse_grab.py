@@ -1,4 +1,4 @@
-"""A hand at the end of the mouse: it takes hold of soft bodies and pulls them about."""
+"""Grab and drag soft bodies with the mouse."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from taichi_soft import Body, Grab, OptionError, World
 Floats = NDArray[np.float64]
 
 _GRAZING = 1e-3
-"""Cosine to the plane's normal from which on a ray meets the plane too far away to follow it."""
+"""Smallest cosine between a ray and the plane's normal; flatter rays hit the plane too far away."""
 
 
 class MouseGrab:
-    """Takes hold of the body under the mouse while a button is down.
+    """Grabs the body under the mouse while a button is down.
 
-    The point that was picked follows the mouse in the plane through it that faces the camera.
+    The picked point follows the mouse in the plane through it that faces the camera.
 
     Args:
         base: the game's ShowBase.
-        world: built.
-        button: event of the mouse button; None binds none, and the game calls `press`, `move` and `release`.
-        bodies: that can be taken hold of; None for all.
-        frequency, max_force: of the pull, see `World.grab`.
-        sort: of the task that follows the mouse: before that of the world's step.
-    Raises: OptionError for what is no world.
+        world: a built world.
+        button: event of the mouse button; with None the game calls `press`, `move` and `release` itself.
+        bodies: bodies that can be grabbed; None for all.
+        frequency, max_force: strength of the grab, see `World.grab`.
+        sort: sort of the task that follows the mouse; it must run before the world's step.
+    Raises: OptionError if `world` is not a World.
     """
 
     def __init__(
@@ -57,17 +57,17 @@ class MouseGrab:
 
     @property
     def grab(self) -> Grab | None:
-        """The hold it has on a body; None where it has none, or the body is gone."""
+        """Current grab; None if there is none or the body was removed."""
         if self._grab is not None and not self._grab.is_held:
             self._grab = None
         return self._grab
 
     def press(self, x: float, y: float) -> bool:
-        """Take hold of what is seen at a point of the window, -1 to 1 from left to right and from below.
+        """Grab the body that is visible at a point of the window.
 
         Args:
             x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
-        Returns: whether there was a body.
+        Returns: True if a body was hit.
         Raises: as `World.grab`.
         """
         self.release()
@@ -86,7 +86,7 @@ class MouseGrab:
         return self._grab is not None
 
     def move(self, x: float, y: float) -> None:
-        """Pull to where the ray through a point of the window meets the plane; nothing where it does not.
+        """Move the grab to the point where the ray through a window point hits the plane, if it does.
 
         Args:
             x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
@@ -101,21 +101,21 @@ class MouseGrab:
             self.grab.move(near + distance * along)
 
     def release(self) -> None:
-        """Let go, if anything is held."""
+        """Release the grab, if there is one."""
         if self.grab is not None:
             self.grab.release()
         self._grab = None
 
     def ray(self, x: float, y: float) -> tuple[Floats, Floats]:
-        """Where the line of sight through a point of the window begins and ends, (3,) [m] each.
+        """Return start and end of the line of sight through a window point, (3,) [m] each.
 
         Args:
             x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
-        Raises: OptionError where the camera's lens knows no such line.
+        Raises: OptionError if the camera's lens has no such line.
         """
         ends = core.LPoint3(), core.LPoint3()
         if not self._base.camLens.extrude(core.LPoint2(x, y), *ends):
-            raise OptionError(f"the lens of the camera sees nothing at ({x}, {y})")
+            raise OptionError(f"the camera's lens has no line of sight at ({x}, {y})")
         near, far = (self._base.render.get_relative_point(self._base.cam, end) for end in ends)
         return np.array(near, dtype=np.float64), np.array(far, dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""Colliders that are where nodes of the scene graph are."""
+"""Colliders that follow nodes of the scene graph."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from taichi_soft import Collider, OptionError, World
 
 
 class NodeCollider:
-    """One shape of a node as a collider. Made by `add_colliders`.
+    """A collider for one shape of a node. Returned by `add_colliders`.
 
     Attributes:
         path: NodePath of the node.
-        collider: that bodies hit.
+        collider: collider of the shape.
     """
 
     def __init__(self, path: Any, placed: PlacedShape, collider: Collider) -> None:
-        """Made by `add_colliders`."""
+        """Use `add_colliders` instead."""
         self.path, self.collider = path, collider
         self._placed = placed
 
@@ -28,15 +28,15 @@ class NodeCollider:
         return f"NodeCollider({self.path.get_name()!r}, {self.collider!r})"
 
     def follow(self) -> None:
-        """Be where the node is at the end of the coming step, and push what is on the way there.
+        """Move the collider to the node's pose over the next step, pushing bodies on the way.
 
-        Call it in `before_step`, after the node was moved to where it is when the step ends.
-        Raises: StateError once the collider was removed.
+        Call this in `before_step`, after moving the node to its pose at the end of the step.
+        Raises: StateError after the collider was removed.
         """
         self.collider.move_to(*self._placed.pose(self.path))
 
     def teleport(self) -> None:
-        """Be where the node is at once, without pushing. Raises: StateError once the collider was removed."""
+        """Jump to the node's pose without pushing. Raises: StateError after the collider was removed."""
         self.collider.teleport(*self._placed.pose(self.path))
 
 
@@ -48,17 +48,16 @@ def add_colliders(
     restitution: float | None = None,
     thickness: float = 0.0,
 ) -> tuple[NodeCollider, ...]:
-    """A collider for each collision solid and shape of Bullet at and below a node, where they are now.
+    """Add a collider for each collision solid and Bullet shape at and below a node, at their current poses.
 
-    The world's coordinates are those of the top of the scene graph, such as `base.render`.
+    World coordinates are those of the root of the scene graph, such as `base.render`.
     Args:
-        world: before `build`, or with `collider_room` for them.
-        path: NodePath.
-        friction: Coulomb coefficient. None: a node of Bullet has its own one, any other one 0.5.
-        restitution, thickness: as in `World.add_collider`.
-    Returns: the colliders, in the order of the nodes. Those that do not move need nothing more.
-    Raises: as `shapes_of`, with nothing changed; OptionError where there is no shape at all; and as
-        `World.add_collider`.
+        world: world before `build`, or with enough `collider_room`.
+        path: NodePath of the node.
+        friction: Coulomb coefficient. None takes that of a Bullet node, and 0.5 for other nodes.
+        restitution, thickness: see `World.add_collider`.
+    Returns: the colliders, in the order of the nodes. Static colliders need no further calls.
+    Raises: as `shapes_of`, with nothing changed; OptionError if there is no shape; as `World.add_collider`.
     """
     found = [(each, placed) for each in _nodes(path) for placed in shapes_of(each)]
     if not found:
@@ -79,7 +78,7 @@ def add_colliders(
 
 
 def _nodes(path: Any) -> Iterator[Any]:
-    """Paths to the node and what is below it, as far as they may carry shapes. Ghosts of Bullet do not."""
+    """Paths to the node and its descendants that can have shapes, without Bullet's ghosts."""
     if isinstance(path.node(), (core.CollisionNode, bullet.BulletRigidBodyNode)):
         yield path
     for child in path.get_children():

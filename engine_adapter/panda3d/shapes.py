@@ -1,4 +1,4 @@
-"""Collision solids of Panda3D and shapes of Bullet as shapes of taichi-soft."""
+"""Convert collision solids of Panda3D and shapes of Bullet to shapes of taichi-soft."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, Shape, 
 
 Floats = NDArray[np.float64]
 
-_ROUGHLY = 1e-3
-"""Part by which scales along the axes may differ and still count as one: a game's float32 sums do."""
+_SCALE_TOLERANCE = 1e-3
+"""Largest relative difference of scales that count as uniform, because of rounding in float32."""
 
-_WAY_OUT = "build it of those, or give the world a shape by World.add_collider"
+_ADVICE = "build it from those, or add a shape with World.add_collider"
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedShape:
-    """A shape in the coordinates of the node that carries it, without the node's scale.
+    """A shape in the coordinates of its node, without the node's scale.
 
     Args:
-        shape: of taichi-soft, scaled.
-        position: of its origin, (3,) [m].
+        shape: shape of taichi-soft, scaled.
+        position: position of its origin, (3,) [m].
         rotation: its axes as columns, (3, 3).
     """
 
@@ -36,7 +36,7 @@ class PlacedShape:
     rotation: Floats
 
     def pose(self, path: Any) -> tuple[Floats, Floats]:
-        """Position (3,) [m] and rotation (3, 3) in the world, with its node where its NodePath is.
+        """Position (3,) [m] and rotation (3, 3) in the world, for the node's current pose.
 
         Args:
             path: NodePath of the node.
@@ -46,22 +46,22 @@ class PlacedShape:
 
 
 def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
-    """Shapes of one node, a CollisionNode or a node of Bullet, in their order.
+    """Convert the shapes of one CollisionNode or Bullet node, in order.
 
-    Taken are CollisionSphere, CollisionBox, CollisionCapsule and CollisionPlane, under any uniform scale, and
-    BulletSphereShape, BulletBoxShape, BulletCapsuleShape and BulletPlaneShape, unscaled.
+    Supported are CollisionSphere, CollisionBox, CollisionCapsule and CollisionPlane, with any uniform scale,
+    and BulletSphereShape, BulletBoxShape, BulletCapsuleShape and BulletPlaneShape, unscaled.
     Args:
         path: NodePath to the node.
-    Raises: OptionError that names what cannot be taken: another kind of solid or node, a scale that is not
-        the same along all axes, a shear, or a scaled node of Bullet.
+    Raises: OptionError that names an unsupported solid or node, a non-uniform scale, a shear, or a scaled
+        Bullet node.
     """
     node = path.node()
     if isinstance(node, core.CollisionNode):
         scale = _scale(path)
         return tuple(_of_solid(solid, scale, node) for solid in node.get_solids())
     if isinstance(node, bullet.BulletBodyNode):
-        if abs(_scale(path) - 1.0) > _ROUGHLY:
-            raise OptionError(f"node {node.name!r} of Bullet is scaled: scale its shapes in its place")
+        if abs(_scale(path) - 1.0) > _SCALE_TOLERANCE:
+            raise OptionError(f"node {node.name!r} of Bullet is scaled: scale its shapes instead")
         return tuple(_of_bullet(node, number) for number in range(node.get_num_shapes()))
     raise OptionError(
         f"node {node.name!r} must be a CollisionNode or a node of Bullet, got {type(node).__name__}"
@@ -69,13 +69,13 @@ def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
 
 
 def pose_of(path: Any) -> tuple[Floats, Floats]:
-    """Position (3,) [m] and rotation (3, 3) of a node in the coordinates of the top of its scene graph."""
+    """Position (3,) [m] and rotation (3, 3) of a node relative to the root of its scene graph."""
     transform = path.get_net_transform()
     return np.array(transform.get_pos(), dtype=np.float64), _matrix(transform.get_norm_quat())
 
 
 def _matrix(quaternion: Any) -> Floats:
-    """Axes as columns, (3, 3). Panda3D multiplies rows by matrices."""
+    """Rotation with axes as columns, (3, 3). Panda3D uses row vectors."""
     rows = core.LMatrix3()
     quaternion.extract_to_matrix(rows)
     turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T
@@ -83,12 +83,12 @@ def _matrix(quaternion: Any) -> Floats:
 
 
 def _scale(path: Any) -> float:
-    """The node's uniform scale. Raises: OptionError for any other."""
+    """Uniform scale of a node. Raises: OptionError for a non-uniform scale or a shear."""
     transform = path.get_net_transform()
     scale = np.array(transform.get_scale(), dtype=np.float64)
     spread = float(np.ptp(scale))
     shear = float(np.abs(np.array(transform.get_shear())).max())
-    if scale.min() <= 0.0 or max(spread, shear) > _ROUGHLY * scale.max():
+    if scale.min() <= 0.0 or max(spread, shear) > _SCALE_TOLERANCE * scale.max():
         raise OptionError(
             f"node {path.node().name!r} must have one scale above 0 along all axes and no shear, got scale "
             f"{scale.tolist()} and shear {list(transform.get_shear())}"
@@ -116,7 +116,7 @@ def _of_bullet(node: Any, number: int) -> PlacedShape:
 
 def _refused(shape: Any, node: Any, known: dict[Any, Any]) -> OptionError:
     kinds = ", ".join(kind.__name__ for kind in known)
-    return OptionError(f"{type(shape).__name__} of node {node.name!r} is none of {kinds}: {_WAY_OUT}")
+    return OptionError(f"{type(shape).__name__} of node {node.name!r} is not one of {kinds}: {_ADVICE}")
 
 
 def _at(shape: Shape, position: Any, rotation: Floats | None = None) -> PlacedShape:
@@ -126,7 +126,7 @@ def _at(shape: Shape, position: Any, rotation: Floats | None = None) -> PlacedSh
 
 
 def _onto(axis: Floats) -> Floats:
-    """A rotation (3, 3) that turns z onto a direction (3,) of length 1."""
+    """Rotation (3, 3) from z to a unit vector (3,)."""
     across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
     turn: Floats = np.array([across, np.cross(axis, across), axis]).T
@@ -167,7 +167,7 @@ def _bullet_box(shape: Any) -> PlacedShape:
 
 
 def _bullet_capsule(shape: Any) -> PlacedShape:
-    """Panda3D does not tell along which axis it lies: it turns most easily about that one."""
+    """Panda3D does not expose the axis of a capsule: it is the axis of the smallest moment of inertia."""
     probe = bullet.BulletRigidBodyNode()
     probe.add_shape(shape)
     probe.set_mass(1.0)
@@ -188,7 +188,7 @@ _SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
     core.CollisionCapsule: _capsule,
     core.CollisionPlane: _plane,
 }
-"""By the very class: CollisionPolygon is a CollisionPlane to Python, and hollow things are spheres."""
+"""By exact class, because CollisionPolygon is a subclass of CollisionPlane, and hollow solids of spheres."""
 
 _BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
     bullet.BulletSphereShape: _bullet_sphere,

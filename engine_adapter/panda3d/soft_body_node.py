@@ -1,4 +1,4 @@
-"""A node of the scene graph that draws one soft body."""
+"""Scene graph node that draws one soft body."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from engine_adapter.panda3d.looks import render_state, texture_places, vertex_co
 from taichi_soft import Body, OptionError, RenderMesh
 
 _POSITIONS, _NORMALS, _LOOK = range(3)
-"""Arrays of a vertex buffer. One for each column: a kernel fills the first two where they lie."""
+"""Arrays of a vertex buffer, one per column: a kernel fills the first two in place."""
 
 
 class SoftBodyNode(core.NodePath):  # type: ignore[misc]
-    """A NodePath to a GeomNode that draws one body, in the coordinates of its parent.
+    """A NodePath to a GeomNode that draws one body, in its parent's coordinates.
 
         node = SoftBodyNode(adapter, body)
         node.reparent_to(base.render)
-        ...  # each frame, after adapter.advance; or let a SoftBodyTask do it
+        ...  # each frame after adapter.advance, or use a SoftBodyTask
         node.draw()
 
-    A body with skins is drawn as the artist's meshes, with their textures and texture coordinates; any other
-    one as its surface. The kernel writes positions and normals into Panda3D's own vertex buffers. A body that
-    was cut, torn, restored or given another level of detail gets new buffers by itself. One that was removed
-    is not drawn, and drawn again if `World.restore` brings it back.
+    A body with skins is drawn as the artist's meshes, with textures and texture coordinates; other bodies as
+    their surface. A kernel writes positions and normals directly into Panda3D's vertex buffers. The node
+    makes new buffers when the body was cut, torn or restored, or changed its level of detail. A removed body
+    is not drawn, until `World.restore` brings it back.
 
     Args:
-        adapter: that steps the body's world.
-        body: of that world.
-        crease: angle beyond which an edge of a surface is sharp [degrees], see `Body.render_mesh`. Skins have
-            their artist's normals.
-    Raises: OptionError for what is no adapter and no body, and as `Body.render_mesh`.
+        adapter: adapter that steps the body's world.
+        body: body of that world.
+        crease: angle above which an edge of a surface is sharp [degrees], see `Body.render_mesh`. Skins keep
+            the artist's normals.
+    Raises: OptionError for wrong types, and as `Body.render_mesh`.
     """
 
     def __init__(self, adapter: EngineAdapter, body: Body, *, crease: float | None = 60.0) -> None:
@@ -50,16 +50,16 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
     @property
     def body(self) -> Body:
-        """Which it draws."""
+        """Body that the node draws."""
         return self._body
 
     @property
     def meshes(self) -> tuple[RenderMesh, ...]:
-        """What it draws of the body now, in the order of its Geoms; none where the body was removed."""
+        """Current render meshes, in the order of the Geoms; empty if the body was removed."""
         return self._meshes
 
     def draw(self) -> None:
-        """Bring the buffers up to date: positions between the last two steps, as `EngineAdapter.alpha` says.
+        """Update the buffers with positions interpolated by `EngineAdapter.alpha`.
 
         Raises: as `EngineAdapter.render_mesh`.
         """
@@ -70,14 +70,14 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
         if not self._meshes or any(mesh.is_outdated for mesh in self._meshes):
             self._make()
         for number, mesh in enumerate(self._meshes):
-            geom = self.node().modify_geom(number)  # so the node takes note that its bounds are others
+            geom = self.node().modify_geom(number)  # tells the node that its bounds changed
             data = geom.modify_vertex_data()
             positions = rows_in(data, _POSITIONS, 3)
             self._adapter.render_mesh(mesh, positions, rows_in(data, _NORMALS, 3))
             geom.set_bounds(_box_round(positions))
 
     def _make(self) -> None:
-        """Buffers for the body as it is now."""
+        """Make buffers for the body's current meshes."""
         skins: tuple[RenderMesh, ...] = self._body.render_meshes
         self._meshes = skins or (self._body.render_mesh(crease=self._crease),)
         self.node().remove_all_geoms()
@@ -90,14 +90,14 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
 
 def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
-    """An array of a GeomVertexData as NumPy sees it where it lies, float32 (n, width). Keep it for no longer
-    than it takes to write: Panda3D may move the array between frames."""
+    """NumPy view of an array of a GeomVertexData, float32 (n, width). Use it only briefly: Panda3D may move
+    the array between frames."""
     view = memoryview(data.modify_array(array)).cast("B")
     return np.frombuffer(view, dtype=np.float32).reshape(-1, width)
 
 
 def _box_round(positions: NDArray[np.float32]) -> Any:
-    """A BoundingBox of points (n, 3), to cull by: Panda3D takes ten times as long to find a sphere."""
+    """BoundingBox of points (n, 3) for culling; a bounding sphere is much slower to compute in Panda3D."""
     columns = positions.T.copy()
     corners = (
         core.LPoint3(*(float(end) for end in ends)) for ends in (columns.min(axis=1), columns.max(axis=1))
@@ -106,7 +106,7 @@ def _box_round(positions: NDArray[np.float32]) -> Any:
 
 
 def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
-    """Buffers for a mesh, with its triangles, and places on a texture (k, 2) or colours (k, 4)."""
+    """Make buffers for a mesh, with triangles, and texture coordinates (k, 2) or colours (k, 4)."""
     width = 0 if look is None else look.shape[1]
     data = core.GeomVertexData("soft body", _vertex_format(width), core.Geom.UH_dynamic)
     data.set_num_rows(mesh.vertex_count)
@@ -123,7 +123,7 @@ def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
 
 
 def _vertex_format(look: int) -> Any:
-    """Positions, normals, and what `look` numbers tell: 2 a place on a texture, 4 a colour, 0 nothing."""
+    """Vertex format: positions, normals, and texture coordinates (`look` 2), colours (4) or neither (0)."""
     columns = [
         (core.InternalName.get_vertex(), 3, core.Geom.C_point),
         (core.InternalName.get_normal(), 3, core.Geom.C_normal),

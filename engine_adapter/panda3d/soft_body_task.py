@@ -1,4 +1,4 @@
-"""A task that drives a world by Panda3D's clock and draws it."""
+"""Task that steps a world with Panda3D's clock and draws it."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from taichi_soft import OptionError
 
 
 class Drawn(Protocol):
-    """What is drawn each frame: a `SoftBodyNode`, a `DebugNode`."""
+    """Node that is drawn each frame, such as a `SoftBodyNode` or a `DebugNode`."""
 
     def draw(self) -> None:
-        """Bring it up to date."""
+        """Update the node."""
 
 
 class SoftBodyTask:
-    """Lets time go on in a world, once a frame, and then draws its nodes.
+    """Advances a world once per frame and then draws its nodes.
 
         task = SoftBodyTask(base, adapter, [SoftBodyNode(adapter, body)])
 
-    The time of a frame is that of Panda3D's global clock. For pictures that come out the same every time set
-    the clock's mode to `M_non_real_time`.
+    The frame time comes from Panda3D's global clock. For reproducible frames, set the clock's mode to
+    `M_non_real_time`.
 
     Args:
         base: the game's ShowBase.
-        adapter: that steps the world.
-        nodes: to draw, in this order.
-        sort: of the task, as `task_mgr.add` takes it. Panda3D draws the frame at 50.
-    Raises: OptionError for what is no adapter.
+        adapter: adapter that steps the world.
+        nodes: nodes to draw, in this order.
+        sort: sort of the task, see `task_mgr.add`. Panda3D renders the frame at 50.
+    Raises: OptionError if `adapter` is not an EngineAdapter.
 
     Attributes:
-        nodes: the list of what is drawn: append to it and remove from it.
+        nodes: list of the nodes to draw. You can append to it and remove from it.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class SoftBodyTask:
         self._task = base.task_mgr.add(self._run, "soft bodies", sort=sort)
 
     def remove(self) -> None:
-        """Take the task out of the game: time stands still in the world."""
+        """Remove the task. The world is no longer stepped."""
         self._base.task_mgr.remove(self._task)
 
     def _run(self, task: Any) -> Any:

@@ -9,25 +9,25 @@ export class Rollback {
   rewindTo(step: number): void;
 }
 
-/** The same on all machines, but `player`, `delay` and `patience`. */
+/** Use the same options on all machines, except `player`, `delay` and `patience`. */
 export interface SessionOptions {
   /** Number of the own player, from 0. */
   player: number;
-  /** How many there are, 2 to 16. */
+  /** Number of players, 2 to 16. */
   players?: number;
-  /** Bytes of each input, 1 to 64. */
+  /** Size of an input [bytes], 1 to 64. */
   inputSize: number;
   /** Length of a tick [s]. */
   dt?: number;
-  /** 0 for as many as are stable. */
+  /** Substeps per tick; 0 chooses a stable number. */
   substeps?: number;
-  /** The most ticks made beyond the last one of which all inputs are known. */
+  /** Largest number of ticks made on predictions. */
   ticks?: number;
-  /** Ticks after which an own input is used. */
+  /** Ticks until an own input takes effect. */
   delay?: number;
-  /** Ticks from one comparison of hashes to the next. */
+  /** Ticks between comparisons of hashes. */
   hashEvery?: number;
-  /** Calls of `advance` in a row that may wait before one throws. */
+  /** Largest number of consecutive `advance` calls that wait, before one throws. */
   patience?: number;
 }
 

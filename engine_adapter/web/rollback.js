@@ -1,12 +1,12 @@
-// Games of several players over a network: as `Rollback` and `RollbackSession` of Python, with which a session here
-// plays (engine_adapter/rollback.py, engine_adapter/session.py). What a session sends is the same there.
+// Rollback netcode, compatible with `Rollback` and `RollbackSession` in Python (engine_adapter/rollback.py,
+// engine_adapter/session.py): sessions in both languages can play together.
 
 const MARK = 0x31525354; // "TSR1"
 const NO_TICK = 0xffffffff;
 const HEAD_SIZE = 42;
 const LEAD_SMOOTHING = 0.1; // weight of the newest message in the estimate of how far ahead this machine is
 
-/** What `Rollback` and `RollbackSession` refuse: nothing was changed. */
+/** Error of a refused call of `Rollback` or `RollbackSession`. Nothing was changed. */
 export class SessionError extends Error {
   constructor(text) {
     super(text);
@@ -24,7 +24,7 @@ export class Rollback {
   #world;
   #ticks;
   #snapshots = new Map(); // by the world's step count, ascending
-  #restoreCount; // of the world when they were all of its own past
+  #restoreCount; // the world's, while the snapshots are its past
 
   constructor(world, ticks) {
     this.#world = world;
@@ -32,17 +32,17 @@ export class Rollback {
     this.#restoreCount = world.restoreCount;
   }
 
-  /** Step counts that it is possible to go back to, ascending. */
+  /** Step counts that can be restored, ascending. */
   get steps() {
     return this.#isPast ? [...this.#snapshots.keys()] : [];
   }
 
-  // Whether what is kept led to the present state.
+  // True if the snapshots lead to the current state.
   get #isPast() {
     return this.#restoreCount === this.#world.restoreCount;
   }
 
-  /** Keep the state as it is now: between a step and the inputs of the next. */
+  /** Store the current state. Call it between a step and the inputs of the next one. */
   save() {
     if (!this.#isPast) {
       this.#snapshots.clear();
@@ -51,22 +51,22 @@ export class Rollback {
     const now = this.#world.clock.steps;
     this.#snapshots.delete(now);
     this.#snapshots.set(now, this.#world.snapshot());
-    // The present one is not a step back.
+    // The current state is not a step back.
     while (this.#snapshots.size > this.#ticks + 1) this.#snapshots.delete(this.#snapshots.keys().next().value);
   }
 
-  /** Put the world back to where `save` was called at that step count; what was saved later is dropped. */
+  /** Restore the state that `save` stored at a step count, and drop later ones. */
   rewindTo(step) {
     if (!this.#isPast) {
       throw new SessionError(
-        `step ${step} is not kept: the world was restored since, to where other steps led. Rewind after the next save`,
+        `step ${step} is not stored: the world was restored to another state since. Rewind after the next save`,
       );
     }
     const saved = this.#snapshots.get(step);
     if (!saved) {
       const { steps } = this;
       const kept = steps.length ? `${steps[0]} to ${steps.at(-1)}` : "none yet";
-      throw new SessionError(`step ${step} is not kept (kept: ${kept}): save more ticks, or rewind less far`);
+      throw new SessionError(`step ${step} is not stored (stored: ${kept}): use more ticks, or rewind less`);
     }
     this.#world.restore(saved);
     this.#restoreCount = this.#world.restoreCount;
@@ -81,9 +81,9 @@ function dropBefore(rows, tick) {
 }
 
 /**
- * One machine's side of a game. `advance` makes a tick with the own input and predictions of those of others, `message`
- * is a datagram for all others, `receive` takes theirs: late, twice, in any order. `act(inputs)` applies the inputs of
- * all players, by player, before each step; a tick may be made several times.
+ * One machine's side of a game. `advance` makes a tick with the own input and predicted inputs of the others. `message`
+ * returns a datagram for all others. `receive` reads theirs, which can be late, repeated or out of order.
+ * `act(inputs)` applies the inputs of all players, by player, before each step; a tick can be made several times.
  */
 export class RollbackSession {
   #world;
@@ -95,9 +95,9 @@ export class RollbackSession {
   #tick;
   #inputs; // known ones, by player and tick
   #used = new Map(); // by tick
-  #heard; // of each player all inputs before this tick are known
-  #acknowledged; // tick up to which each other knows the own inputs
-  #wrong = null; // first tick that was made with a wrong prediction
+  #heard; // by player: all inputs before this tick are known
+  #acknowledged; // by player: tick up to which it knows our inputs
+  #wrong = null; // first tick with a wrong prediction
   #hashes = new Map(); // own ones, by tick
   #theirHashes; // not compared yet, by player and tick
   #newest; // tick of the newest message
@@ -163,7 +163,7 @@ export class RollbackSession {
     return Math.max(...this.#others.map((each) => this.#leads[each]));
   }
 
-  /** First compared tick that began in another state on another machine; null if all states agreed. */
+  /** First compared tick whose initial state differs on another machine; null if all states agree. */
   get desync() {
     return this.#desync;
   }
@@ -172,12 +172,12 @@ export class RollbackSession {
     return this.#rollbacks;
   }
 
-  /** The most ticks that one rewind went back. */
+  /** Largest number of ticks that one rewind went back. */
   get longestRewind() {
     return this.#longestRewind;
   }
 
-  /** Correct wrong predictions, then make a tick. Returns false if it has to wait for another player. */
+  /** Correct wrong predictions, then make a tick. Returns false if it must wait for another player. */
   advance(ownInput) {
     const { player, inputSize, ticks } = this.#settings;
     if (!(ownInput instanceof Uint8Array) || ownInput.length !== inputSize) {
@@ -203,7 +203,7 @@ export class RollbackSession {
     return true;
   }
 
-  /** Make again the ticks that were made with wrong predictions. Returns how many. */
+  /** Repeat the ticks with wrong predictions. Returns their number. */
   settle() {
     if (this.#wrong !== null) {
       this.#rollback.rewindTo(this.#wrong);
@@ -213,19 +213,19 @@ export class RollbackSession {
     }
     const missing = this.#tick - this.#world.clock.steps;
     if (missing < 0) {
-      throw new SessionError(`the world made ${-missing} steps outside its session: call session.advance only`);
+      throw new SessionError(`the world made ${-missing} steps outside its session: call only session.advance`);
     }
     for (let i = 0; i < missing; i += 1) this.#makeTick();
     this.#compare();
     return missing;
   }
 
-  /** A datagram for all other machines. Send one after each call of `advance`, whatever it returned. */
+  /** Return a datagram for all other machines. Send one after each call of `advance`, even if it returned false. */
   message() {
     const { player, players, inputSize, ticks, hashEvery } = this.#settings;
     const first = Math.min(...this.#others.map((each) => this.#acknowledged[each]));
     const count = this.#heard[player] - first;
-    // A state that a rewind is going to change, or some later input can change, has no hash to send.
+    // Send no hash of a state that a rewind or a late input can still change.
     const final = Math.min(this.confirmed, this.#wrong ?? this.#tick);
     const tick = Math.max(...[...this.#hashes.keys()].filter((each) => each <= final));
     const data = new Uint8Array(HEAD_SIZE + 4 * players + inputSize * count);
@@ -246,7 +246,7 @@ export class RollbackSession {
     return data;
   }
 
-  /** Take a message of another machine. The next `advance` or `settle` repeats the ticks that it proves wrong. */
+  /** Read a message of another machine. The next `advance` or `settle` repeats the ticks that it corrects. */
   receive(data) {
     const message = this.#read(data);
     const other = message.player;
@@ -263,8 +263,8 @@ export class RollbackSession {
     if (message.hashTick !== NO_TICK) this.#theirHashes[other].set(message.hashTick, message.hash);
     if (message.tick > this.#newest[other]) {
       this.#newest[other] = message.tick;
-      // Both machines see the other one late, by the same time if the network is as slow both ways: half of the
-      // difference is what their clocks differ by.
+      // Each machine sees the other one late. If the latency is equal in both directions, half of the difference is
+      // this machine's lead.
       const lead = (this.#tick - message.tick - (message.tick - (heard - delay))) / 2;
       this.#leads[other] += LEAD_SMOOTHING * (lead - this.#leads[other]);
     }
@@ -277,19 +277,19 @@ export class RollbackSession {
     if (data instanceof ArrayBuffer) data = new Uint8Array(data);
     const view = data instanceof Uint8Array ? new DataView(data.buffer, data.byteOffset, data.byteLength) : null;
     if (!view || data.length < body || view.getUint32(0, true) !== MARK) {
-      throw new SessionError("these bytes are no message of a session of this version");
+      throw new SessionError("these bytes are not a message of a session of this version");
     }
     const theirs = [view.getUint8(13), ...[14, 16, 18].map((at) => view.getUint16(at, true))];
     const ours = [players, inputSize, ticks, hashEvery];
     if (!isSame(theirs, ours)) {
       const names = "players, inputSize, ticks, hashEvery";
-      throw new SessionError(`${names} are ${theirs.join(", ")} there and ${ours.join(", ")} here: give all sessions the same`);
+      throw new SessionError(`${names} are ${theirs.join(", ")} there and ${ours.join(", ")} here: use the same values on all machines`);
     }
     const start = view.getBigUint64(4, true);
     if (start !== this.#start) {
       const [there, here] = [start, this.#start].map((each) => each.toString(16).padStart(16, "0"));
       throw new SessionError(
-        `the other world began in the state ${there}, this one in ${here}: run the same script, of the same version, on all machines`,
+        `the other world's initial state is ${there}, this one's is ${here}: run the same script, of the same version, on all machines`,
       );
     }
     const message = {
@@ -302,7 +302,7 @@ export class RollbackSession {
     };
     const count = view.getUint16(40, true);
     if (!this.#others.includes(message.player)) {
-      throw new SessionError(`player ${message.player} is no other player: here is player ${player}`);
+      throw new SessionError(`player ${message.player} is not another player: this machine is player ${player}`);
     }
     if (data.length !== body + inputSize * count) {
       throw new SessionError(`a message of ${count} inputs has ${data.length} bytes: it is damaged`);
@@ -313,7 +313,7 @@ export class RollbackSession {
     return message;
   }
 
-  // Compares a message with what is known.
+  // Checks that a message agrees with earlier ones.
   #requireOrder({ player, tick, hashTick, first, heard, inputs }) {
     const who = `player ${player}`;
     const due = this.#heard[player];
@@ -321,12 +321,12 @@ export class RollbackSession {
     if (first > due) {
       throw new SessionError(`${who} sends no input before tick ${first}, and that of ${due} is missing`);
     }
-    const most = own + 2 * this.#settings.ticks; // a machine that waits as it has to is not beyond
+    const most = own + 2 * this.#settings.ticks; // a correct machine waits before it
     if (Math.max(first + inputs.length, tick, hashTick === NO_TICK ? -1 : hashTick) > most) {
-      throw new SessionError(`${who} is beyond tick ${most}, which no machine of this session can be yet`);
+      throw new SessionError(`${who} is beyond tick ${most}, which no machine of this session can have reached`);
     }
     if (heard[this.#settings.player] > own) {
-      throw new SessionError(`${who} acknowledges an input that was not sent yet: the message is damaged`);
+      throw new SessionError(`${who} acknowledges an input that was not sent: the message is damaged`);
     }
     inputs.forEach((each, i) => {
       const known = this.#inputs[player].get(first + i);
@@ -341,7 +341,7 @@ export class RollbackSession {
     this.#heard[player] += 1;
   }
 
-  // Keeps the state, applies what is known or predicted, and makes a step; or changes nothing.
+  // Saves the state, applies known or predicted inputs, and makes a step. An error changes nothing.
   #makeTick() {
     const tick = this.#world.clock.steps;
     this.#rollback.save();
@@ -365,7 +365,7 @@ export class RollbackSession {
     const silent = this.#others.filter((each) => this.#heard[each] === tick).join(" and ");
     throw new SessionError(
       `no input of player ${silent} for tick ${tick} came in ${this.#waits} frames, and ${this.#settings.ticks} ticks ` +
-        "are predicted already: end the session, or go on waiting",
+        "are already predicted: end the session, or keep waiting",
     );
   }
 
@@ -380,7 +380,7 @@ export class RollbackSession {
     }
   }
 
-  // Drops what no rewind and no message can ask for.
+  // Drops data that no rewind and no message needs.
   #forget() {
     const { player, ticks, delay, hashEvery } = this.#settings;
     const { confirmed } = this;

@@ -1,4 +1,4 @@
-/** Three numbers: a place [m], a velocity [m/s], an impulse [N s]. */
+/** Three numbers: a position [m], a velocity [m/s] or an impulse [N s]. */
 export type Vector = ArrayLike<number> & Iterable<number>;
 /** A unit quaternion x, y, z, w. */
 export type Rotation = ArrayLike<number> & Iterable<number>;
@@ -21,7 +21,7 @@ export class Scene {
   readonly counts: Record<Kind, number>;
   /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
   nameOf(kind: Kind, number: number): string;
-  /** Number of a thing, by its name. */
+  /** Number of an object, by its name. */
   find(kind: Kind, name: string | number): number;
   /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name: string | number): {
@@ -31,9 +31,9 @@ export class Scene {
     mass: number;
     levelCount: number;
   };
-  /** A world as it was exported. */
+  /** Create a world in its exported state. */
   createWorld(): World;
-  /** Free the scene, as soon as the last of its worlds is destroyed. */
+  /** Free the scene when the last of its worlds is destroyed. */
   unload(): void;
 }
 
@@ -84,15 +84,15 @@ export class World {
   readonly clock: Clock;
   /** All bodies, by slot. */
   readonly bodies: Body[];
-  /** Events that were dropped: more than 10,000 waited, or more pairs touched than there is room for. */
+  /** Number of dropped events, because more than 10,000 waited, or more pairs touched than there is room for. */
   readonly droppedEvents: number;
-  /** A function that is called before each step of `advance`: it moves colliders and frames, and pushes. */
+  /** Function that is called before each step of `advance`, to move colliders and frames and to apply forces. */
   onStep: (() => void) | null;
-  /** Free the world, its meshes included. */
+  /** Free the world and its meshes. */
   destroy(): void;
-  /** Make one step of `dt` [s]; 0 substeps for as many as are stable. */
+  /** Make one step of `dt` [s]; 0 substeps chooses a stable number. */
   step(dt?: number, substeps?: number): void;
-  /** How `advance` steps: time beyond `maxSteps` in a frame is dropped. */
+  /** Set the steps of `advance`. Time beyond `maxSteps` in a frame is dropped. */
   setFixedStep(step?: { dt?: number; substeps?: number; maxSteps?: number }): void;
   /** Add the time of a frame [s] and make the steps that are due. */
   advance(seconds: number): Clock;
@@ -102,49 +102,49 @@ export class World {
   wake(): void;
   /** Gravity [m/s^2], from the next step on. It wakes all bodies. */
   setGravity(gravity: Vector): void;
-  /** Coulomb's coefficient of the floor, from the next step on. */
+  /** Coulomb coefficient of the floor, from the next step on. */
   setFriction(friction: number): void;
-  /** Wind [m/s], of air with a density [kg/m^3]. */
+  /** Wind velocity [m/s], and air density [kg/m^3]. */
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
   /** Push all bodies away from a point: `impulse` [N s] near it, none at `radius` [m]. */
   radialImpulse(center: Vector, impulse: number, radius: number): void;
-  /** The state as 16 hexadecimal digits: the same on every platform. */
+  /** Hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash(): string;
   /** A copy of the state between two steps. */
   snapshot(): Uint8Array;
-  /** Put the world back to a snapshot of the same export. */
+  /** Restore a snapshot of the same export. */
   restore(bytes: Uint8Array | ArrayBuffer): void;
-  /** How often `restore` was called. A history of states is void when somebody else has restored one. */
+  /** Number of `restore` calls. A stored history of states is invalid after a `restore` by other code. */
   readonly restoreCount: number;
   /** Record events of these kinds, a sum of `EVENTS`; all by default, 0 for none. */
   recordEvents(kinds?: number): void;
-  /** The events since the last call. */
+  /** Return the events since the last call. */
   events(): SoftEvent[];
-  /** The body in a slot, by its number or name; null if the slot is empty. */
+  /** Return the body in a slot, by number or name; null if the slot is empty. */
   body(name: string | number): Body | null;
-  /** Put a body of an asset into a free slot; `velocity` [m/s], `spin` [rad/s]. */
+  /** Spawn a body of an asset in a free slot; `velocity` [m/s], `spin` [rad/s]. */
   spawn(
     asset: string | number,
     place?: { position?: Vector; rotation?: Rotation; velocity?: Vector; spin?: Vector },
   ): Body;
-  /** The first surface on a ray, or null. */
+  /** Find the first surface on a ray, or null. */
   raycast(origin: Vector, direction: Vector, reach?: number): Hit | null;
-  /** The nearest point of all surfaces, or null. */
+  /** Find the closest point of all surfaces, or null. */
   closest(point: Vector, reach?: number): Hit | null;
-  /** Bodies with a point in a sphere. */
+  /** Find the bodies that touch or enclose a sphere. */
   overlapSphere(center: Vector, radius: number): Body[];
-  /** Bodies with a point in a box. */
+  /** Find the bodies that touch or enclose a box. */
   overlapBox(pose: Pose, size: Vector): Body[];
   collider(name: string | number): Collider;
   /** Add a plane, sphere, box or capsule. The world needs `collider_room` for it. */
   addCollider(shape: Shape, pose?: Pose): Collider;
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
-  /** The grab with a number from 0 to 15, or null. */
+  /** Return a grab by its index, 0 to 15, or null. */
   grab(number: number): Grab | null;
-  /** The joint of a name or number, 0 to 63; null for none. */
+  /** Return a joint by name or index, 0 to 63; null for none. */
   joint(name: string | number): Joint | null;
-  /** The motor of a name or number, 0 to 63; null for none. */
+  /** Return a motor by name or index, 0 to 63; null for none. */
   motor(name: string | number): Motor | null;
 }
 
@@ -158,49 +158,49 @@ export class Body {
   readonly status: "active" | "frozen" | "asleep";
   /** Centre of mass [m]. */
   readonly center: number[];
-  /** Level of detail, 0 being the finest. */
+  /** Level of detail; 0 is the finest. */
   readonly level: number;
   /** Number of vertices at its level. */
   readonly vertexCount: number;
-  /** Take the body out of the world. */
+  /** Remove the body from the world. */
   despawn(): void;
-  /** Go on with more or fewer tetrahedra. With `release`, joints and motors that have no place there are released. */
+  /** Change the level of detail. Fails if joints, motors or attachments cannot be kept, unless `release` is true. */
   setLevel(level: number, how?: { release?: boolean }): void;
-  /** A copy of the positions of its vertices [m]: after the last step, or `alpha` of the way to it. */
+  /** Copy the positions of its vertices [m], interpolated from the previous step (0) to the last one (1). */
   positions(alpha?: number): Float32Array;
-  /** A mesh to draw: the first one of its asset, or one by its number or name. Call it once, not in each frame. */
+  /** Return a render mesh: the first one of its asset, or one by number or name. Call it once, not in each frame. */
   mesh(name?: string | number | null): Mesh;
   /** Velocity [m/s] and angular velocity [rad/s] about the centre of mass. */
   setVelocity(linear: Vector, spin?: Vector): void;
-  /** Move the centre of mass there, and turn the body as it is now by `turn`. */
+  /** Move the centre of mass to a position, and rotate the current shape by `turn`. */
   teleport(center: Vector, how?: { turn?: Rotation; keepsVelocity?: boolean }): void;
   /** Apply an impulse [N s] to vertices, or to the whole body. */
   applyImpulse(impulse: Vector, vertices?: ArrayLike<number> | null): void;
   /** Apply a force [N] during the next step, to vertices or to the whole body. */
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
-  /** Apply an impulse [N s] to what is within `radius` [m] of a point. */
+  /** Apply an impulse [N s] to the vertices within `radius` [m] of a point. */
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
   /** Factor on gravity for this body. */
   setGravityScale(scale: number): void;
-  /** Coulomb's coefficient against other bodies, in worlds with soft contact. */
+  /** Coulomb coefficient against other bodies, in worlds with soft contact. */
   setFriction(friction: number): void;
-  /** Drag [1/s]. */
+  /** Damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
-  /** Whether wind passes it by. */
+  /** Shelter the body from the wind, or expose it. */
   setSheltered(isSheltered: boolean): void;
-  /** Hold vertices in their places. */
+  /** Pin vertices at their positions. */
   pin(vertices: ArrayLike<number>): void;
-  /** Let pinned vertices go, or all of them. */
+  /** Release pinned vertices, or all of them. */
   unpin(vertices?: ArrayLike<number> | null): void;
   /** Positions of pinned vertices after the next step [m], 3 numbers each. */
   setTargets(vertices: ArrayLike<number>, targets: ArrayLike<number>): void;
-  /** Hang vertices on a frame, from where both are now. With `feels` the load can be read. */
+  /** Attach vertices to a frame at their current positions. Set `feels` to read the load later. */
   attach(vertices: ArrayLike<number> | null, frame: Frame, how?: { feels?: boolean }): void;
-  /** Let vertices go that hang on a frame, or all of them. */
+  /** Detach vertices from frames, or all of them. */
   detach(vertices?: ArrayLike<number> | null): void;
   /** `force` [N] and `torque` [N m] of the body on a frame. */
   load(frame: Frame): { force: number[]; torque: number[] };
-  /** Let vertices be held by another body: where they are in it, or each at a vertex of it, `onto`. */
+  /** Attach vertices to another body: at their current positions in it, or each to one of its vertices in `onto`. */
   join(vertices: ArrayLike<number>, other: Body, how?: { onto?: ArrayLike<number> | null }): Joint;
   addMotor(
     vertices: ArrayLike<number>,
@@ -213,36 +213,36 @@ export class Body {
       point?: Vector | null;
     },
   ): Motor;
-  /** Hold the body where a ray has hit it, by a spring. */
+  /** Grab the body with a spring, where a ray hit it. */
   grab(
     hit: Pick<Hit, "triangle" | "weights" | "point">,
     spring?: { frequency?: number; maxForce?: number; target?: Vector },
   ): Grab;
 }
 
-/** `positions` and `normals` are views of the module's memory: take them anew after each `update`. */
+/** `positions` and `normals` are views of the module's memory: read them again after each `update`. */
 export class Mesh {
   readonly body: Body;
   readonly vertexCount: number;
   readonly positions: Float32Array;
   readonly normals: Float32Array;
-  /** Three numbers of vertices each. */
+  /** Vertex indices, three per triangle. */
   readonly triangles: Uint32Array;
-  /** Two numbers a vertex, v upwards; null where there are none. */
+  /** Texture coordinates, two numbers per vertex, v upwards; null if there are none. */
   readonly uv: Float32Array | null;
-  /** Write `positions` [m] and `normals` as the body is now. */
+  /** Update `positions` [m] and `normals`. */
   update(): void;
-  /** Gives back its memory, as `World.destroy` does for all. */
+  /** Free its memory. `World.destroy` does this for all meshes. */
   free(): void;
 }
 
-/** A spring that holds a body. */
+/** A grab: a spring that holds a body. */
 export class Grab {
   /** Force of the spring [N]. */
   readonly force: number[];
   /** Move the end of the spring [m]. */
   moveTo(point: Vector): void;
-  /** Let go. */
+  /** Release the grab. */
   release(): void;
 }
 
@@ -256,7 +256,7 @@ export class Joint {
   release(): void;
 }
 
-/** A motor that turns or pushes a part of a body. */
+/** A motor that rotates or pushes a part of a body. */
 export class Motor {
   readonly number: number;
   readonly handle: bigint;
@@ -264,7 +264,7 @@ export class Motor {
   readonly measuredSpeed: number;
   /** Its torque [N m] or force [N], mean over the last step. */
   readonly effort: number;
-  /** Wanted speed [rad/s] or [m/s]. */
+  /** Target speed [rad/s] or [m/s]. */
   setSpeed(speed: number): void;
   /** Limit of torque [N m] or force [N]; with 0 its vertices coast. */
   setLimit(limit: number): void;
@@ -272,35 +272,35 @@ export class Motor {
   remove(): void;
 }
 
-/** A solid that bodies touch and do not move. */
+/** A rigid shape that bodies cannot move. */
 export class Collider {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
-  /** `impulse` [N s] that bodies gave it in the last step, and `moment` about its place. */
+  /** `impulse` [N s] of bodies on it in the last step, and `moment` about its position. */
   readonly impulse: { impulse: number[]; moment: number[] };
-  /** Move to a pose until the end of the next step. */
+  /** Move to a pose over the next step. */
   moveTo(pose: Pose): void;
-  /** Move on at this velocity [m/s] and angular velocity [rad/s]. */
+  /** Move at a constant velocity [m/s] and angular velocity [rad/s]. */
   setVelocity(linear: Vector, spin?: Vector): void;
-  /** Coulomb's coefficient, from the next step on. */
+  /** Coulomb coefficient, from the next step on. */
   setFriction(friction: number): void;
-  /** Be at a pose at once, without touching what is on the way. */
+  /** Jump to a pose, without pushing bodies on the way. */
   teleport(pose: Pose): void;
   remove(): void;
 }
 
-/** A pose that the game moves, with the bodies that are attached to it. */
+/** A pose that the game moves, together with attached bodies. */
 export class Frame {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
-  /** Move to a pose until the end of the next step. */
+  /** Move to a pose over the next step. */
   moveTo(pose: Pose): void;
   remove(): void;
 }
 
-/** A world of such a folder. */
+/** Loads a folder from `taichi-soft export --for web`, and creates a world. */
 export function loadWorld(folder: string | URL): Promise<World>;
-/** Loads a folder that `taichi-soft export --for web` wrote. */
+/** Loads a folder from `taichi-soft export --for web`. */
 export function loadScene(folder: string | URL): Promise<Scene>;
 /** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
 export function sceneOf(code: BufferSource, world: Uint8Array): Promise<Scene>;

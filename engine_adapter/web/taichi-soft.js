@@ -1,4 +1,4 @@
-// Soft bodies in a browser or in node: worlds that `taichi-soft export --for web` wrote.
+// Soft bodies in a browser or in node: runs worlds from `taichi-soft export --for web`.
 //
 //     const world = await loadWorld("game.softworld");
 //     const jelly = world.body("jelly").mesh();
@@ -7,7 +7,7 @@
 //       jelly.update(); // jelly.positions and jelly.normals are views of the module's memory
 //     }
 //
-// All is in the axes for which the world was exported, in SI units; turns are unit quaternions [x, y, z, w].
+// All quantities use the axes for which the world was exported, and SI units; rotations are unit quaternions [x, y, z, w].
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
 const STATUS = ["active", "frozen", "asleep"];
@@ -29,18 +29,18 @@ export class SoftError extends Error {
   }
 }
 
-// The bytes of an array of any type.
+// Returns the bytes of an array of any type.
 function bytesIn(given, name) {
   if (given instanceof ArrayBuffer) return new Uint8Array(given);
   if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
   throw new SoftError(-1, `${name} is ${shown(given)}: give a typed array or an ArrayBuffer`);
 }
 
-// The numbers of a vector of any kind: an array, a typed array, a Vector3 or Quaternion of three.js.
+// Returns the numbers of a vector: an array, a typed array, or a Vector3 or Quaternion of three.js.
 function vector(value, name, count = 3) {
   const found = typeof value?.[Symbol.iterator] === "function" ? Array.from(value, Number) : [];
   if (found.length === count) return found;
-  throw new SoftError(-1, `${name} takes ${count} numbers, got ${Array.isArray(value) ? `[${value}]` : value}`);
+  throw new SoftError(-1, `${name} must have ${count} numbers, got ${Array.isArray(value) ? `[${value}]` : value}`);
 }
 
 function shown(value) {
@@ -48,16 +48,16 @@ function shown(value) {
   return typeof value === "object" ? (value?.constructor?.name ?? "null") : String(value);
 }
 
-// A whole number of 32 bits. WebAssembly turns every other value into one: a text into 0, 2.7 into 2.
-function whole(value, name, way = "a whole number of 32 bits") {
+// Requires a 32-bit integer. WebAssembly would convert other values: a text to 0, 2.7 to 2.
+function whole(value, name, way = "a 32-bit integer") {
   if (Number.isInteger(value) && value === (value | 0)) return value;
   throw new SoftError(-1, `${name} is ${shown(value)}: give ${way}`);
 }
 
-// 32 bits, as a number with or without a sign.
+// Converts signed or unsigned 32-bit numbers.
 const bits = (value, name) => whole(value > 0x7fffffff && value <= 0xffffffff ? value - 2 ** 32 : value, name);
 
-// A thing of a world. Its number or handle alone does not tell: other worlds have the same ones.
+// Requires an object of this world. Its number or handle does not identify the world.
 function ownOf(world, thing, Kind, name, way) {
   if (thing instanceof Kind && thing.world === world) return thing;
   const what = thing instanceof Kind ? "of another world" : shown(thing);
@@ -66,14 +66,14 @@ function ownOf(world, thing, Kind, name, way) {
 
 const poseOf = ({ position, rotation = UPRIGHT }) => [...vector(position, "position"), ...vector(rotation, "rotation", 4)];
 
-// The module's memory and functions.
+// Memory and functions of the module.
 class Native {
   constructor(module) {
     const refuse = (code, text) => {
       throw new SoftError(code, this.text(text));
     };
     const listeners = new Map();
-    const nothing = () => 8; // of WASI: a bad file; the library writes to none
+    const nothing = () => 8; // WASI's error for a bad file; the library writes no files
     const imports = {
       taichi_soft: { fail: refuse, before_step: (world) => listeners.get(world)?.() },
       wasi_snapshot_preview1: new Proxy({}, { get: () => nothing }),
@@ -81,7 +81,7 @@ class Native {
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize();
     this.listeners = listeners;
-    this.small = this.allocate(1024); // for the arguments and results of one call
+    this.small = this.allocate(1024); // buffer for arguments and results of one call
   }
 
   get view() {
@@ -91,14 +91,14 @@ class Native {
 
   allocate(size) {
     const at = this.exports.malloc(Math.max(size, 8));
-    if (at === 0) throw new SoftError(-9, `there is not enough memory for ${size} bytes`);
+    if (at === 0) throw new SoftError(-9, `not enough memory for ${size} bytes`);
     return at;
   }
 
-  // Calls a function. One that refuses leaves by an exception, which the module's stack has to follow.
+  // Calls a function. A refused call throws, so restore the module's stack.
   call(name, ...args) {
     if (!(name in this.exports)) {
-      throw new SoftError(-5, `the world has no ${name}, and is of another version than this package: export it again`);
+      throw new SoftError(-5, `the world has no ${name}, because it is from another version of this package: export it again`);
     }
     const stack = this.exports.__stack_pointer.value;
     try {
@@ -106,7 +106,7 @@ class Native {
     } catch (error) {
       this.exports.__stack_pointer.value = stack;
       if (!(error instanceof WebAssembly.RuntimeError)) throw error;
-      throw new SoftError(-9, `${name} has failed, for want of memory or by a fault: ${error.message}`);
+      throw new SoftError(-9, `${name} failed, because of memory or a fault: ${error.message}`);
     }
   }
 
@@ -134,7 +134,7 @@ class Native {
     return this.view.getBigUint64(at, true);
   }
 
-  // Calls a function with memory of its own for some bytes.
+  // Calls a function with a temporary copy of some bytes.
   lending(bytes, use) {
     const given = bytesIn(bytes, "bytes");
     const at = this.allocate(given.length);
@@ -150,17 +150,17 @@ class Native {
     return this.lending(new TextEncoder().encode(`${text}\0`), use);
   }
 
-  // Calls a function with a list of vertices; null is all of them.
+  // Calls a function with a list of vertices; null means all.
   lendingVertices(vertices, use) {
     if (vertices === null) return use(0, 0);
     const numbers = Array.from(vertices);
-    if (numbers.length === 0) throw new SoftError(-1, "no vertex is named: give null for all");
+    if (numbers.length === 0) throw new SoftError(-1, "the list of vertices is empty: give null for all");
     for (const each of numbers) whole(each, "a vertex");
     return this.lending(Int32Array.from(numbers), (at) => use(at, numbers.length));
   }
 }
 
-// Numbers in the module's memory, which is another one after it has grown.
+// Numbers in the module's memory, which is reallocated when it grows.
 class Block {
   constructor(native, Kind, count) {
     this.native = native;
@@ -190,7 +190,7 @@ export class Scene {
     this.native.view.setUint32(small, 24, true);
     this.native.call("ts_scene_get_info", this.handle, small);
     const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
-    // Read once: worlds go on when the scene was unloaded.
+    // Read once, because worlds can outlive the scene.
     this.names = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, this.#names(kind)]));
     const [joints, motors] = [this.names.joint.length, this.names.motor.length];
     this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes, joint: joints, motor: motors };
@@ -205,7 +205,7 @@ export class Scene {
       try {
         native.call("ts_scene_get_name", this.handle, KINDS[kind], found.length, native.small, 1024);
       } catch {
-        return found; // there are no more
+        return found; // no more names
       }
       found.push(native.text(native.small));
     }
@@ -239,17 +239,17 @@ export class Scene {
   /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
   nameOf(kind, number) {
     const found = this.#namesOf(kind)[number];
-    if (found === undefined) throw new SoftError(-1, `there is no ${kind} ${number}: there are ${this.names[kind].length}`);
+    if (found === undefined) throw new SoftError(-1, `${kind} ${number} does not exist: there are ${this.names[kind].length}`);
     return found;
   }
 
-  /** Number of a thing, by its name. */
+  /** Number of an object, by its name. */
   find(kind, name) {
     const names = this.#namesOf(kind);
     if (typeof name === "number") return whole(name, kind);
     const number = names.indexOf(name);
     if (number >= 0) return number;
-    throw new SoftError(-1, `no ${kind} is called ${name}: give a number, or one of these names: ${names.join(", ") || "none"}`);
+    throw new SoftError(-1, `unknown ${kind} ${name}: give a number, or one of these names: ${names.join(", ") || "none"}`);
   }
 
   #namesOf(kind) {
@@ -260,16 +260,16 @@ export class Scene {
   /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const found = this.assets[this.find("asset", name)];
-    if (!found) throw new SoftError(-1, `there is no asset ${name}: there are ${this.assets.length}`);
+    if (!found) throw new SoftError(-1, `asset ${name} does not exist: there are ${this.assets.length}`);
     return found;
   }
 
-  /** A world as it was exported. */
+  /** Create a world in its exported state. */
   createWorld() {
     return new World(this);
   }
 
-  /** Free the scene, as soon as the last of its worlds is destroyed. */
+  /** Free the scene when the last of its worlds is destroyed. */
   unload() {
     this.native.call("ts_scene_unload", this.handle);
   }
@@ -300,12 +300,12 @@ export class World {
     for (const mesh of [...this.#meshes]) mesh.free();
   }
 
-  /** One step of `dt` [s]; 0 substeps for as many as are stable. */
+  /** Make one step of `dt` [s]; 0 substeps chooses a stable number. */
   step(dt = 1 / 60, substeps = 0) {
     this.#call("ts_world_step", dt, whole(substeps, "substeps"));
   }
 
-  /** How `advance` steps: time beyond `maxSteps` in a frame is dropped. */
+  /** Set the steps of `advance`. Time beyond `maxSteps` in a frame is dropped. */
   setFixedStep({ dt = 1 / 60, substeps = 0, maxSteps = 8 } = {}) {
     const { view, small } = this.native;
     view.setUint32(small, 24, true);
@@ -317,7 +317,7 @@ export class World {
 
   /** Adds the time of a frame [s] and makes the steps that are due. Returns the `clock`. */
   advance(seconds) {
-    if (this.#isAdvancing) throw new SoftError(-7, "world.advance was called within its own onStep");
+    if (this.#isAdvancing) throw new SoftError(-7, "world.advance was called from its own onStep");
     const { small } = this.native;
     this.native.view.setUint32(small, 40, true);
     this.#isAdvancing = true;
@@ -336,7 +336,7 @@ export class World {
     try {
       this.#call("ts_web_end_frame");
     } catch {
-      // onStep destroyed the world: what it threw counts
+      // onStep destroyed the world: rethrow its exception
     }
   }
 
@@ -353,7 +353,7 @@ export class World {
     return { stepsMade: view.getInt32(small + 4, true), steps: Number(view.getBigInt64(small + 8, true)), time, alpha, dropped };
   }
 
-  /** A function that is called before each step of `advance`: it moves colliders and frames, and pushes. */
+  /** Function that is called before each step of `advance`, to move colliders and frames and to apply forces. */
   set onStep(listener) {
     this.#listener = listener;
     if (listener) this.native.listeners.set(this.handle, listener);
@@ -378,12 +378,12 @@ export class World {
     this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, vector(gravity, "gravity")));
   }
 
-  /** Coulomb's coefficient of the floor, from the next step on. */
+  /** Coulomb coefficient of the floor, from the next step on. */
   setFriction(friction) {
     this.#call("ts_world_set_friction", friction);
   }
 
-  /** Wind [m/s], of air with a density [kg/m^3]. */
+  /** Wind velocity [m/s], and air density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, vector(velocity, "velocity")), density, drag);
   }
@@ -392,7 +392,7 @@ export class World {
     this.#call("ts_world_radial_impulse", this.native.doubles(this.native.small, vector(center, "center")), impulse, radius);
   }
 
-  /** The state as 16 hexadecimal digits: the same on every platform. */
+  /** Hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash() {
     this.#call("ts_world_hash", this.native.small);
     return this.native.handle(this.native.small).toString(16).padStart(16, "0");
@@ -417,7 +417,7 @@ export class World {
     this.#restoreCount += 1;
   }
 
-  /** How often `restore` was called. A history of states is void when somebody else has restored one. */
+  /** Number of `restore` calls. A stored history of states is invalid after a `restore` by other code. */
   get restoreCount() {
     return this.#restoreCount;
   }
@@ -427,7 +427,7 @@ export class World {
     this.#call("ts_world_record_events", whole(kinds, "kinds", "a sum of EVENTS"));
   }
 
-  /** The events since the last call. */
+  /** Return the events since the last call. */
   events() {
     const { native } = this;
     const [size, most, found] = [72, 64, []];
@@ -464,7 +464,7 @@ export class World {
     return Number(this.native.view.getBigInt64(this.native.small, true));
   }
 
-  /** The body in a slot, by its number or name; null if the slot is empty. */
+  /** Return the body in a slot, by number or name; null if the slot is empty. */
   body(name) {
     const slot = this.scene.find("body", name);
     this.#call("ts_world_get_body", slot, this.native.small);
@@ -488,7 +488,7 @@ export class World {
     return new Body(this, native.handle(native.small + 128));
   }
 
-  /** The first surface on a ray, or null. */
+  /** Find the first surface on a ray, or null. */
   raycast(origin, direction, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
@@ -497,7 +497,7 @@ export class World {
     return this.#hit();
   }
 
-  /** The nearest point of all surfaces, or null. */
+  /** Find the closest point of all surfaces, or null. */
   closest(point, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
@@ -582,21 +582,21 @@ export class World {
     return new Frame(this, native.int(native.small + 64));
   }
 
-  /** The grab with a number from 0 to 15, or null. */
+  /** Return a grab by its index, 0 to 15, or null. */
   grab(number) {
     this.#call("ts_world_get_grab", whole(number, "number"), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Grab(this, handle);
   }
 
-  /** The joint of a name or number, 0 to 63; null for none. */
+  /** Return a joint by name or index, 0 to 63; null for none. */
   joint(name) {
     this.#call("ts_world_get_joint", this.scene.find("joint", name), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Joint(this, handle);
   }
 
-  /** The motor of a name or number, 0 to 63; null for none. */
+  /** Return a motor by name or index, 0 to 63; null for none. */
   motor(name) {
     this.#call("ts_world_get_motor", this.scene.find("motor", name), this.native.small);
     const handle = this.native.handle(this.native.small);
@@ -643,15 +643,15 @@ export class Body {
     return STATUS[this.world.native.int(this.#small)];
   }
 
-  /** Level of detail, 0 being the finest. */
+  /** Level of detail; 0 is the finest. */
   get level() {
     this.#call("ts_body_get_level", this.#small);
     return this.world.native.int(this.#small);
   }
 
   /**
-   * Go on with more or fewer tetrahedra. Joints, motors and attachments that have no place at that level bar the change,
-   * unless they are released.
+   * Change the level of detail. Fails if joints, motors or attachments cannot be kept at that level, unless `release` is
+   * true.
    */
   setLevel(level, { release = false } = {}) {
     this.#call("ts_body_set_level", whole(level, "level"), Number(release));
@@ -663,7 +663,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** A copy of the positions of its vertices [m]: after the last step, or `alpha` of the way to it. */
+  /** Copy the positions of its vertices [m], interpolated from the previous step (0) to the last one (1). */
   positions(alpha = 1) {
     const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {
@@ -674,13 +674,13 @@ export class Body {
     }
   }
 
-  /** A mesh to draw: the first one of its asset and level, or one by its number or name. Call it once, not in each frame. */
+  /** Return a render mesh: the first of its asset and level, or one by number or name. Call it once, not in each frame. */
   mesh(name = null) {
     const { asset, level } = this;
     const { scene } = this.world;
     const isIts = (each) => each.asset === asset && (each.level === null || each.level === level);
     const found = name === null ? scene.meshes.find(isIts) : scene.meshes[scene.find("mesh", name)];
-    if (!found) throw new SoftError(-1, `nothing is drawn of asset ${asset}`);
+    if (!found) throw new SoftError(-1, `asset ${asset} has no mesh`);
     return this.world.keep(new Mesh(this, found));
   }
 
@@ -720,7 +720,7 @@ export class Body {
     this.#call("ts_body_set_gravity_scale", scale);
   }
 
-  /** Coulomb's coefficient against other bodies, in worlds with soft contact. */
+  /** Coulomb coefficient against other bodies, in worlds with soft contact. */
   setFriction(friction) {
     this.#call("ts_body_set_friction", friction);
   }
@@ -771,11 +771,11 @@ export class Body {
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
   }
 
-  /** Let vertices be held by another body: where they are in it, or each at a vertex of it, `onto`. */
+  /** Attach vertices to another body: at their current positions in it, or each to one of its vertices in `onto`. */
   join(vertices, other, { onto = null } = {}) {
     const { native } = this.world;
     ownOf(this.world, other, Body, "other", "a body, such as world.body(name)");
-    if (onto && onto.length !== vertices.length) throw new SoftError(-6, "onto names a vertex for each of vertices");
+    if (onto && onto.length !== vertices.length) throw new SoftError(-6, "onto must have as many vertices as vertices");
     native.lendingVertices(vertices, (list, count) =>
       native.lendingVertices(onto, (partners) =>
         this.#call("ts_body_join", list, count, other.handle, onto ? partners : 0, this.#small),
@@ -785,8 +785,8 @@ export class Body {
   }
 
   /**
-   * Turn vertices about an axis with up to `maxTorque` [N m], or push them along it with up to `maxForce` [N], towards a
-   * speed [rad/s] or [m/s]. The axis turns with them, or is fixed in space, where it may go through a point.
+   * Rotate vertices about an axis with up to `maxTorque` [N m], or push them along it with up to `maxForce` [N], towards
+   * a speed [rad/s] or [m/s]. The axis rotates with them, or is fixed in space, optionally through a point.
    */
   addMotor(vertices, { axis, speed = 0, maxTorque = null, maxForce = null, isFixed = false, point = null }) {
     const { native } = this.world;
@@ -801,7 +801,7 @@ export class Body {
     return new Motor(this.world, native.handle(this.#small + 128));
   }
 
-  /** Hold the body where a ray has hit it, by a spring. */
+  /** Grab the body with a spring, where a ray hit it. */
   grab({ triangle, weights, point }, { frequency = 5, maxForce = -1, target = point } = {}) {
     const { native } = this.world;
     native.view.setUint32(this.#small, 72, true);
@@ -812,7 +812,7 @@ export class Body {
   }
 }
 
-/** A mesh to draw. `positions` and `normals` are views that `update` fills: read them anew after each call. */
+/** A render mesh. `positions` and `normals` are views that `update` fills: read them again after each call. */
 export class Mesh {
   #blocks;
 
@@ -834,12 +834,12 @@ export class Mesh {
     return this.#there.normals.view;
   }
 
-  /** Three numbers of vertices each. */
+  /** Vertex indices, three per triangle. */
   get triangles() {
     return this.#there.triangles.view;
   }
 
-  /** Two numbers a vertex, v upwards; null where there are none. */
+  /** Texture coordinates, two numbers per vertex, v upwards; null if there are none. */
   get uv() {
     return this.#there.uv?.view ?? null;
   }
@@ -852,10 +852,10 @@ export class Mesh {
 
   get #there() {
     if (this.#blocks) return this.#blocks;
-    throw new SoftError(-2, "this mesh was freed, or its world destroyed");
+    throw new SoftError(-2, "this mesh was freed, or its world was destroyed");
   }
 
-  /** Gives back its memory, as `World.destroy` does for all. */
+  /** Free its memory. `World.destroy` does this for all meshes. */
   free() {
     this.#blocks?.positions.free();
     this.#blocks?.normals.free();
@@ -864,7 +864,7 @@ export class Mesh {
   }
 }
 
-/** A spring that holds a body. */
+/** A grab: a spring that holds a body. */
 export class Grab {
   constructor(world, handle) {
     this.world = world;
@@ -888,7 +888,7 @@ export class Grab {
   }
 }
 
-// What has a handle, with its number.
+// An object with a handle and an index.
 class Numbered {
   constructor(world, handle) {
     this.world = world;
@@ -918,7 +918,7 @@ export class Joint extends Numbered {
   }
 }
 
-/** A motor that turns or pushes a part of a body. */
+/** A motor that rotates or pushes a part of a body. */
 export class Motor extends Numbered {
   /** Speed of its vertices [rad/s] or [m/s]. */
   get measuredSpeed() {
@@ -944,7 +944,7 @@ export class Motor extends Numbered {
   }
 }
 
-// What has a number and a pose.
+// An object with a number and a pose.
 class Placed {
   constructor(world, number, prefix) {
     this.world = world;
@@ -956,7 +956,7 @@ class Placed {
     this.world.native.call(`${this.prefix}_${name}`, this.world.handle, this.number, ...args);
   }
 
-  /** Move to a pose until the end of the next step. */
+  /** Move to a pose over the next step. */
   moveTo(pose) {
     this.call("move_to", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
@@ -972,7 +972,7 @@ class Placed {
   }
 }
 
-/** A solid that bodies touch and do not move. */
+/** A rigid shape that bodies cannot move. */
 export class Collider extends Placed {
   constructor(world, number) {
     super(world, number, "ts_collider");
@@ -983,7 +983,7 @@ export class Collider extends Placed {
     this.call("set_velocity", at, at + 24);
   }
 
-  /** Coulomb's coefficient, from the next step on. */
+  /** Coulomb coefficient, from the next step on. */
   setFriction(friction) {
     this.call("set_friction", friction);
   }
@@ -992,7 +992,7 @@ export class Collider extends Placed {
     this.call("teleport", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
 
-  /** `impulse` [N s] that bodies gave it in the last step, and `moment` about its place. */
+  /** `impulse` [N s] of bodies on it in the last step, and `moment` about its position. */
   get impulse() {
     const { native } = this.world;
     this.call("get_impulse", native.small, native.small + 24);
@@ -1000,7 +1000,7 @@ export class Collider extends Placed {
   }
 }
 
-/** A pose that the game moves, with the bodies that are attached to it. */
+/** A pose that the game moves, together with attached bodies. */
 export class Frame extends Placed {
   constructor(world, number) {
     super(world, number, "ts_frame");
@@ -1013,12 +1013,12 @@ async function bytesOf(address) {
     answer = await fetch(address);
   } catch (error) {
     const way = globalThis.document
-      ? "A page from a file may read no other: serve the folder, for example by python -m http.server"
-      : "It reads addresses: give the bytes of files to sceneOf";
+      ? "A page from a file cannot read files: serve the folder, for example with python -m http.server"
+      : "Only URLs can be loaded: pass the bytes of files to sceneOf";
     throw new SoftError(-4, `cannot read ${address}: ${error.message}. ${way}`);
   }
   if (!answer.ok) {
-    const way = "is it a folder that taichi-soft export --for web wrote?";
+    const way = "is it a folder from taichi-soft export --for web?";
     throw new SoftError(-4, `cannot read ${address}: ${answer.status} ${answer.statusText}; ${way}`);
   }
   return new Uint8Array(await answer.arrayBuffer());
@@ -1035,11 +1035,11 @@ function checksum(bytes) {
   return ~code >>> 0;
 }
 
-// The entry of a world file with a name: the place of its bytes and the count of its numbers. See archive.cpp.
+// Finds an entry of a world file: offset of its bytes and count of its numbers. See archive.cpp.
 function entryOf(view, wanted) {
   const filled = (size) => Math.ceil(size / 8) * 8;
   const decoder = new TextDecoder();
-  const widths = [0, 1, 4, 8, 4, 8]; // of a number of each type [bytes]
+  const widths = [0, 1, 4, 8, 4, 8]; // size of a number of each type [bytes]
   let at = 32;
   for (let left = view.getUint32(12, true); left > 0; left -= 1) {
     const [length, type, dimensions] = [0, 4, 8].map((each) => view.getUint32(at + each, true));
@@ -1054,8 +1054,8 @@ function entryOf(view, wanted) {
   throw new RangeError(`no ${wanted}`);
 }
 
-// Whether a module has the size and checksum that its world file says. A world file that cannot be read is the library's to
-// refuse, which says what is wrong with it.
+// True if a module has the size and checksum in its world file. Returns true for an invalid world file, which the library
+// refuses with a reason.
 function isOf(world, code) {
   try {
     const view = new DataView(world.buffer, world.byteOffset, world.byteLength);
@@ -1074,30 +1074,30 @@ export async function sceneOf(code, world) {
   if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
   const [module, file] = [bytesIn(code, "code"), bytesIn(world, "world")];
   if (module.subarray(0, 4).join() !== "0,97,115,109") {
-    throw new SoftError(-4, "the code is no module: is the folder one that taichi-soft export --for web wrote?");
+    throw new SoftError(-4, "the code is not a WebAssembly module: is the folder from taichi-soft export --for web?");
   }
   const compiling = WebAssembly.compile(module); // on another thread
   compiling.catch(() => {}); // awaited below, unless the module is refused
   if (!isOf(file, module)) {
-    throw new SoftError(-4, "the kernels are not those of this world file, or damaged: export it again, with both");
+    throw new SoftError(-4, "the kernels belong to another export, or are damaged: export the world again, and ship both");
   }
   let compiled;
   try {
     compiled = await compiling;
   } catch (error) {
-    throw new SoftError(-9, `this browser cannot compile the world, for which it needs SIMD: ${error.message}`);
+    throw new SoftError(-9, `this browser cannot compile the world, which needs SIMD: ${error.message}`);
   }
   return new Scene(compiled, file);
 }
 
-/** Loads a folder that `taichi-soft export --for web` wrote. */
+/** Loads a folder from `taichi-soft export --for web`. */
 export async function loadScene(folder) {
   const base = String(folder).replace(/\/$/, "");
   const [code, world] = await Promise.all([bytesOf(`${base}/kernels/web.wasm`), bytesOf(`${base}/world.tsw`)]);
   return sceneOf(code, world);
 }
 
-/** A world of such a folder. */
+/** Loads a folder from `taichi-soft export --for web`, and creates a world. */
 export async function loadWorld(folder) {
   return (await loadScene(folder)).createWorld();
 }

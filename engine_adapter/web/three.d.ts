@@ -1,15 +1,15 @@
 import type { Body, Grab, Mesh } from "./taichi-soft.js";
 
-/** A mesh of three.js that follows a body. `THREE` is the module of three.js; its types are yours to name. */
+/** A three.js mesh that follows a body. `THREE` is the module of three.js; you can choose its types. */
 export class SoftMesh<ThreeMesh = any> {
   constructor(THREE: any, body: Body, material: any, name?: string | number | null);
   readonly mesh: ThreeMesh;
   readonly drawn: Mesh;
-  /** Draw the body as it is now. */
+  /** Update the mesh from the body. */
   update(): void;
-  /** Hold the body where the ray of a `THREE.Raycaster` meets it; null if it meets nothing, or another body. */
+  /** Grab the body at the hit of a `THREE.Raycaster`; null if the ray hits nothing or another body. */
   grab(raycaster: any): { grab: Grab; distance: number } | null;
-  /** Move what `grab` returned to the ray, as far from its origin as at first. */
+  /** Move a result of `grab` to the ray, at its initial distance from the origin. */
   pull(held: { grab: Grab; distance: number }, raycaster: any): void;
   dispose(): void;
 }

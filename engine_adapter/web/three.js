@@ -1,4 +1,4 @@
-// Soft bodies in a scene of three.js: the game hands over its own three, so that nothing is imported here.
+// Draws soft bodies in a three.js scene. The game passes its own three.js module, so this file imports nothing.
 //
 //     const jelly = new SoftMesh(THREE, world.body("jelly"), new THREE.MeshStandardMaterial());
 //     scene.add(jelly.mesh);
@@ -7,23 +7,23 @@
 //       jelly.update();
 //     });
 
-/** A mesh of three.js that follows a body. World files for it are exported with `--axes y-up`. */
+/** A three.js mesh that follows a body. Export the world file with `--axes y-up`. */
 export class SoftMesh {
   constructor(THREE, body, material, name = null) {
     this.drawn = body.mesh(name);
     const geometry = new THREE.BufferGeometry();
     for (const [to, from] of [["position", "positions"], ["normal", "normals"]]) {
-      // A copy of three's own: views of the module's memory end where it grows.
+      // A separate copy: views of the module's memory become invalid when it grows.
       const attribute = new THREE.BufferAttribute(new Float32Array(this.drawn[from]), 3);
       geometry.setAttribute(to, attribute.setUsage(THREE.DynamicDrawUsage));
     }
     if (this.drawn.uv) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(this.drawn.uv), 2));
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(this.drawn.triangles), 1));
     this.mesh = new THREE.Mesh(geometry, material);
-    this.mesh.frustumCulled = false; // its box changes with every frame
+    this.mesh.frustumCulled = false; // the bounding box changes in every frame
   }
 
-  /** Draw it as it is now. */
+  /** Update the mesh from the body. */
   update() {
     this.drawn.update();
     const { position, normal } = this.mesh.geometry.attributes;
@@ -32,7 +32,7 @@ export class SoftMesh {
     position.needsUpdate = normal.needsUpdate = true;
   }
 
-  /** Take hold of the body where a ray of a THREE.Raycaster meets it; null where that misses, or hits another. */
+  /** Grab the body at the hit of a THREE.Raycaster; null if the ray hits nothing or another body. */
   grab(raycaster) {
     const { origin, direction } = raycaster.ray;
     const { world, handle } = this.drawn.body;
@@ -40,7 +40,7 @@ export class SoftMesh {
     return hit?.body.handle === handle ? { grab: hit.body.grab(hit), distance: hit.distance } : null;
   }
 
-  /** Move what `grab` gave to where the ray is now, as far from its origin as at first. */
+  /** Move a result of `grab` to the ray, at its initial distance from the origin. */
   pull({ grab, distance }, raycaster) {
     const { origin, direction } = raycaster.ray;
     grab.moveTo(origin.clone().addScaledVector(direction, distance).toArray());

@@ -1,4 +1,4 @@
-"""A simulation taken out to a content pipeline: its meshes and their motion, in one file."""
+"""Bake a simulation into one file of meshes and their motion, for a content pipeline."""
 
 from taichi_soft.bake.baking import BakeReport, bake
 from taichi_soft.bake.room import Room

@@ -1,4 +1,4 @@
-"""From a world's axes to those of glTF."""
+"""Convert a world's axes to those of glTF."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from numpy.typing import NDArray
 
 
 def y_up(rows: NDArray[Any]) -> NDArray[Any]:
-    """Vectors (n, 3) of a world, in which z is up, as glTF has them: (x, z, -y). No bit is lost."""
+    """Convert vectors (n, 3) from z up to glTF's y up: (x, z, -y). This is exact."""
     return np.stack([rows[:, 0], rows[:, 2], -rows[:, 1]], axis=1)

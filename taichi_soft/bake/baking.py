@@ -1,4 +1,4 @@
-"""A scene in, a file out."""
+"""Bake a scene into a file."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ MEGABYTE = 1e6
 
 @dataclass(frozen=True)
 class BakeReport:
-    """What was written."""
+    """Result of a bake."""
 
-    path: Path  # of the file or folder
-    frames: int  # of the clip
+    path: Path  # path of the file or folder
+    frames: int  # number of frames
     fps: float  # frames per second of the clip
-    meshes: tuple[str, ...]  # their names
-    vertices: int  # of all meshes
-    size: int  # of all files [bytes]
-    left_out: tuple[str, ...]  # bodies that have no triangles
+    meshes: tuple[str, ...]  # names of the meshes
+    vertices: int  # number of vertices of all meshes
+    size: int  # total size of the files [bytes]
+    left_out: tuple[str, ...]  # bodies without triangles
 
 
 def bake(
@@ -48,26 +48,27 @@ def bake(
     on_room: Callable[[Room], object] | None = None,
     on_frame: Progress | None = None,
 ) -> BakeReport:
-    """Simulate, and write the meshes of all bodies and their motion into one file.
+    """Simulate a scene and write the meshes of all bodies and their motion into one file.
 
-    Frames lie `1 / fps` apart, the first at once and the last after `seconds`. Each is what the world had
-    after a fixed step: a world makes at least 60 steps a second, a whole number of them from frame to frame.
+    Frames are `1 / fps` apart: the first is the initial state, the last comes after `seconds`. Each frame is
+    the exact state after a fixed step. A world makes at least 60 steps per second, an integer number per
+    frame.
     Args:
-        scene: a world, which is built if it is not yet; or an `EngineAdapter`, whose steps are made, with
-            what its `before_step` does. It goes on from where it stands.
+        scene: a world, which is built if needed, or an `EngineAdapter`, which steps with its own step length
+            and `before_step`. It continues from its current state.
         out: .glb (glTF 2.0, morph targets), .npz (point cache), .vat (a folder: vertex-animation texture,
-            mesh, shaders) or .usdc (USD). What was there is replaced once all is written.
+            mesh, shaders) or .usdc (USD). An existing file is replaced when the bake is complete.
         seconds: length of the clip [s].
         fps: frames per second.
-        interpolation: between frames of a .glb: "linear" or "step".
-        limit: most that the file may hold [MB], told from the number of vertices and frames.
-        on_room: called once with what the file will take, before anything moves.
-        on_frame: called with (frames made, frames in all) after each.
-    Returns: what was written.
+        interpolation: interpolation between frames of a .glb: "linear" or "step".
+        limit: largest size of the file [MB], estimated from the number of vertices and frames.
+        on_room: called once with the estimated size, before anything moves.
+        on_frame: called with (frames made, total frames) after each frame.
+    Returns: names and sizes of the written meshes.
     Raises: OptionError for a value out of range, for more than `limit`, and for frames between an adapter's
-        steps; MissingExtraError; StateError for a body that is cut or torn meanwhile, with the frame;
-        MeshError where nothing has triangles; BakeError where the file cannot be written. Nothing is written
-        then.
+        steps; MissingExtraError; StateError for a body that is cut or torn during the bake, with the frame;
+        MeshError if no body has triangles; BakeError if the file cannot be written. After an error, no file
+        is written.
     """
     path = as_path(out)
     form = _format_of(path)
@@ -111,29 +112,29 @@ def _format_of(path: Path) -> Format:
 
 
 def _require_place(path: Path) -> None:
-    """Raises: BakeError where what is there must not be replaced."""
+    """Raise a BakeError if the path holds something that must not be replaced."""
     wants_folder = path.suffix.lower() == ".vat"
     if path.is_dir() and not (wants_folder and (is_vat(path) or not any(path.iterdir()))):
-        raise BakeError(f"cannot write {path}: it is a folder of something else: name another, or remove it")
+        raise BakeError(f"cannot write {path}: the folder is not a .vat: choose another path, or remove it")
     if wants_folder and path.is_file():
         raise BakeError(
-            f"cannot write {path}: it is a file, and .vat is a folder: name another, or remove it"
+            f"cannot write {path}: a .vat is a folder, and this is a file: choose another path, or remove it"
         )
 
 
 def _require_limit(room: Room, limit: float, path: Path) -> None:
     if room.size > limit * MEGABYTE:
         is_vat_less = path.suffix.lower() != ".vat" and fits_texture(room.frames, room.vertices)
-        smaller = ", into .vat (9 bytes a vertex and frame, not 24)" if is_vat_less else ""
+        smaller = ", into .vat (9 bytes per vertex and frame, not 24)" if is_vat_less else ""
         raise OptionError(
-            f"{path.name} would hold {room}, and the limit is {limit:g} MB: bake fewer --seconds or --fps, "
+            f"{path.name} would hold {room}, above the limit of {limit:g} MB: bake fewer --seconds or --fps, "
             f"a coarser mesh{smaller}, or give a limit of {room.size / MEGABYTE + 1:.0f}"
         )
 
 
 @contextmanager
 def _part_folder(path: Path) -> Iterator[Path]:
-    """A folder beside a file's place, until the file is there."""
+    """Make a temporary folder next to the file's path."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)
@@ -146,7 +147,7 @@ def _part_folder(path: Path) -> Iterator[Path]:
 
 
 def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Interpolation) -> int:
-    """Write into the folder, and move it to its place once it is whole. Returns: bytes."""
+    """Write into the folder, and move the result to `path` when it is complete. Returns: size [bytes]."""
     try:
         made = part / f"bake{path.suffix.lower()}"
         form.write(take, made, interpolation)
@@ -159,8 +160,7 @@ def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Inte
 
 
 def _move(made: Path, path: Path, old: Path) -> None:
-    """Put what is whole in its place. A folder keeps what others put into it, as Godot does with settings of
-    imports."""
+    """Move a complete result to its path. A folder keeps files of others, such as Godot's import settings."""
     if not path.is_dir():
         made.replace(path)
         return

@@ -1,4 +1,4 @@
-"""One mesh through time, and all of them: what the formats write."""
+"""Clips: meshes over time, the input of all formats."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Ints32 = NDArray[np.int32]
 
 @dataclass(eq=False)
 class Clip:
-    """One render mesh of one body, from the frame in which the body came to that in which it went.
+    """One render mesh of one body, from the frame in which the body appears to the one in which it leaves.
 
-    A frame in which nothing moved is the same array as the one before it.
+    A frame without motion is the same array object as the one before it.
     """
 
-    name: str  # no other clip has it
+    name: str  # unique
     triangles: Ints32  # (m, 3)
-    visual: Any  # trimesh's; None where there is none
-    first: int  # frame of the bake in which the body is there first
+    visual: Any  # `visual` of trimesh, or None
+    first: int  # frame of the bake in which the body appears
     positions: list[Floats32] = field(default_factory=list)  # (k, 3) each [m], z up
     normals: list[Floats32] = field(default_factory=list)  # (k, 3) each, of unit length
 
@@ -34,19 +34,19 @@ class Clip:
 
     @property
     def end(self) -> int:
-        """The frame behind the last one in which the body is there."""
+        """Frame after the last one with the body."""
         return self.first + len(self.positions)
 
     @property
     def uv(self) -> Floats | None:
-        """Texture coordinates (k, 2) from the lower left; None where the mesh has none."""
+        """Texture coordinates (k, 2) from the lower left; None if the mesh has none."""
         uv = getattr(self.visual, "uv", None)
         if uv is None or len(uv) != self.vertex_count:
             return None
         return np.asarray(uv, dtype=np.float64)[:, :2]
 
     def add(self, positions: Floats32, normals: Floats32) -> None:
-        """Take in the next frame."""
+        """Append the next frame."""
         if self.positions and np.array_equal(positions, self.positions[-1]):
             if np.array_equal(normals, self.normals[-1]):
                 positions, normals = self.positions[-1], self.normals[-1]
@@ -54,17 +54,17 @@ class Clip:
         self.normals.append(normals)
 
     def is_there(self, frame: int) -> bool:
-        """Whether the body is in the world at a frame of the bake."""
+        """True if the body is in the world at a frame of the bake."""
         return self.first <= frame < self.end
 
     def at(self, frame: int) -> tuple[Floats32, Floats32]:
-        """Positions and normals at a frame; where the body is not there, those of the nearest one."""
+        """Positions and normals at a frame; those of the nearest frame if the body is absent."""
         index = min(max(frame - self.first, 0), len(self.positions) - 1)
         return self.positions[index], self.normals[index]
 
     def targets(self) -> tuple[list[int], list[int]]:
-        """Frames of the clip that differ from the first one, each of them once, and by frame of the clip the
-        place of its shape among them, -1 for that of the first frame."""
+        """Return the frames whose shape differs from the first, without repeats, and the index of each
+        frame's shape in this list, -1 for the first shape."""
         shapes, place, current = [], [-1], -1
         for index in range(1, len(self.positions)):
             before = index - 1
@@ -83,11 +83,11 @@ class Take:
     clips: tuple[Clip, ...]
     frame_count: int
     fps: float
-    left_out: tuple[str, ...]  # bodies that have nothing to draw
+    left_out: tuple[str, ...]  # bodies without triangles
 
     @property
     def times(self) -> Floats:
-        """Of the frames, from the first on [s]."""
+        """Times of the frames from the first [s]."""
         return np.arange(self.frame_count) / self.fps
 
     @property

@@ -1,4 +1,4 @@
-"""The formats of a bake, by the end of the file's name."""
+"""Bake formats, by file suffix."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from taichi_soft.bake.vertex_texture import require_pixels, write_vat
 from taichi_soft.core.errors import OptionError
 
 LARGEST_GLB = 4 * 1024**3 - 1
-"""Bytes: a .glb tells its length in 32 bits."""
+"""Largest .glb [bytes]: its length field has 32 bits."""
 
 
 class Format(NamedTuple):
-    """How a bake is written."""
+    """A format of a bake."""
 
     write: Callable[[Take, Path, Interpolation], object]
-    size: Callable[[int, int], int]  # of (frames, vertices) [bytes]
-    needs: tuple[str, ...]  # extra and modules of it; none where numpy is enough
-    require: Callable[[int, int], object]  # refuses (frames, vertices) that it cannot hold
+    size: Callable[[int, int], int]  # size for (frames, vertices) [bytes]
+    needs: tuple[str, ...]  # extra, and the modules it must provide; empty if numpy is enough
+    require: Callable[[int, int], object]  # refuses (frames, vertices) that do not fit the format
 
 
 def _any(frames: int, vertices: int) -> None:
@@ -31,12 +31,12 @@ def _any(frames: int, vertices: int) -> None:
 
 
 def _floats(frames: int, vertices: int) -> int:
-    """Positions and normals."""
+    """Size of positions and normals [bytes]."""
     return 24 * frames * vertices
 
 
 def _with_weights(frames: int, vertices: int) -> int:
-    """And a weight for each frame in each frame."""
+    """Size of positions, normals and a matrix of weights, frames by frames [bytes]."""
     return _floats(frames + 1, vertices) + 4 * frames**2
 
 
@@ -47,7 +47,7 @@ def _pixels(frames: int, vertices: int) -> int:
 def _below_4_gib(frames: int, vertices: int) -> None:
     if _with_weights(frames, vertices) > LARGEST_GLB:
         raise OptionError(
-            f"{vertices:,} vertices in {frames:,} frames are more than the 4 GiB that a .glb can hold: bake "
+            f"{vertices:,} vertices in {frames:,} frames exceed the 4 GiB of a .glb: bake "
             "fewer --seconds or --fps, or a coarser mesh, or into .npz, .usdc or .vat"
         )
 

@@ -1,7 +1,7 @@
-"""glTF 2.0: a node for each clip, with a morph target for each frame in which it has another shape.
+"""Write glTF 2.0: one node per clip, with a morph target for each distinct shape.
 
-trimesh writes the first frame, with materials and textures; pygltflib puts the motion behind it. A weight of
-one and all others zero at each frame gives the frame itself, and what lies between two frames is their mean.
+trimesh writes the first frame with materials and textures; pygltflib appends the motion. At each frame one
+weight is 1 and all others are 0; between two frames, interpolated weights blend their shapes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from taichi_soft.bake.materials import visual_of
 
 Interpolation = Literal["linear", "step"]
 
-FLOAT, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 5126, 34962, 34963  # as OpenGL numbers them
+FLOAT, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 5126, 34962, 34963  # OpenGL's constants
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
@@ -53,10 +53,10 @@ class GlbFile:
         self.content.asset.generator = "taichi-soft"
         self._blob = bytearray(self.content.binary_blob())
         self._nodes = {node.name: index for index, node in enumerate(self.content.nodes)}
-        self._say_what_views_hold()
+        self._set_view_targets()
 
-    def _say_what_views_hold(self) -> None:
-        """Vertices or indices: trimesh leaves it out, and some importers want it."""
+    def _set_view_targets(self) -> None:
+        """Set the target of each buffer view. trimesh omits it, and some importers require it."""
         for mesh in self.content.meshes:
             (primitive,) = mesh.primitives
             kinds = {accessor: ARRAY_BUFFER for accessor in vars(primitive.attributes).values()}
@@ -65,20 +65,20 @@ class GlbFile:
                     self.content.bufferViews[self.content.accessors[accessor].bufferView].target = kind
 
     def node_of(self, clip: Clip) -> int:
-        """Number of the node that shows a clip."""
+        """Index of the node of a clip."""
         return self._nodes[clip.name]
 
     def mesh_of(self, clip: Clip) -> Any:
-        """The mesh of that node."""
+        """Mesh of the clip's node."""
         return self.content.meshes[self.content.nodes[self.node_of(clip)].mesh]
 
     def add(self, rows: NDArray[Any], *, is_bounded: bool = False, is_vertices: bool = True) -> int:
-        """Put an array into the file. Returns: the number of its accessor.
+        """Append an array to the file. Returns: the index of its accessor.
 
         Args:
-            rows: (n,) or (n, 2 or 3), kept as float32.
-            is_bounded: whether it tells its least and largest values, as positions and times have to.
-            is_vertices: whether it has a row for each vertex.
+            rows: (n,) or (n, 2 or 3), stored as float32.
+            is_bounded: True to store minimum and maximum, which positions and times require.
+            is_vertices: True for one row per vertex.
         """
         from pygltflib import Accessor, BufferView
 
@@ -104,7 +104,7 @@ class GlbFile:
         return len(self.content.accessors) - 1
 
     def save(self, path: Path) -> None:
-        """Write it. Raises: OSError."""
+        """Write the file. Raises: OSError."""
         self.content.buffers[0].byteLength = len(self._blob)
         self.content.set_binary_blob(self._blob)
         self.content.save_binary(str(path))
@@ -122,12 +122,12 @@ class _Motion:
         self.weights: dict[tuple[int, ...], int] = {}
 
     def finish(self) -> None:
-        """Hand the animation to the file, if anything moves."""
+        """Add the animation to the file if anything moves."""
         if self.animation.channels:
             self.file.content.animations.append(self.animation)
 
     def add(self, clip: Clip) -> None:
-        """The motion of one clip, and from when to when it is seen."""
+        """Add the motion of a clip and the interval in which it is visible."""
         shapes, place = clip.targets()
         if shapes:
             self._add_targets(clip, shapes)
@@ -153,7 +153,7 @@ class _Motion:
         mesh.extras = {"targetNames": [f"frame {clip.first + index}" for index in shapes]}
 
     def _weights(self, count: int, place: list[int]) -> int:
-        """One for the shape of each frame, in one array: clips that move alike share it."""
+        """Add an array of weights, 1 for the shape of each frame. Clips with equal weights share it."""
         key = (count, *place)
         if key not in self.weights:
             rows = np.zeros((len(place), count), dtype=np.float32)
@@ -163,7 +163,7 @@ class _Motion:
         return self.weights[key]
 
     def _hide(self, clip: Clip) -> None:
-        """A body that is not there yet, or no more, has no size."""
+        """Scale a body to zero in the frames in which it is absent."""
         changes = {0: clip.first == 0, clip.first: True}
         if clip.end < self.take.frame_count:
             changes[clip.end] = False

@@ -1,4 +1,4 @@
-"""What a clip's mesh looks like, as trimesh writes it to glTF."""
+"""Materials of clips, in the form that trimesh writes to glTF."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from taichi_soft.bake.clip import Clip
 
 PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
-"""Of what has no material of its own. glTF takes what is left out for metal."""
+"""Default material. glTF treats a material without these values as metal."""
 
 COLORS = ((232, 107, 82), (41, 148, 158), (242, 178, 71), (102, 115, 199), (128, 178, 97), (204, 107, 153))
-"""Of bodies without a colour, sRGB up to 255, as films have them."""
+"""Colours of bodies without a colour, sRGB up to 255, the same as in films."""
 
-UNSAID = (102, 102, 102)
-"""The grey that trimesh gives a material without a colour."""
+UNSET = (102, 102, 102)
+"""The grey that trimesh assigns to a material without a colour."""
 
 
 def visual_of(clip: Clip, number: int) -> Any:
-    """trimesh's TextureVisuals with a material of glTF: the artist's, or a plain one.
+    """Make TextureVisuals of trimesh with a glTF material: the artist's, or a default one.
 
     Args:
-        number: of the clip; one without any colour takes that of the palette.
+        number: index of the clip, which chooses the colour of a clip without one.
     """
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
@@ -41,14 +41,14 @@ def visual_of(clip: Clip, number: int) -> Any:
 
 
 def _as_pbr(material: Any) -> Any:
-    """The material of an .obj with the numbers that glTF would take otherwise where they are left out, and
-    without the grey that trimesh gives to what says none, which would darken its texture."""
+    """Convert a material of an .obj to glTF: set values whose glTF defaults differ, and remove the grey that
+    trimesh assigns to materials without a colour, because it darkens the texture."""
     if not hasattr(material, "to_pbr"):
         return material
     made = material.to_pbr()
     made.metallicFactor = 0.0
     if getattr(material, "name", None):
         made.name = material.name
-    if made.baseColorTexture is not None and tuple(np.asarray(material.diffuse)[:3]) == UNSAID:
+    if made.baseColorTexture is not None and tuple(np.asarray(material.diffuse)[:3]) == UNSET:
         made.baseColorFactor = None
     return made

@@ -1,15 +1,16 @@
-"""A point cache: every vertex in every frame, as NumPy reads it.
+"""Write a point cache for NumPy: every vertex in every frame.
 
-| array | shape | what it is |
+| array | shape | content |
 |---|---|---|
-| positions | (frames, vertices, 3) float32 | of all meshes, one behind the other [m]; z is up |
-| normals | (frames, vertices, 3) float32 | of unit length |
-| triangles | (triangles, 3) int32 | vertices, counterclockwise seen from outside |
-| uvs | (vertices, 2) float32 | texture coordinates from the lower left; NaN where a mesh has none |
-| times | (frames,) float64 | from the first frame on [s] |
-| names | (meshes,) | of the meshes |
-| vertex_starts, triangle_starts | (meshes + 1,) int64 | where each mesh begins, and where the last one ends |
-| is_there | (frames, meshes) bool | where false, the body is not in the world: it has its nearest shape |
+| positions | (frames, vertices, 3) float32 | of all meshes, concatenated [m]; z is up |
+| normals | (frames, vertices, 3) float32 | unit normals |
+| triangles | (triangles, 3) int32 | vertex indices, counterclockwise seen from outside |
+| uvs | (vertices, 2) float32 | texture coordinates from the lower left; NaN for meshes without |
+| times | (frames,) float64 | from the first frame [s] |
+| names | (meshes,) | names of the meshes |
+| vertex_starts, triangle_starts | (meshes + 1,) int64 | start of each mesh, and end of the last one |
+| is_there | (frames, meshes) bool | false if the body is absent; its shape is then that of the nearest frame
+|
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A world stepped frame by frame, with what its bodies look like in each."""
+"""Step a world frame by frame and record the meshes of its bodies."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 STEPS_PER_SECOND = 60.0
-"""Least number of fixed steps of a world that comes without an adapter: as `FixedStep` has it."""
+"""Smallest step rate of a world without an adapter [1/s], the default of `FixedStep`."""
 
-NEAR = 1e-6
-"""Part of a step by which a frame may miss it: frame rates such as 29.97 are not exact."""
+STEP_TOLERANCE = 1e-6
+"""Largest distance of a frame from a step [steps]: frame rates such as 29.97 are not exact."""
 
-WHOLE = 1e-3
-"""Part of a frame that may be missing of the last one: 0.3333 s at 30 per second are ten frames."""
+FRAME_TOLERANCE = 1e-3
+"""Fraction of the last frame that may be missing: 0.3333 s at 30 frames per second are ten frames."""
 
 Scene = World | EngineAdapter
 Progress = Callable[[int, int], None]
 
 
 def steps_of(scene: Scene, fps: float) -> Callable[[], None]:
-    """What makes the steps from one frame to the next. A frame lies on a step, so that what is baked is what
-    the world had.
+    """Return a function that advances a scene by one frame. Frames coincide with steps, so that the bake
+    contains exact states.
 
-    Raises: OptionError where frames fall between the steps of an adapter.
+    Raises: OptionError if frames fall between the steps of an adapter.
     """
     if isinstance(scene, EngineAdapter):
         adapter, dt = scene, scene.fixed_step.dt
         count = round(1.0 / (fps * dt))
-        if count < 1 or abs(1.0 / (fps * dt) - count) > NEAR * count:
+        if count < 1 or abs(1.0 / (fps * dt) - count) > STEP_TOLERANCE * count:
             rates = ", ".join(f"{1.0 / (n * dt):g}" for n in (1, 2, 3, 4))
             raise OptionError(
                 f"fps is {fps:g}: frames fall between the adapter's steps of {dt:g} s: use {rates}, or a "
                 f"FixedStep(dt=1 / {math.ceil(STEPS_PER_SECOND / fps) * fps:g})"
             )
         return lambda: _repeat(adapter.step, count)
-    world, count = scene, max(1, math.ceil(STEPS_PER_SECOND / fps - NEAR))
+    world, count = scene, max(1, math.ceil(STEPS_PER_SECOND / fps - STEP_TOLERANCE))
     return lambda: _repeat(lambda: world.step(1.0 / (fps * count)), count)
 
 
@@ -55,14 +55,14 @@ def record(
     require_room: Callable[[int], object],
     on_frame: Progress | None = None,
 ) -> Take:
-    """Make the steps, and keep every frame; the first shows the world as it stands.
+    """Step a scene and record every frame; the first is the current state.
 
     Args:
         scene: a built world, or the adapter that steps it.
-        require_room: called with the number of vertices before the first frame, and when bodies came.
-        on_frame: called with (frames made, frames in all) after each.
-    Raises: StateError for a body that is cut or torn meanwhile, with the frame; MeshError where no body has
-        triangles; what `require_room` and steps raise.
+        require_room: called with the number of vertices before the first frame, and after bodies were added.
+        on_frame: called with (frames made, total frames) after each frame.
+    Raises: StateError for a body that is cut or torn during the recording, with the frame; MeshError if no
+        body has triangles; errors of `require_room` and of steps.
     """
     advance = steps_of(scene, fps)
     recorder = _Recorder(scene.world if isinstance(scene, EngineAdapter) else scene, fps, require_room)
@@ -74,13 +74,13 @@ def record(
             on_frame(frame + 1, frame_count)
     clips = tuple(clip for _, clip in recorder.drawn)
     if not clips:
-        raise MeshError(f"no body has triangles in any of the {frame_count} frames: there is nothing to bake")
+        raise MeshError(f"no body has triangles in any of the {frame_count} frames: add one with a surface")
     return Take(clips, frame_count, fps, tuple(recorder.left_out))
 
 
 @dataclass
 class _Recorder:
-    """Clips as they grow."""
+    """Clips during recording."""
 
     world: World
     fps: float
@@ -90,9 +90,9 @@ class _Recorder:
     known: set[Body] = field(default_factory=set)
 
     def take(self, frame: int) -> None:
-        """Look at every body as it is now."""
+        """Record the current mesh of each body."""
         there = set(self.world.bodies)
-        self.known &= there  # what was away and comes back, by a restored state, begins a clip of its own
+        self.known &= there  # a body that a restored state brings back starts a new clip
         new = [body for body in self.world.bodies if body not in self.known]
         for body in new:
             self._begin(body, frame)
@@ -108,7 +108,7 @@ class _Recorder:
         meshes: tuple[RenderMesh, ...] = body.render_meshes
         try:
             meshes = meshes or (body.render_mesh(),)
-        except MeshError:  # a rope has no triangles
+        except MeshError:  # without triangles, such as a rope
             name = f"body {body.index}"
             self.left_out += [name] if name not in self.left_out else []
         for mesh in meshes:
@@ -124,13 +124,13 @@ class _Recorder:
     def _require_whole(self, mesh: RenderMesh, clip: Clip, frame: int) -> None:
         if not mesh.is_outdated:
             return
-        way_out = "do that before the bake begins"
+        advice = "do that before the bake begins"
         if frame > 1:
-            way_out = f"bake what comes before it, {(frame - 1) / self.fps:.6g} seconds"
+            advice = f"bake only the time before it, {(frame - 1) / self.fps:.6g} seconds"
         raise StateError(
             f"{clip.name!r} was cut, torn or given another level of detail by frame {frame} "
-            f"({frame / self.fps:.6g} s): it has other "
-            f"vertices from there on, which no clip can carry: {way_out}"
+            f"({frame / self.fps:.6g} s): a clip "
+            f"cannot change its vertices: {advice}"
         )
 
 
@@ -144,5 +144,5 @@ def _repeat(call: Callable[[], object], count: int) -> None:
 
 
 def frames_in(seconds: float, fps: float) -> int:
-    """Frames from 0 to `seconds`, both of them included."""
-    return math.floor(seconds * fps + WHOLE) + 1
+    """Number of frames from 0 to `seconds`, both included."""
+    return math.floor(seconds * fps + FRAME_TOLERANCE) + 1

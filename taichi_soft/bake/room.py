@@ -1,4 +1,4 @@
-"""How large a bake becomes, told before anything is simulated."""
+"""Estimated size of a bake."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Room:
-    """What a bake will take."""
+    """Frames, vertices and estimated size of a bake."""
 
     frames: int  # of the clip
-    vertices: int  # of all meshes that are there
-    size: int  # of positions and normals [bytes]; what does not move takes less
+    vertices: int  # of all current meshes
+    size: int  # of positions and normals [bytes]; bodies at rest take less
 
     def __str__(self) -> str:
         return f"{self.frames:,} frames of {self.vertices:,} vertices, about {self.size / 1e6:,.1f} MB"

@@ -1,7 +1,7 @@
-"""USD: a Mesh for each clip, with a sample of its points and normals at each frame.
+"""Write USD: one Mesh per clip, with samples of its points and normals at each frame.
 
-Texture coordinates and the colour of the material are kept. Pictures are not: they are no part of
-a .usdc.
+The file has texture coordinates and the colour of the material, but no texture images, which a .usdc cannot
+contain.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from taichi_soft.bake.materials import visual_of
 
 
 def write_usd(take: Take, path: Path) -> None:
-    """Write a stage, z up, in metres, of which a time code is a frame."""
+    """Write a stage, z up, in metres, with one time code per frame."""
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.CreateNew(str(path))
@@ -37,7 +37,7 @@ def write_usd(take: Take, path: Path) -> None:
 
 
 def _identifier(name: str, taken: set[str]) -> str:
-    """As USD takes names: letters, digits and underscores, each once."""
+    """Convert a name to a unique USD identifier: letters, digits and underscores."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     plain = plain if plain[:1].isalpha() else f"_{plain}"
     each = plain

@@ -1,10 +1,9 @@
-"""A vertex-animation texture: pictures that a shader reads the places of vertices from, frame by frame.
+"""Write a vertex-animation texture: images from which a shader reads the positions of vertices in each frame.
 
-A pixel is a vertex in a frame. Vertex v of frame f lies in column v % width and row
-f * rows_per_frame + v // width, counted from the upper left. Positions have 16 bits for each axis, from the
-lowest to the highest place of the whole bake: one picture has the upper eight of them, one the lower eight.
-So every engine reads them, whatever becomes of its 16-bit pictures. A body that is not in the world is drawn
-together to one point, which draws nothing.
+A pixel is a vertex in a frame. Vertex v of frame f is in column v % width and row
+f * rows_per_frame + v // width, counted from the upper left. Positions have 16 bits per axis, from the lowest
+to the highest position of the whole bake. One image has the upper eight bits and one the lower eight, because
+engines treat 16-bit images differently. An absent body is collapsed to one point, so that it is invisible.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core.errors import OptionError
 
 WIDEST, TALLEST = 4096, 16384
-"""Pixels. A texture of more rows is not to be had on the GPUs that games are made for."""
+"""Largest texture [pixels]. Common GPUs support no more rows."""
 
 LEVELS = 65535
-"""Of 16 bits."""
+"""Quantisation steps of 16 bits."""
 
 METADATA = "metadata.json"
 GODOT_3 = {
@@ -47,29 +46,29 @@ SHADERS = {
     "godot3.shader": ("godot.gdshader", GODOT_3),
     "unity.hlsl": ("unity.hlsl", {}),
 }
-"""File: what it is made from, and the words of that engine in it."""
+"""By file: its template, and the engine's keywords in it."""
 
 Floats = NDArray[np.float64]
 
 
 def fits_texture(frames: int, vertices: int) -> bool:
-    """Whether a texture can hold them."""
+    """True if a texture can hold them."""
     return -(-vertices // WIDEST) * frames <= TALLEST
 
 
 def require_pixels(frames: int, vertices: int) -> None:
-    """Raises: OptionError where a texture would have too many rows."""
+    """Raise an OptionError if a texture would have too many rows."""
     if not fits_texture(frames, vertices):
         each = -(-vertices // WIDEST)
         raise OptionError(
-            f"{vertices:,} vertices in {frames:,} frames are a texture of {each * frames:,} rows, and GPUs "
-            f"take {TALLEST:,}: bake at most {TALLEST // each:,} frames (fewer --seconds or --fps), or a "
+            f"{vertices:,} vertices in {frames:,} frames need a texture of {each * frames:,} rows, and GPUs "
+            f"support {TALLEST:,}: bake at most {TALLEST // each:,} frames (fewer --seconds or --fps), or a "
             "coarser mesh"
         )
 
 
 def write_vat(take: Take, folder: Path) -> None:
-    """Make the folder, with pictures, mesh, metadata and shaders."""
+    """Write the folder with images, mesh, metadata and shaders."""
     require_pixels(take.frame_count, take.vertex_count)
     folder.mkdir()
     width = min(take.vertex_count, WIDEST)
@@ -106,7 +105,7 @@ def write_vat(take: Take, folder: Path) -> None:
 
 
 def is_vat(folder: Path) -> bool:
-    """Whether a folder was written by `write_vat`."""
+    """True if `write_vat` wrote the folder."""
     return (folder / METADATA).is_file() and (folder / "position_high.png").is_file()
 
 
@@ -124,7 +123,7 @@ def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
 
 
 def _gathered(clip: Clip, frame: int) -> Floats:
-    """All vertices in their middle."""
+    """Collapse all vertices to their centre."""
     rows = clip.at(frame)[0].astype(np.float64)
     return np.repeat(rows.mean(axis=0, keepdims=True), len(rows), axis=0)
 
@@ -144,7 +143,7 @@ def _mesh_facts(take: Take) -> list[dict[str, Any]]:
 
 
 def _write_mesh(take: Take, path: Path, width: int, rows: int) -> None:
-    """The first frame, with a second set of texture coordinates: the pixel of each vertex in a frame."""
+    """Write the first frame, with a second set of texture coordinates: the pixel of each vertex."""
     file = GlbFile(take)
     start = 0
     for clip in take.clips:

@@ -1,4 +1,4 @@
-"""The command line: demos and films, what was chosen on this machine, what a frame costs."""
+"""The command line: demos, films, bakes, exports, profiles and device information."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from taichi_soft.core.extras import require_extra
 
 
 def main(*arguments: str) -> None:
-    """Run the command line; an error of ours is one line and exit code 1, a wrong option 2.
+    """Run the command line. A TaichiSoftError prints one line and exits with 1, a wrong option with 2.
 
     Args:
-        arguments: to run with; without any, those of the process.
+        arguments: command-line arguments; by default those of the process.
     """
     try:
         require_extra("cli", "the command line needs")

@@ -28,7 +28,7 @@ add_moved(app)
 
 
 def run(*arguments: str) -> None:
-    """As `cli.main`, with the extra `cli` installed."""
+    """Run the command line, see `cli.main`. Needs the extra `cli`."""
     run_app(app, *arguments)
 
 

@@ -1,4 +1,4 @@
-"""A simulation as a file for a content pipeline."""
+"""Command `bake`: write a simulation to a file for a content pipeline."""
 
 from __future__ import annotations
 
@@ -18,22 +18,25 @@ from taichi_soft.core.runtime import init
 def bake(
     scene: Annotated[
         str,
-        typer.Argument(help="Function of a file or module that returns a world: scene.py:make_world."),
+        typer.Argument(help="Function in a file or module that returns a world: scene.py:make_world."),
     ],
     out: Annotated[
         Path,
-        typer.Option(help="What to write: .glb, .npz, .vat (a folder with textures and shaders), .usdc."),
+        typer.Option(help="Output: .glb, .npz, .vat (a folder with textures and shaders) or .usdc."),
     ],
     seconds: Annotated[float, typer.Option(help="Length of the clip [s].")],
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 30.0,
-    step: Annotated[bool, typer.Option("--step", help="No motion between the frames of a .glb.")] = False,
-    limit: Annotated[float, typer.Option(help="Most that the file may hold [MB].")] = 1000.0,
+    step: Annotated[
+        bool,
+        typer.Option("--step", help="Hold each frame of a .glb until the next one, without interpolation."),
+    ] = False,
+    limit: Annotated[float, typer.Option(help="Largest size of the file [MB].")] = 1000.0,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Simulate a scene, and write its meshes and their motion for Blender, a game engine or a web page."""
+    """Simulate a scene and write its meshes and motion for Blender, a game engine or a web page."""
     make = function_of(scene, "which scene")
-    if threads is not None or arch != "auto":  # or the scene may start Taichi as it likes
+    if threads is not None or arch != "auto":  # otherwise the scene can start Taichi itself
         init(arch, threads)
     made = _scene_of(make(), scene)
     from taichi_soft.bake import bake as write
@@ -56,7 +59,7 @@ def bake(
             ),
         )
     for name in report.left_out:
-        say(f"{name} has no triangles, and was left out")
+        say(f"{name} has no triangles and was skipped")
     say(
         f"wrote {escape(str(report.path))}: {report.frames} frames at {report.fps:g} per second, "
         f"{len(report.meshes)} {'mesh' if len(report.meshes) == 1 else 'meshes'}, {report.size / 1e6:.1f} MB"

@@ -1,4 +1,4 @@
-"""What all commands have in common: the terminal, options, facts of the machine."""
+"""Terminal output, options and device information that all commands share."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from taichi_soft.core.types import ArchName
 console = Console()
 errors = Console(stderr=True)
 
-Arch = Annotated[ArchName, typer.Option(help="Device: auto is the CPU; vulkan and metal are untried.")]
+Arch = Annotated[ArchName, typer.Option(help="Device; auto is the CPU. vulkan and metal are untested.")]
 Threads = Annotated[
     int | None, typer.Option(help="CPU threads; by default one per core, bound to it on Linux.")
 ]
@@ -27,21 +27,21 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing els
 
 
 def say(line: str) -> None:
-    """Print one line as one line, however narrow the terminal is."""
+    """Print a line without wrapping it to the terminal's width."""
     console.print(line, soft_wrap=True, highlight=False)
 
 
 def progress_bar() -> Progress:
-    """How far something is, on a terminal only."""
+    """Make a progress bar that only a terminal shows."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     return Progress(*columns, console=errors, disable=not errors.is_terminal)
 
 
 @contextmanager
 def filming(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Show how far a film is, and what compiles: a bar on a terminal, one line elsewhere.
+    """Show the progress of a film and of compilation: a bar on a terminal, one line elsewhere.
 
-    Yields a function of (frames made, frames in all).
+    Yields a function of (frames made, total frames).
     """
     if not errors.is_terminal:
         say(f"filming {escape(name)}")
@@ -53,13 +53,13 @@ def filming(name: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def device_facts(device: Device) -> dict[str, Any]:
-    """What was chosen, for people and for JSON."""
+    """Describe the chosen device, as text and for JSON."""
     facts = {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
     return {**facts, "bound to cores": list(device.cores)} if device.cores else facts
 
 
 def version_of(name: str) -> str:
-    """Of an installed package."""
+    """Version of an installed package."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Demos, filmed without a display."""
+"""Command `demo`: film a demo without a display."""
 
 from __future__ import annotations
 
@@ -15,24 +15,30 @@ from taichi_soft.core.runtime import init
 
 
 def demo(
-    name: Annotated[str | None, typer.Argument(help="Which demo; without a name, lists them.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Name of the demo; without a name, list all demos.")
+    ] = None,
     out: Out = None,
     seconds: Seconds = None,
     fps: Fps = 50.0,
     size: Size = "1280x720",
     slow: Slow = 1.0,
     blur: Blur = 1,
-    framed: Annotated[bool, typer.Option(help="Look from where all places of the bodies are seen.")] = False,
+    framed: Annotated[
+        bool, typer.Option(help="Move the camera until it sees the bodies at all times.")
+    ] = False,
     orbit: Annotated[
-        float | None, typer.Option(help="The camera goes round once in so much time of the world [s].")
+        float | None, typer.Option(help="Period of an orbiting camera [s of world time].")
     ] = None,
     stats: Stats = False,
-    video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
+    video: Annotated[
+        bool, typer.Option(help="Write a film; without it, only run and time the steps.")
+    ] = True,
     peers: Annotated[bool, typer.Option("--peers", hidden=True)] = False,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Run a demo without a display, film it, and say how fast it ran, as a multiple of real time."""
+    """Run and film a demo without a display, and print its speed as a multiple of real time."""
     from taichi_soft.render.demos import demo_names, load_demo
 
     if peers:

@@ -1,4 +1,4 @@
-"""What is right and wrong with a mesh file."""
+"""Command `doctor`: check a mesh file."""
 
 from __future__ import annotations
 
@@ -19,24 +19,26 @@ COLORS = {"good": "green", "note": "yellow", "bad": "bold red"}
 
 def doctor(
     file: Annotated[Path, typer.Argument(help="A surface (.glb, .obj, .ply, .stl, .off), or tetrahedra.")],
-    material: Annotated[str, typer.Option(help="A preset; `taichi-soft info` lists them.")] = "gelatine",
-    cells: Annotated[int | None, typer.Option(help="Of the cage, along the longest side; 10.")] = None,
-    method: Annotated[str, typer.Option(help="Of meshing: lattice, ftetwild or tetgen.")] = "lattice",
+    material: Annotated[
+        str, typer.Option(help="Material preset; `taichi-soft info` lists all.")
+    ] = "gelatine",
+    cells: Annotated[
+        int | None, typer.Option(help="Cells of the cage along the longest side; 10 by default.")
+    ] = None,
+    method: Annotated[str, typer.Option(help="Meshing method: lattice, ftetwild or tetgen.")] = "lattice",
     up: Annotated[
         str | None,
-        typer.Option(
-            help="Axis that points up in the file, y or z. If not given, the usual one of its format."
-        ),
+        typer.Option(help="Axis that points up in the file, y or z. By default that of its format."),
     ] = None,
     fix: Annotated[
         Path | None,
-        typer.Option(help="Write the surface here, without useless triangles, all facing outwards."),
+        typer.Option(help="Write a repaired surface here: without degenerate triangles, all outwards."),
     ] = None,
     as_json: AsJson = False,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Say what is wrong with a mesh, and what the body costs that it makes. Ends with 1 if it makes none."""
+    """Print the problems of a mesh, and the cost of its body. Exits with 1 if it cannot become a body."""
     from taichi_soft.doctor import diagnose
     from taichi_soft.doctor.mending import write_mended
     from taichi_soft.meshing.surfaces import read_surfaces
@@ -59,6 +61,6 @@ def doctor(
     if fix is not None:
         left_out, turned = write_mended(read_surfaces(file, up), fix)  # type: ignore[arg-type]
         if not as_json:
-            say(f"{escape(fix.name)}: {left_out:,} triangles left out, {turned:,} turned round")
+            say(f"{escape(fix.name)}: {left_out:,} triangles removed, {turned:,} flipped")
     if not found.is_fit:
         raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""A world as a folder for engines without Python."""
+"""Command `export`: write a world as a folder for engines without Python."""
 
 from __future__ import annotations
 
@@ -21,23 +21,28 @@ def export(
         typer.Argument(help="Script that makes a World, or a function that returns one: game.py:make."),
     ],
     out: Annotated[Path, typer.Option(help="Folder to write: game.softworld.")],
-    axes: Annotated[str, typer.Option(help="Of the engine: z-up, y-up (Godot), unity, unreal.")] = "z-up",
+    axes: Annotated[
+        str, typer.Option(help="Axes of the engine: z-up, y-up (Godot), unity, unreal.")
+    ] = "z-up",
     for_: Annotated[
         str | None,
         typer.Option(
             "--for",
-            help="Platforms: linux-x64, windows-x64, linux-arm64, macos-arm64, web, with commas between "
-            "them, or all. This machine's by default.",
+            help="Platforms: linux-x64, windows-x64, linux-arm64, macos-arm64, web, separated by commas, "
+            "or all. This machine's by default.",
         ),
     ] = None,
     static: Annotated[
-        bool, typer.Option("--static", help="Objects to link the game with, where it may open no code.")
+        bool,
+        typer.Option(
+            "--static", help="Write objects to link into the game, for systems that forbid loading code."
+        ),
     ] = False,
 ) -> None:
-    """Write a world with its kernels, which a C library steps in an engine without Python.
+    """Write a world and its kernels, which a C library steps in an engine without Python.
 
-    A script need not know of it: its world is taken as it leaves it, and built if it is not. Bodies, assets,
-    colliders, frames, joints and motors are called as the script's variables are.
+    Scripts need no changes: the world is exported in the state after the script, and built if needed. Bodies,
+    assets, colliders, frames, joints and motors are named after the script's variables.
     """
     init("cpu")
     world, names = _found_in(scene)
@@ -65,7 +70,7 @@ def _plural(report: Any) -> list[tuple[str, list[str]]]:
 
 
 def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
-    """The world of a script or function, and names of what is in it."""
+    """Return the world of a script or function, and the names of its parts."""
     from engine_adapter import EngineAdapter
     from taichi_soft import World
 
@@ -73,7 +78,7 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
         made = variables_of(scene)
         worlds = {id(each): each for each in made.values() if isinstance(each, World)}
         if len(worlds) != 1:
-            raise OptionError(f"{scene} must make one World in a variable of its own, and has {len(worlds)}")
+            raise OptionError(f"{scene} must have exactly one global World, found {len(worlds)}")
         return next(iter(worlds.values())), _names_in(made)
     found = function_of(scene, "which scene")()
     world = found.world if isinstance(found, EngineAdapter) else found
@@ -83,7 +88,7 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
 
 
 def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
-    """Names of what a world has, by the variables that hold it; of what is in a list, with its place."""
+    """Name the parts of a world after the variables that hold them; in a list, with the index."""
     from taichi_soft import Body, Collider, Frame, Joint, Motor, SoftBodyAsset
 
     found: dict[Any, str] = {}

@@ -1,4 +1,4 @@
-"""A film of a user's mesh, world or stage."""
+"""Command `film`: film a mesh, a world or a stage."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 MATERIAL = "gelatine"
 
 SMALLEST, LARGEST, LENGTH = 0.05, 5.0, 1.0
-"""A mesh whose longest side is outside of these by its file is filmed with this one [m]: it has another unit,
-or is too large or too small to look soft."""
+"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]: its file has another
+unit, or the mesh is too large or too small to look soft."""
 
 SECONDS = 5.0
-"""Length of a film where none is given and the scene is no Stage [s]."""
+"""Default length of a film whose scene is not a Stage [s]."""
 
 DROP = 0.5
-"""Height from which a mesh falls [its own height]."""
+"""Drop height [height of the mesh]."""
 
 
 def film(
@@ -55,24 +55,26 @@ def film(
     blur: Blur = 1,
     stats: Stats = False,
     orbit: Annotated[
-        bool, typer.Option("--orbit", help="Let the camera go round once while the film runs.")
+        bool, typer.Option("--orbit", help="Let the camera orbit once during the film.")
     ] = False,
     material: Annotated[
-        str | None, typer.Option(help="Of a mesh: a preset that taichi-soft info lists; gelatine by default.")
+        str | None,
+        typer.Option(help="For a mesh: material preset, see taichi-soft info; gelatine by default."),
     ] = None,
     length: Annotated[
-        float | None, typer.Option(help="Of a mesh: its longest side in metres; by default as in the file.")
+        float | None,
+        typer.Option(help="For a mesh: its longest side in metres; by default that of the file."),
     ] = None,
     cells: Annotated[
-        int | None, typer.Option(help="Of a mesh: cells along its longest side; 10 by default.")
+        int | None, typer.Option(help="For a mesh: cells along its longest side; 10 by default.")
     ] = None,
     up: Annotated[
-        str | None, typer.Option(help="Of a mesh: axis that points up in its file, y or z.")
+        str | None, typer.Option(help="For a mesh: axis that points up in its file, y or z.")
     ] = None,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Film a mesh that falls onto the floor, or a world of your own, without a display."""
+    """Film a mesh that falls onto the floor, or your own world, without a display."""
     pixels = size_of(size)
     if seconds is not None:
         as_positive(seconds, "seconds", "s")
@@ -106,7 +108,7 @@ def _stage_of(
     seconds: float | None,
     orbit: bool,
 ) -> Stage:
-    """A stage as its author made it; or of a world, seen from where all of its motion is in the picture."""
+    """Return the author's stage, or a stage of a world whose camera sees all motion."""
     from taichi_soft import World
     from taichi_soft.render.camera import Camera
     from taichi_soft.render.camera_moves import Orbit
@@ -118,7 +120,7 @@ def _stage_of(
         if orbit:
             if not isinstance(found.camera, Camera):
                 raise OptionError(
-                    f"--orbit needs a camera that stays, and that of {scene} moves: leave it out"
+                    f"--orbit needs a fixed camera, and the camera of {scene} moves: leave out --orbit"
                 )
             found.camera = Orbit(found.camera, found.seconds if seconds is None else seconds)
         return found
@@ -130,7 +132,7 @@ def _stage_of(
 
     def make() -> Stage:
         if not waiting:
-            gc.collect()  # the first world gives its fields to the next
+            gc.collect()  # frees the fields of the first world for the next
         world = waiting.pop() if waiting else find()
         if not world.is_built:
             world.build()
@@ -140,7 +142,7 @@ def _stage_of(
 
 
 def _scene_of(scene: str) -> Callable[[], Any]:
-    """A function that makes the world or stage of a script or function anew."""
+    """Return a function that makes a new world or stage from a script or function."""
     if ":" not in scene and not scene.endswith(".py"):
         from taichi_soft.render.demos import demo_names
 
@@ -164,9 +166,7 @@ def _scene_of(scene: str) -> Callable[[], Any]:
                 return next(iter(found.values()))
             if found:
                 break
-        raise OptionError(
-            f"{scene} must make one World or one Stage, in a variable of its own, and has {len(found)}"
-        )
+        raise OptionError(f"{scene} must have exactly one global World or Stage, found {len(found)}")
 
     return find
 
@@ -174,7 +174,7 @@ def _scene_of(scene: str) -> Callable[[], Any]:
 def _drop_of(
     file: Path, material: str, length: float | None, cells: int | None, up: Any
 ) -> Callable[[], Any]:
-    """A function that makes a world in which the mesh of a file falls onto the floor."""
+    """Return a function that makes a world in which the mesh of a file falls onto the floor."""
     from taichi_soft import SoftBodyAsset, World
 
     made_of = preset(material)  # type: ignore[arg-type]
@@ -183,12 +183,12 @@ def _drop_of(
     own = float(np.ptp(points, axis=0).max())
     wanted = own if length is None else as_positive(length, "length", "m")
     if own <= 0.0:
-        raise MeshError(f"{file.name}: all of its vertices are at one place")
+        raise MeshError(f"{file.name}: all vertices are at the same point")
     if length is None and not SMALLEST <= own <= LARGEST:
         wanted = LENGTH
         say(
-            f"{escape(file.name)} is {own:.4g} m long in its file, and is filmed as {wanted:g} m long: "
-            "--length sets another one"
+            f"{escape(file.name)} is {own:.4g} m long in its file and is scaled to {wanted:g} m: "
+            "--length sets another length"
         )
     if wanted != own:
         surfaces = tuple(replace(each, vertices=each.vertices * (wanted / own)) for each in surfaces)

@@ -1,4 +1,4 @@
-"""The options and the lines of commands that make a film."""
+"""Options and output of commands that make a film."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from taichi_soft.core.errors import OptionError
 if TYPE_CHECKING:
     from taichi_soft.render.stage import Stage
 
-Out = Annotated[Path | None, typer.Option(help="Film to write: .mp4, .webm, .gif, or .png for pictures.")]
-Seconds = Annotated[float | None, typer.Option(help="Time of the world that the film shows, in seconds.")]
+Out = Annotated[Path | None, typer.Option(help="Film to write: .mp4, .webm, .gif, or .png for images.")]
+Seconds = Annotated[float | None, typer.Option(help="World time to film [s].")]
 Fps = Annotated[float, typer.Option(help="Frames per second.")]
 Size = Annotated[str, typer.Option(help="Width x height in pixels.")]
-Slow = Annotated[float, typer.Option(help="How many times slower than the world the film is.")]
-Blur = Annotated[int, typer.Option(help="Number of pictures averaged to one, for motion blur; 1 is sharp.")]
+Slow = Annotated[float, typer.Option(help="Slow-motion factor.")]
+Blur = Annotated[int, typer.Option(help="Subframes averaged per frame, for motion blur; 1 turns it off.")]
 
 Stats = Annotated[
-    bool, typer.Option("--stats", help="Write the time and the speed of this machine on each frame.")
+    bool, typer.Option("--stats", help="Show the time and the speed of this machine on each frame.")
 ]
 
 
 def size_of(text: str) -> tuple[int, int]:
-    """Width and height [pixels] of `1280x720`. Raises: OptionError."""
+    """Parse `1280x720` to width and height [pixels]. Raises: OptionError."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise OptionError(f"size must be width x height in pixels, such as 1280x720, got {text!r}")
@@ -48,7 +48,7 @@ def make_film(
     blur: int,
     stats: bool,
 ) -> None:
-    """Film a stage, and say what was written and how fast it ran; without a path, only run it."""
+    """Film a stage and print the result and its speed; without a path, only run it."""
     from taichi_soft.render.film import film
 
     with filming(name) as show:
@@ -73,4 +73,4 @@ def make_film(
         )
     if len(report.draw_times):
         drawing = f"{median(report.draw_times) * 1e3:.1f} ms to draw, at the median"
-        say(f"a picture of {size[0]}x{size[1]} took {drawing}")
+        say(f"a frame of {size[0]}x{size[1]} took {drawing}")

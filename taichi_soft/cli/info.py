@@ -1,4 +1,4 @@
-"""What was chosen on this machine, and what there is."""
+"""Command `info`: print the chosen device, and the available laws and materials."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from taichi_soft.elements.materials import Material
 
 
 def info(
-    laws: Annotated[bool, typer.Option("--laws", help="Measure what each force law costs.")] = False,
-    law: Annotated[list[str] | None, typer.Option(help="Measure this one; once for each of several.")] = None,
+    laws: Annotated[bool, typer.Option("--laws", help="Measure the cost of each force law.")] = False,
+    law: Annotated[
+        list[str] | None, typer.Option(help="Measure only this law; repeat the option for several.")
+    ] = None,
     arch: Arch = "auto",
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say which device, versions, laws and materials there are."""
+    """Print device, versions, laws and materials."""
     from taichi_soft.elements.laws import LAWS
     from taichi_soft.elements.materials import PRESETS
     from taichi_soft.profiling.baseline import find_compiler
@@ -58,7 +60,7 @@ def __say_laws(names: list[str], as_json: bool) -> None:
     from taichi_soft.profiling.report import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
-        costs = measure_laws(cast(list[LawName], names))  # which checks them
+        costs = measure_laws(cast(list[LawName], names))  # checks the names
     if as_json:
         print(json.dumps(law_rows(costs), indent=2))
         return

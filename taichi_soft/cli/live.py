@@ -1,4 +1,4 @@
-"""A world live in the browser."""
+"""Command `live`: show a live world in the browser."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from taichi_soft.core.extras import require_extra
 def live(
     scene: Annotated[
         str | None,
-        typer.Argument(help="A demo, a mesh, or a script that makes a World; without it, some bodies."),
+        typer.Argument(help="A demo, a mesh, or a script that makes a World; by default a playground."),
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address to serve at; any but this machine's own asks for a token.")
+        str, typer.Option(help="Address to serve at; any address except loopback requires a token.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8080,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 8080,
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
     measure: Annotated[
         bool,
-        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs: 8 minutes."),
+        typer.Option("--measure", help="Measure latency and the cost of a visitor instead (8 minutes)."),
     ] = False,
 ) -> None:
-    """Show a world in the browser, to be seen, touched and tuned, until Ctrl-C."""
+    """Show a world in the browser until Ctrl-C; visitors can grab bodies and change parameters."""
     require_extra("live", "a live world needs")
     from taichi_soft.live.scene import found_source
     from taichi_soft.live.server import LiveServer
@@ -62,8 +62,8 @@ def _measure() -> None:
     middle = [(each.ratios[0], each.ratios[len(each.ratios) // 2], each.ratios[-1]) for each in costs]
     table.add_row("ratio of p99: least, median, most", *(_numbers(three, 2) for three in middle))
     console.print(table)
-    say("latency: from a move of the hand to the first frame with it, at the socket; drawing is not included")
-    say("step: median of turns without and with a visitor; the ratio is that of one turn's p99")
+    say("latency: from a move of the hand to the first frame that shows it, at the socket, without rendering")
+    say("step: median over turns without and with a visitor; ratio: of the p99 within a turn")
 
 
 def _numbers(numbers: Iterable[float], digits: int) -> str:
@@ -83,7 +83,7 @@ async def _serve(server: object, opens: bool) -> None:
     except OSError as error:
         place = f"{server.host}:{server.port}"
         raise OptionError(f"cannot serve at {place}: {error.strerror or error}") from error
-    say(f"open {escape(address)} in a browser; Ctrl-C ends it")
+    say(f"open {escape(address)} in a browser; press Ctrl-C to stop")
     if opens:
         webbrowser.open(address)
     try:

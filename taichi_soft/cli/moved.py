@@ -1,4 +1,4 @@
-"""Commands of earlier versions that only a checkout has now."""
+"""Commands of earlier versions that are now only in a source checkout."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import typer
 from taichi_soft.core.errors import OptionError
 
 MOVED = ("drop-test", "report")
-"""Commands of `python -m lab`, by their names here and there."""
+"""Commands that moved to `python -m lab` under the same name."""
 
 
 def add_moved(app: typer.Typer) -> None:
-    """Add hidden commands that take anything, and say where the command is."""
+    """Add hidden commands that accept any arguments and name the new command."""
     anything = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
     for name in MOVED:
         app.command(name, hidden=True, context_settings=anything)(_refuse)
@@ -22,5 +22,5 @@ def _refuse(context: typer.Context) -> None:
 
 
 def refuse_moved(old: str, new: str) -> None:
-    """Raises: OptionError in one line that names the command of a checkout."""
-    raise OptionError(f"{old} is in a checkout of the sources only: run python -m lab {new} there")
+    """Raise an OptionError that names the command in a source checkout."""
+    raise OptionError(f"{old} needs a checkout of the sources: run python -m lab {new} there")

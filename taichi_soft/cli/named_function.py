@@ -1,4 +1,4 @@
-"""A script of a user, or a function of it or of a module, named on the command line: `game.py:make_world`."""
+"""Find a script or a function that is named on the command line: `game.py:make_world`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from taichi_soft.core.errors import OptionError
 
 
 def function_of(text: str, what: str) -> Callable[[], Any]:
-    """What `place:name` means.
+    """Return the function that `place:name` names.
 
     Args:
-        what: it is to give, as "which worlds".
-    Raises: OptionError for other text, what cannot be imported, and a name that is not there.
+        what: purpose of the function for error messages, such as "which worlds".
+    Raises: OptionError for malformed text, a failed import, or an unknown name.
     """
     place, _, name = text.rpartition(":")
     if not place or not name.isidentifier():
@@ -36,7 +36,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
 def variables_of(script: str) -> dict[str, Any]:
     """Run a script, with its folder and the current one on the path. Returns: its variables, by name.
 
-    Raises: OptionError for a file that cannot be read, and what the script raises.
+    Raises: OptionError for a file that cannot be read, and every error of the script.
     """
     try:
         Path(script).read_bytes()

@@ -1,4 +1,4 @@
-"""What a frame costs."""
+"""Command `profile`: measure the cost of a frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.core.runtime import init
 GpuName: TypeAlias = Literal["cuda", "vulkan", "metal"]
 
 IN_TURN = 15
-"""Steps at least in which a budget is measured."""
+"""Smallest number of steps for measuring a budget."""
 
 
 def profile(
@@ -25,36 +25,36 @@ def profile(
         bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")
     ] = False,
     crossover: Annotated[
-        bool, typer.Option("--crossover", help="Compare the schedules on one body of growing size.")
+        bool, typer.Option("--crossover", help="Compare the schedules for bodies of increasing size.")
     ] = False,
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Compare 64 spheres on one thread and on all.")
     ] = False,
     gpu: Annotated[
-        GpuName | None, typer.Option(help="Compare the CPU's threads with this kind of GPU: minutes.")
+        GpuName | None, typer.Option(help="Compare the CPU's threads with this kind of GPU (minutes).")
     ] = None,
     implicit: Annotated[
         bool, typer.Option("--implicit", help="Compare implicit Euler with leapfrog and with scipy.")
     ] = False,
     startup: Annotated[
-        bool, typer.Option("--startup", help="Time new processes until their worlds are warm: minutes.")
+        bool, typer.Option("--startup", help="Time new processes until their worlds are warm (minutes).")
     ] = False,
     game: Annotated[
-        bool, typer.Option("--game", help="What contact, sleep, spawning and unused features cost.")
+        bool, typer.Option("--game", help="Measure the cost of contact, sleep, spawning and unused features.")
     ] = False,
     budget: Annotated[
-        bool, typer.Option("--budget", help="Whether a budget is kept by levels of detail: minutes.")
+        bool, typer.Option("--budget", help="Measure whether levels of detail keep a time budget (minutes).")
     ] = False,
-    repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
+    repeats: Annotated[int, typer.Option(min=3, help="Number of measurements per figure.")] = 121,
     as_json: AsJson = False,
     arch: Arch = "auto",
     threads: Threads = None,
     cores: Annotated[
         str | None,
-        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); --threads alone binds none."),
+        typer.Option(help="Cores to bind the threads to, such as 0,1 (Linux); --threads alone binds none."),
     ] = None,
 ) -> None:
-    """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
+    """Measure the cost of a frame, and how many bodies fit a frame at 60 Hz and 120 Hz."""
     device = init(arch, threads, _cores_of(cores))
     from taichi_soft import profiling
     from taichi_soft.profiling import report
@@ -96,7 +96,7 @@ def profile(
     where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
     say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
     for title, table in report.tables(found):
-        say(f"\n[bold]{escape(title)}[/]")  # not the table's own title, which breaks at the table's width
+        say(f"\n[bold]{escape(title)}[/]")  # a table wraps its own title at the table's width
         console.print(table)
 
 

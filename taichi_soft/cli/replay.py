@@ -1,4 +1,4 @@
-"""Recordings, made again."""
+"""Command `replay`: replay a recording."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from taichi_soft.core.runtime import init
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(help="A recording, see World(record=...), or what a page saved.")],
+    file: Annotated[
+        Path, typer.Argument(help="A recording, see World(record=...), or a file saved by a web page.")
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="Picture of the end, .png; beside the recording by default.")
+        Path | None, typer.Option(help="Image of the final state, .png; by default next to the recording.")
     ] = None,
-    steps: Annotated[int | None, typer.Option(help="Makes at most this many of its steps.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Replay at most this many steps.")] = None,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Make a recording again, bit by bit; say what broke first, and draw the moment."""
+    """Replay a recording bit by bit, print what failed first, and draw the final state."""
     init(arch, threads)
     from taichi_soft.render.replay import failure_line
     from taichi_soft.render.replay import replay as play_again
@@ -29,11 +31,11 @@ def replay(
     report = play_again(file, out or file.with_suffix(".png"), steps)
     end = f"up to step {report.world.step_count}, t = {report.world.time:.4g} s"
     if report.first_difference is None:
-        say(f"{report.steps} steps made again, {end}: every state is the same, bit by bit")
+        say(f"{report.steps} steps replayed, {end}: all states are bit-identical")
     else:
         say(
-            f"{report.steps} steps made again, {end}: not the same from step {report.first_difference} on. "
-            "Was it recorded on another kind of machine?"
+            f"{report.steps} steps replayed, {end}: states differ from step {report.first_difference} on. "
+            "Was it recorded on another kind of processor?"
         )
     say(f"hash {report.hash}")
     for failure in report.failures:

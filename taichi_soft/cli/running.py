@@ -1,4 +1,4 @@
-"""A command line: its commands with a summary each, and what becomes of errors, warnings and signals."""
+"""Make and run a command line: summaries of commands, errors, warnings and signals."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from taichi_soft.core.signals import INTERRUPTED, ended_by_signals
 
 
 def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
-    """Make a command of each function, named after it; the first paragraph of its docstring sums it up."""
+    """Make a command of each function, with its name and the first paragraph of its docstring as summary."""
     app = typer.Typer(
         help=summary,
         no_args_is_help=True,
         add_completion=False,
-        rich_markup_mode=None,  # it would take units in brackets, such as [s], for markup
+        rich_markup_mode=None,  # units in brackets, such as [s], are not markup
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
@@ -32,11 +32,11 @@ def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
 
 
 def run_app(app: typer.Typer, *arguments: str) -> None:
-    """Run a command; an error of ours is one line and exit code 1, a wrong option 2.
+    """Run a command. A TaichiSoftError prints one line and exits with 1, a wrong option with 2.
 
     Args:
-        app: made by `make_app`.
-        arguments: to run with; without any, those of the process.
+        app: result of `make_app`.
+        arguments: command-line arguments; by default those of the process.
     """
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:

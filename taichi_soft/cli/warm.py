@@ -1,4 +1,4 @@
-"""Kernels compiled before a game needs them."""
+"""Command `warm`: compile kernels before a game needs them."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from taichi_soft.core.runtime import init, kernel_folder
 def warm(
     worlds: Annotated[
         str,
-        typer.Argument(help="Function of a file or module that returns built worlds: game.py:make_world."),
+        typer.Argument(help="Function in a file or module that returns built worlds: game.py:make_world."),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for the kernels, to ship with a game; by default that of all programs."),
+        typer.Option(help="Folder for the kernels, to ship with a game; by default the shared cache."),
     ] = None,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Compile all that the worlds of a game need, so that its next start finds it."""
+    """Compile all kernels of a game's worlds, so that its next start loads them from the cache."""
     make = function_of(worlds, "which worlds")
     if out is not None:
         os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(out.resolve())
-    if threads is not None or arch != "auto":  # or a game may start Taichi as it likes
+    if threads is not None or arch != "auto":  # otherwise the game can start Taichi itself
         init(arch, threads)
     start = time.perf_counter()
     with (
@@ -48,11 +48,11 @@ def warm(
     took = time.perf_counter() - start
     say(
         f"{count} {'world' if count == 1 else 'worlds'} in {took:.1f} s: {BURST.made} kernels compiled, "
-        f"{BURST.found} found from earlier"
+        f"{BURST.found} already in the cache"
     )
-    say(f"a start that builds the same worlds in the same order finds them in {escape(str(kernel_folder()))}")
+    say(f"starts that build the same worlds in the same order load them from {escape(str(kernel_folder()))}")
     if out is not None:
-        say("where TI_OFFLINE_CACHE_FILE_PATH names that folder")
+        say("set TI_OFFLINE_CACHE_FILE_PATH to that folder")
 
 
 def _worlds_of(found: Any, text: str) -> Iterable[Any]:

@@ -1,1 +1,1 @@
-"""What a game does to a body between two steps: arguments checked, then one kernel call each."""
+"""A game's changes to bodies between two steps: check the arguments, then call one kernel."""

@@ -1,4 +1,4 @@
-"""Particles that go with a frame, and what they pull it with."""
+"""Particles attached to a frame, and their load on it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Slice, SoftBody, context_of
-from taichi_soft.control.change import change, named_particles, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, require_per_body, rows_of
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 from taichi_soft.core.checks import as_flag
@@ -21,17 +21,17 @@ from taichi_soft.core.types import Schedule
 
 
 class Attachment(Handle):
-    """Particles of a body held by a frame. Made by `Body.attach`.
+    """Particles of a body attached to a frame. Returned by `Body.attach`.
 
-    Where the body is cut or tears, they are held on, and so are copies of them: `particles` has them all. If
-    it falls apart, `body` is the largest piece that has some; what another has is held by an attachment of
-    its own, in its `Body.attachments`. Where the level of detail changes, the nearest vertices are held on.
+    If the body is cut or torn, the particles and their copies stay attached; `particles` lists all. If it
+    falls apart, `body` is the largest piece with attached particles; other pieces get their own attachments,
+    listed in `Body.attachments`. If the level of detail changes, the nearest vertices are attached instead.
     """
 
     def __init__(
         self, frames: Frames, body: SoftBody, particles: NDArray[np.int32], frame: Frame, *, two_way: bool
     ) -> None:
-        """Made by `Body.attach`."""
+        """Use `Body.attach` instead."""
         self._frames = frames
         self.body = body
         self.particles = particles
@@ -44,27 +44,27 @@ class Attachment(Handle):
 
     @property
     def is_attached(self) -> bool:
-        """False once released."""
+        """False after release."""
         return self in self._frames.holding(self.body)
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """What the body pulled the frame with, mean over the last step, (3,) [N].
+        """Force of the body on the frame, mean over the last step, (3,) [N].
 
-        The weight of what is held by it and what it takes to accelerate it included. A frozen body pulls at
-        nothing: 0, or what others do to the particles that are held.
-        Raises: StateError once released, or made without `two_way`.
+        It includes the weight of the attached particles and the force that accelerates them. A frozen body
+        exerts no force: the result is 0, or the force of other bodies on the attached particles.
+        Raises: StateError after release, or without `two_way`.
         """
         return self._load()[:3]
 
     @property
     def torque(self) -> NDArray[np.float64]:
-        """The same force's torque about the frame's origin, (3,) [N m]. Raises: as `force`."""
+        """Torque of `force` about the frame's origin, (3,) [N m]. Raises: as `force`."""
         return self._load()[3:]
 
     @recorded
     def release(self) -> None:
-        """Let the particles go, with the velocity that they had. Raises: StateError if it was done before."""
+        """Release the particles; they keep their velocity. Raises: StateError if already released."""
         self._require_attached()
         body = self.body
         change(body, free_particles, rows_of(body, self.particles))
@@ -82,7 +82,7 @@ class Attachment(Handle):
     def _load(self) -> NDArray[np.float64]:
         self._require_attached()
         if not self.two_way:
-            raise StateError("this attachment feels nothing: make it with two_way=True")
+            raise StateError("this attachment does not record its load: create it with two_way=True")
         impulses = np.empty(6)
         context = context_of(self.body)
         rows = rows_of(self.body, self.particles)
@@ -91,10 +91,10 @@ class Attachment(Handle):
 
 
 class Attachments(Slice):
-    """All attachments of one world; its `Frames` know them by body."""
+    """All attachments of one world; `Frames` stores them by body."""
 
     name = "attachments"
-    prevents_cuts = False  # `share_attachments` lets pieces hang on
+    prevents_cuts = False  # `share_attachments` keeps pieces attached
     prevents_levels = False  # see `levels.reattaching`
 
     @property
@@ -102,16 +102,16 @@ class Attachments(Slice):
         return self.context.of(Frames)
 
     def holds(self, body: SoftBody) -> bool:
-        """Whether it is attached to a frame."""
+        """True if the body is attached to a frame."""
         return bool(self._frames.holding(body))
 
     def release_body(self, body: SoftBody) -> None:
-        """Release all that hold a body."""
+        """Release all attachments of a body."""
         for attachment in list(self._frames.holding(body)):
             attachment.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Attach a vertex that is free to a frame, and ask what it pulls with."""
+        """Attach a free vertex to a frame, and read its load."""
         free = np.setdiff1d(np.arange(body.vertex_count), body.pinned)
         if not len(free):
             return
@@ -126,7 +126,7 @@ class Attachments(Slice):
         frame.remove()
 
     def entries(self) -> list[list[Any]]:
-        """Numbers of handle, body and frame, whether it feels a load, and the particles that it holds."""
+        """List numbers of handle, body and frame, the flag `two_way`, and the particles."""
         frames, bodies = self._frames, sorted(self._frames.attachments, key=lambda body: body.index)
         return [
             [serial_of(a), body.index, frames.number_of(a.frame), a.two_way, a.particles.tolist()]
@@ -137,20 +137,20 @@ class Attachments(Slice):
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, bool, NDArray[np.int32]]]:
-        """Rows of `entries`. Raises: ValueError for what holds nobody, or hangs from no frame."""
+        """Parse rows of `entries`. Raises: ValueError for a missing body or frame."""
         rows = {row for row, (serial, _, _) in enumerate(earlier[Frames.name]) if serial != 0}
         found = []
         for serial, slot, number, two_way, particles in entries:
             count = vertex_counts[below(slot, len(vertex_counts))]
             if not count or number not in rows:
-                raise ValueError("an attachment holds no body, or hangs from no frame")
+                raise ValueError("an attachment has no body or no frame")
             found.append(
                 (int(serial), int(slot), int(number), bool(two_way), indices_below(particles, count))
             )
         return found
 
     def restore(self, read: Any) -> None:
-        """Let there be the attachments that were `read`, and no other."""
+        """Replace all attachments by those from `read`."""
         context, frames = self.context, self._frames
         frames.attachments.clear()
         for serial, slot, number, two_way, particles in read:
@@ -166,7 +166,7 @@ class Attachments(Slice):
 
 
 def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
-    """As `Body.attach`."""
+    """Implement `Body.attach`."""
     context = context_of(body)
     frames = context.of(Frames)
     vertices = named_particles(body, particles)
@@ -175,7 +175,7 @@ def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> A
     require_unattached(body, vertices)
     rows = rows_of(body, vertices)
     if feels:
-        require_substeps(context, "forces on frames (two_way=True)")
+        require_per_body(context, "forces on frames (two_way=True)")
     offsets = body.positions()[vertices].astype(np.float64) - frame.position
     local = turned(offsets, frame.rotation.T.astype(np.float64)).astype(np.float32)
     change(body, attach_particles, body.index, number, int(feels), rows, local)
@@ -187,11 +187,10 @@ def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> A
 
 
 def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[np.int64]]]) -> None:
-    """Let go on what holds a body that was cut.
+    """Keep the attachments of a body that was cut.
 
     Args:
-        pieces: what it has become, the largest first, with the vertex of the body before that each vertex is,
-            or is a copy of, (n,).
+        pieces: the pieces, the largest first, each with the original vertex of each of its vertices, (n,).
     """
     context = context_of(body)
     frames = context.of(Frames)
@@ -211,13 +210,13 @@ def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[n
 
 
 def attached_vertices(body: SoftBody) -> NDArray[np.int32]:
-    """All that frames hold, (k,)."""
+    """All attached vertices of a body, (k,)."""
     held = context_of(body).of(Frames).holding(body)
     return np.concatenate([np.zeros(0, np.int32), *(each.particles for each in held)])
 
 
 def require_unattached(body: SoftBody, vertices: NDArray[np.int32]) -> None:
-    """Raises: StateError with the first of `vertices` that a frame holds."""
+    """Raise a StateError with the first of `vertices` that is attached to a frame."""
     held = np.intersect1d(vertices, attached_vertices(body))
     if len(held):
         raise StateError(

@@ -1,4 +1,4 @@
-"""How all control reaches a body: through `change`, and nowhere else."""
+"""Change a body between two steps. All control goes through `change` or `attempt`."""
 
 from __future__ import annotations
 
@@ -25,46 +25,46 @@ def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def attempt(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a kernel that can refuse. The body stays asleep until the caller calls `mark_modified`."""
+    """Call a kernel that can refuse the change. The caller wakes the body with `mark_modified` on success."""
     return context_of(body).built.attempt(kernel, *arguments)
 
 
 def mark_modified(body: SoftBody) -> None:
-    """An attempt has changed `body`."""
+    """Wake `body` after a successful attempt."""
     context_of(body).built.mark_modified(body.index)
 
 
 def numbers(*values: Any) -> Rows32:
-    """Numbers and vectors in a row, as kernels take them."""
+    """Concatenate numbers and vectors to an array for kernels."""
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
 
 
 def some_particles(body: SoftBody, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
-    """Vertex numbers of a body, ascending; None means all. Raises: OptionError, also for none at all."""
+    """Check and sort vertex numbers of a body; None means all. Raises: OptionError, also if empty."""
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
     return named_particles(body, particles, name)
 
 
 def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
-    """The same where they have to be named."""
+    """The same, but None is refused."""
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
-        raise OptionError(f"{name} is empty: name at least one vertex, from 0 to {body.vertex_count - 1}")
+        raise OptionError(f"{name} is empty: give at least one vertex, from 0 to {body.vertex_count - 1}")
     return vertices
 
 
 def mass_of(body: SoftBody, vertices: NDArray[np.int32]) -> float:
-    """Of vertices of a body [kg], added one after the other: so does the native library."""
+    """Mass of vertices of a body [kg], summed in order, as in the native library."""
     return float(np.cumsum(body.masses[vertices])[-1])
 
 
 def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
+    """Indices of a body's vertices in the fields. Raises: StateError before `World.build`."""
     return context_of(body).built.rows_of(body.index, vertices)
 
 
-def require_substeps(context: Context, what: str) -> None:
-    """Raises: StateError where the schedule has no place for `what` within a substep."""
+def require_per_body(context: Context, what: str) -> None:
+    """Raise a StateError if the schedule does not support `what`."""
     if context.settings.schedule is Schedule.FLAT:
-        raise StateError(f"schedule 'flat' has no {what}: make the world with schedule='per_body'")
+        raise StateError(f"schedule 'flat' does not support {what}: make the world with schedule='per_body'")

@@ -13,7 +13,7 @@ from taichi_soft.bodies.tet_constants import write_tet_constants
 
 
 def write_constants(state: BodyFields, body: SoftBody, description: BodyDescription) -> None:
-    """Not a kernel, but called like one: what a body is made of lies in several fields."""
+    """Write all constants of a body. Called like a kernel."""
     arrays = rearrange(context_of(body).layout.bodies[body.index], description)
     place = redescribe(body, description, arrays)
     masses = arrays.mass
@@ -30,7 +30,7 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
 
 
 def write_stiffness(state: BodyFields, place: Ranges, arrays: BodyArrays) -> None:
-    """Not a kernel, but called like one: the constants of all elements, without masses."""
+    """Write the constants of all elements, without masses. Called like a kernel."""
     write_tet_constants(state, place.blocks[0], arrays)
     if arrays.bonds is None:
         return

@@ -1,4 +1,4 @@
-"""What acts on bodies throughout the coming steps: forces, gravity, air."""
+"""Forces, gravity, damping and wind, which act during the next steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
-from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of, some_particles
+from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
     add_push,
@@ -25,28 +25,28 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
 ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
-"""(positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
+"""Function (positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
 
-LARGEST_PUSH = 1e9
-"""[m/s^2]; within 20 us it throws a particle faster than any that counts as sound."""
+MAX_ACCELERATION = 1e9
+"""Largest acceleration [m/s^2]; it exceeds the limit of valid velocities within 20 us."""
 
 
 def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -> None:
-    """As `Body.apply_force`."""
+    """Implement `Body.apply_force`."""
     total = as_vector(force, "force", "N", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
     acceleration = total / mass_of(body, vertices)
-    if not np.abs(acceleration).max() < LARGEST_PUSH:
+    if not np.abs(acceleration).max() < MAX_ACCELERATION:
         raise OptionError(
             f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "
-            f"keep below {LARGEST_PUSH:g} m/s^2"
+            f"stay below {MAX_ACCELERATION:g} m/s^2"
         )
-    require_substeps(context_of(body), "forces")
+    require_per_body(context_of(body), "forces")
     change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
 
 
 def set_gravity(context: Context, gravity: ArrayLike) -> None:
-    """As `World.set_gravity`."""
+    """Implement `World.set_gravity`."""
     acceleration = as_gravity(gravity)
     if (acceleration != context.settings.gravity).any():
         context.apply_settings(replace(context.settings, gravity=acceleration))
@@ -55,62 +55,62 @@ def set_gravity(context: Context, gravity: ArrayLike) -> None:
 
 
 def set_gravity_scale(body: SoftBody, scale: float) -> None:
-    """As `Body.set_gravity_scale`."""
+    """Implement `Body.set_gravity_scale`."""
     change(body, write_gravity_scale, body.index, as_number(scale, "scale", -1e3, 1e3))
 
 
 def set_linear_damping(body: SoftBody, rate: float) -> None:
-    """As `Body.set_linear_damping`."""
+    """Implement `Body.set_linear_damping`."""
     per_second = as_number(rate, "rate", 0.0, 1e6, "a number from 0 to 1e6 per second")
-    require_substeps(context_of(body), "linear damping")
+    require_per_body(context_of(body), "linear damping")
     change(body, write_linear_damping, body.index, per_second)
 
 
 def set_sheltered(body: SoftBody, is_sheltered: bool) -> None:
-    """As `Body.set_sheltered`."""
+    """Implement `Body.set_sheltered`."""
     change(body, write_shelter, body.index, int(as_flag(is_sheltered, "is_sheltered")))
 
 
 def set_wind(context: Context, velocity: ArrayLike | None, density: float, drag: float) -> None:
-    """As `World.set_wind`."""
+    """Implement `World.set_wind`."""
     blows = velocity is not None
     speed = as_vector(velocity if blows else (0, 0, 0), "velocity", "m/s", VELOCITY_LIMIT)  # type: ignore[arg-type]
     kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
     coefficient = as_number(drag, "drag", 0.0, 1e3)
-    require_substeps(context, "wind")
+    require_per_body(context, "wind")
     if context.built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
         context.built.mark_modified(-1)
 
 
 def require_field(field: Any) -> ForceField | None:
-    """`field` if it is a function or None. Raises: OptionError."""
+    """Check that `field` is a function or None. Raises: OptionError."""
     if field is not None and not callable(field):
         raise OptionError(f"function must take (positions, time), or be None, got {field!r}")
     return field  # type: ignore[no-any-return]
 
 
-def push_by_field(context: Context, field: ForceField) -> list[tuple[SoftBody, NDArray[np.float32]]]:
-    """Ask a force field for every body that moves, then push them all.
+def apply_force_field(context: Context, field: ForceField) -> list[tuple[SoftBody, NDArray[np.float32]]]:
+    """Evaluate a force field for all moving bodies, then accelerate them.
 
     Returns: bodies and their accelerations, (n, 3) [m/s^2].
-    Raises: what the field raises, or OptionError for what it returns; then no body is pushed.
+    Raises: errors of the field; OptionError for an invalid result. Then no body is changed.
     """
     rows = []
     for body in context.slots.occupants:
         if not body.is_frozen:
             given = field(body.positions(), context.clock.time)
-            found = as_array(given, "what the force field returns", (body.vertex_count, 3), "m/s^2")
-            if not np.abs(found).max() < LARGEST_PUSH:
-                raise OptionError(f"the force field must stay below {LARGEST_PUSH:g} m/s^2")
+            found = as_array(given, "the result of the force field", (body.vertex_count, 3), "m/s^2")
+            if not np.abs(found).max() < MAX_ACCELERATION:
+                raise OptionError(f"the force field must stay below {MAX_ACCELERATION:g} m/s^2")
             rows.append((body, found.astype(np.float32)))
-    push_bodies(rows)
+    accelerate_bodies(rows)
     return rows
 
 
-def push_bodies(rows: Sequence[tuple[SoftBody, Any]]) -> None:
-    """Push bodies throughout the coming step, vertex by vertex: accelerations float32 (n, 3) [m/s^2].
+def accelerate_bodies(rows: Sequence[tuple[SoftBody, Any]]) -> None:
+    """Accelerate bodies during the next step: accelerations of their vertices, float32 (n, 3) [m/s^2].
 
-    Where all are zero, who sleeps sleeps on.
+    Zero accelerations do not wake a body.
     """
     for body, accelerations in rows:
         if accelerations.any():

@@ -1,9 +1,9 @@
-"""Another material for a body that moves, eased in so that a stiffer law adds no energy.
+"""Ease in a new material while a body moves, so that a stiffer one adds no energy.
 
-A stiffer law finds more strain energy in a deformed body, which would throw it. So constants go from those
-before to those after along k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance falls as a parabola,
-and what is pressed by a load goes to its new shape at an even deceleration. While k grows, vibrations fade
-like k^-`FADING`: of each mode that is faster than the change that leaves E ~ k^(1/2 - FADING).
+A stiffer material has more strain energy in a deformed body, which would throw it. So constants change along
+k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance falls as a parabola, and a loaded body moves to
+its new shape at a constant deceleration. While k grows, vibrations are damped like k^-`FADING`: a mode that
+is faster than the change keeps the energy E ~ k^(1/2 - FADING).
 """
 
 from __future__ import annotations
@@ -28,60 +28,60 @@ from taichi_soft.core.serialisation import below
 Floats = NDArray[np.float64]
 
 SHORTEST, PERIODS = 0.5, 8.0
-"""A change takes this long [s], or as many times the slowest mode's period over 2 pi, whichever is longer."""
+"""Duration of a change: SHORTEST [s], or PERIODS times the slowest mode's period over 2 pi if longer."""
 
 HELD = 6.4
-"""How much slower a beam vibrates that is held at one end than a free one (roots of the bending equation,
+"""Ratio of a free beam's frequency to that of a beam held at one end (roots of the bending equation,
 (4.730 / 1.875)^2)."""
 
 FADING = 2.0
-"""Power of the stiffness with which vibrations fade meanwhile: the slowest mode is then damped critically."""
+"""Exponent of the stiffness in the damping of vibrations; it damps the slowest mode critically."""
 
 TIMES_A_STEP = 8.0
-"""How often vibrations fade in a step, at least: see `kept_vibration`."""
+"""Smallest number of times that vibrations are damped per step: see `kept_vibration`."""
 
 LIFT = 1e-4
-"""A change that adds less than it takes to lift the body by this [m] is made at once."""
+"""A change that adds less energy than lifting the body by this height [m] is immediate."""
 
 LARGEST_RATIO = 1e12
-"""Largest ratio of the new stiffness to the one from which it is eased in: the old one may be zero."""
+"""Largest ratio of new to initial stiffness, because the old stiffness can be zero."""
 
 
 @dataclass(eq=False)
 class Easing:
-    """A change that is under way."""
+    """A running change of material."""
 
-    constants: Floats  # that the fields have now: see `_constants`
-    ratio: float  # of the stiffness after to that before, the largest of all elements
-    seconds: float  # that it takes
-    passed: float = 0.0  # [s]
+    constants: Floats  # current values in the fields: see `_constants`
+    ratio: float  # final over initial stiffness, the largest of all elements
+    seconds: float  # duration
+    passed: float = 0.0  # elapsed time [s]
 
     @property
     def plain(self) -> list[Any]:
-        """As plain data."""
+        """Convert to plain data."""
         content = base64.b64encode(self.constants.tobytes()).decode()
         return [self.ratio, self.seconds, self.passed, content]
 
     def stiffness(self, passed: float) -> float:
-        """Of the element that changes most after a time [s], over that before the change."""
+        """Relative stiffness of the element that changes most, after a time [s]."""
         part = min(passed / self.seconds, 1.0)
         compliance = 1.0 - (1.0 - 1.0 / math.sqrt(self.ratio)) * part
         return 1.0 / (compliance * compliance)
 
 
 class Easings(Slice):
-    """All changes of material that are under way in one world."""
+    """All running changes of material of one world."""
 
     name, prevents_cuts, prevents_levels = "easings", False, False
 
     def __init__(self, context: Any) -> None:
-        """None yet."""
+        """Start without entries."""
         super().__init__(context)
         self.by_body: dict[SoftBody, Easing] = {}
-        self._left: list[SoftBody] = []  # by what a snapshot is about to overwrite
+        self._left: list[SoftBody] = []  # bodies whose fields a snapshot is about to overwrite
 
     def begin(self, body: SoftBody, material: Any) -> None:
-        """Let a body become of a material."""
+        """Start to change a body's material."""
         record, built = record_of(body), self.context.built
         before, energy = record.present or self._arrays(body), elastic_energy(body)
         self.release_body(body)
@@ -92,13 +92,13 @@ class Easings(Slice):
             self._go_on(body, Easing(_constants(before), ratio, self._duration(body, before)))
 
     def _go_on(self, body: SoftBody, easing: Easing) -> None:
-        """Let a change be under way."""
+        """Register a running change."""
         arrays = _with(self._arrays(body), easing.constants)
         self.by_body[body], record_of(body).present = easing, arrays
         write_stiffness(self.context.built.state, self._place(body), arrays)
 
     def _duration(self, body: SoftBody, before: BodyArrays) -> float:
-        """How long a change takes [s] that begins with these constants."""
+        """Duration of a change that begins with these constants [s]."""
         asset = present_asset(body)
         softer = _mean_modulus(asset.arrays) / max(_mean_modulus(before), 1e-30)
         heavier = float(before.mass.mean() / asset.arrays.mass.mean())
@@ -108,7 +108,7 @@ class Easings(Slice):
         return max(SHORTEST, PERIODS * slower * math.sqrt(softer * heavier) / asset.guessed_frequency)
 
     def advance(self, seconds: float) -> None:
-        """Go on with all changes in the coming step of `seconds` [s]."""
+        """Advance all changes for the next step of `seconds` [s]."""
         for body, easing in list(self.by_body.items()):
             before = easing.stiffness(easing.passed)
             easing.passed += seconds
@@ -124,7 +124,7 @@ class Easings(Slice):
             self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
 
     def finish(self, body: SoftBody) -> None:
-        """End a change at once: the body was put into another state, whose deformation is the caller's."""
+        """Finish a change immediately, because the caller has set the body's state."""
         if body in self.by_body:
             self.release_body(body)
             arrays, place = self._arrays(body), self._place(body)
@@ -137,16 +137,16 @@ class Easings(Slice):
         return self.context.layout.ranges[body.index]
 
     def release_body(self, body: SoftBody) -> None:
-        """As `Slice.release_body`."""
+        """See `Slice.release_body`."""
         self.by_body.pop(body, None)
         record_of(body).present = None
 
     def share(self, body: SoftBody, order: Any, pieces: Sequence[tuple[SoftBody, NDArray[np.int64]]]) -> None:
-        """Go on in what a cut has left of a body.
+        """Continue a change in the pieces of a cut body.
 
         Args:
-            order: of its tetrahedra in the fields before.
-            pieces: what it has become, with the tetrahedron of the body before that each one is, (m,).
+            order: previous order of its tetrahedra in the fields.
+            pieces: the pieces, each with the original tetrahedron of each of its tetrahedra, (m,).
         """
         easing = self.by_body.get(body)
         self.release_body(body)
@@ -157,27 +157,27 @@ class Easings(Slice):
             self._go_on(piece, replace(easing, constants=rows[tets][self._arrays(piece).tet_order].ravel()))
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Write what a step of a change writes."""
+        """Call the kernels of a change."""
         _ = present_asset(body).guessed_frequency
         _write(self.context.built.state, body, self._place(body), self._arrays(body), 0.0, 1.0)
 
     def entries(self) -> list[list[Any]]:
-        """Body, how stiff it becomes, how long that takes, how much of it has passed, constants now."""
+        """List body, stiffness ratio, duration, elapsed time and current constants."""
         eased = sorted(self.by_body.items(), key=lambda item: item[0].index)
         return [[body.index, *easing.plain] for body, easing in eased]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """None: there are no handles."""
+        """Return an empty list, because changes have no handles."""
         return []
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, Easing]]:
-        """Rows of `entries`. Raises: ValueError for a change of nobody, or to what is not finite."""
+        """Parse rows of `entries`. Raises: ValueError for a missing body or values that are not finite."""
         found = []
         for slot, ratio, seconds, passed, content in entries:
             if not vertex_counts[below(slot, len(vertex_counts))]:
-                raise ValueError("a material changes of no body")
+                raise ValueError("a change of material has no body")
             constants = np.frombuffer(base64.b64decode(content, validate=True), dtype=np.float64)
             easing = Easing(constants, float(ratio), float(seconds), float(passed))
             if not (1.0 < easing.ratio <= LARGEST_RATIO and 0.0 <= easing.passed < easing.seconds < math.inf):
@@ -188,13 +188,13 @@ class Easings(Slice):
         return found
 
     def clear(self) -> None:
-        """As `Slice.clear`."""
+        """See `Slice.clear`."""
         self._left = list(self.by_body)
         for body in self._left:
             self.release_body(body)
 
     def restore(self, read: Any) -> None:
-        """Go on with the changes that were `read`."""
+        """Continue the changes from `read`."""
         slots, state = self.context.slots.slots, self.context.built.state
         for body in self._left:
             if slots[body.index] is body:
@@ -206,7 +206,7 @@ class Easings(Slice):
 
 
 def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: float, seconds: float) -> None:
-    """Not a kernel, but called like one: constants, and the rate at which vibrations fade in a step [1/s]."""
+    """Write constants, and the damping rate of vibrations in a step [1/s]. Called like a kernel."""
     write_stiffness(state, place, arrays)
     own, interval = present_asset(body).vibration_row(record_of(body).description)
     if rate > 0.0:
@@ -216,7 +216,7 @@ def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: flo
 
 
 def _parts(arrays: BodyArrays) -> list[Floats]:
-    """What a law multiplies with a deformation, and what a pairwise law knows of its edges."""
+    """Constants that a law multiplies with a deformation, and edge constants of a pairwise law."""
     parts = [arrays.lame]
     if arrays.stiffness.any():
         parts.append(arrays.stiffness)
@@ -228,7 +228,7 @@ def _parts(arrays: BodyArrays) -> list[Floats]:
 
 
 def _constants(arrays: BodyArrays) -> Floats:
-    """All of `_parts` in a row; of a law on tetrahedra tetrahedron by tetrahedron."""
+    """Concatenate `_parts`; for laws on tetrahedra, tetrahedron by tetrahedron."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         return np.concatenate(parts, axis=1).ravel()
@@ -236,7 +236,7 @@ def _constants(arrays: BodyArrays) -> Floats:
 
 
 def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
-    """A body with other constants."""
+    """Copy a body's arrays with other constants."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         rows = constants.reshape(len(arrays.lame), -1)
@@ -250,8 +250,8 @@ def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
 
 
 def _moduli(arrays: BodyArrays) -> Floats:
-    """Numbers by which elements are compared, (m, k): bulk and shear modulus, or stiffness along an edge;
-    of an anisotropic material the diagonal."""
+    """Moduli for comparing elements, (m, k): bulk and shear modulus, or stiffness along an edge, or the
+    diagonal of an anisotropic material."""
     if not len(arrays.lame):
         assert arrays.bonds is not None
         return arrays.bonds.constants[:, 1:2]
@@ -266,7 +266,7 @@ def _mean_modulus(arrays: BodyArrays) -> float:
 
 
 def _growth(before: BodyArrays, after: BodyArrays) -> float:
-    """How many times as stiff a body becomes, the largest of all its elements; at least 1."""
+    """Largest ratio of new to old stiffness of all elements; at least 1."""
     old, new = _moduli(before), _moduli(after)
     grown = new > old
     return float(np.minimum(new[grown] / np.maximum(old[grown], 1e-300), LARGEST_RATIO).max(initial=1.0))

@@ -1,4 +1,4 @@
-"""Places in a body: points that go with the vertices of a tetrahedron. Numpy only."""
+"""Embedded points, which follow the vertices of a tetrahedron. Numpy only."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 Floats = NDArray[np.float64]
 
 FARTHEST = -0.5
-"""Least weight of a corner: a place lies in a tetrahedron drawn out threefold from its centre."""
+"""Smallest weight of a corner: points must lie in a tetrahedron that is scaled by three about its centre."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where each of n points lies among four vertices; the weights of one add up to 1."""
+    """Barycentric coordinates of n points among four vertices each; the weights of a point have the sum 1."""
 
     vertices: NDArray[np.int32]  # (n, 4)
     weights: Floats  # (n, 4)
 
 
 def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
-    """Points (n, 3) [m] in the tetrahedra of a body as it is now; a point outside in that which it is least
-    outside of.
+    """Embed points (n, 3) [m] in the tetrahedra of a body in its current shape. A point outside uses the
+    tetrahedron that it is least outside of.
 
-    Raises: OptionError by the name of the first that is too far away, and for a body without tetrahedra.
+    Raises: OptionError with the name of the first point that is too far away, and for a body without
+        tetrahedra.
     """
     if len(body.tets) == 0:
         raise OptionError(
-            f"body {body.index} has no tetrahedra to hold by: attach it to the other one instead, or name "
-            "vertices of it by onto"
+            f"body {body.index} has no tetrahedra: attach it to the other body instead, or give its "
+            "vertices in onto"
         )
     positions = body.positions().astype(np.float64)
     corners = positions[body.tets]
@@ -51,15 +52,15 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
             nearest = np.linalg.norm(positions - point, axis=1).min()
             raise OptionError(
                 f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
-                "bring the two together first, or name vertices by onto"
+                "move the two together first, or give vertices in onto"
             )
         weights[i] = found[chosen[i]]
-    weights[np.abs(weights) < 1e-4] = 0.0  # or neighbours would be held by what is none of theirs
+    weights[np.abs(weights) < 1e-4] = 0.0  # rounding must not involve other vertices
     return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:
-    """The places of vertices, each by the first tetrahedron that has it, if there is one."""
+    """Embed vertices, each through the first tetrahedron that contains it, if any."""
     corners = np.repeat(vertices[:, None], 4, axis=1)
     if len(body.tets):
         flat = body.tets.ravel()

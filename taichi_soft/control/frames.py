@@ -1,4 +1,4 @@
-"""Frames of the engine that bodies hang from, and the call that aims all pinned particles before a step."""
+"""Frames that bodies are attached to, and the target velocities of all pinned particles before a step."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from taichi_soft.core.serialisation import require_below, vector_of
 
 
 class Frames(Slice):
-    """Poses of all frames of one world: rotation row by row, and position [m], (f, 12)."""
+    """Poses of all frames of one world: rotation by rows, and position [m], (f, 12)."""
 
     name = "frames"
 
     def __init__(self, context: Context) -> None:
-        """None yet; one row, as a kernel takes no empty array."""
+        """Start without frames, but with one row, because kernels do not take empty arrays."""
         super().__init__(context)
-        self.attachments: dict[SoftBody, list[Any]] = {}  # by the body that they hold, in their order
-        self.rows: list[Frame | None] = []  # None where one was removed: the next frame takes the first such
+        self.attachments: dict[SoftBody, list[Any]] = {}  # by body, in order
+        self.rows: list[Frame | None] = []  # None after removal; the next frame takes the first free row
         self.present = np.zeros((1, 12), dtype=np.float32)
-        self.coming = self.present.copy()  # at the end of the coming step
+        self.coming = self.present.copy()  # at the end of the next step
         self.past = self.present.copy()  # before the last step
-        self.has_work = False  # some pinned particle has somewhere to go, or has just arrived
+        self.has_work = False  # a pinned particle has a target, or has just reached it
 
     @property
     def handles(self) -> list[Frame]:
-        """Those that are alive, by row."""
+        """Existing frames, by row."""
         return [frame for frame in self.rows if frame is not None]
 
     def add(self, frame: Frame, pose: NDArray[np.float32]) -> int:
-        """The row of a new frame."""
+        """Add a frame. Returns: its row."""
         number = self.rows.index(None) if None in self.rows else len(self.rows)
         if number == len(self.rows):
             self.rows.append(frame)
@@ -53,7 +53,7 @@ class Frames(Slice):
         return number
 
     def number_of(self, frame: Any) -> int:
-        """The row of a frame. Raises: OptionError for what is no frame of this world; StateError if it was
+        """Return the row of a frame. Raises: OptionError for a frame of another world; StateError if it was
         removed."""
         if not isinstance(frame, Frame) or frame._frames is not self:
             raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
@@ -61,22 +61,22 @@ class Frames(Slice):
         return frame._number
 
     def holding(self, body: SoftBody) -> list[Any]:
-        """The attachments that hold a body."""
+        """Attachments of a body."""
         return self.attachments.get(body, [])
 
-    def hanging(self, frame: Frame) -> list[Any]:
-        """The attachments to a frame, body by body."""
+    def attachments_to(self, frame: Frame) -> list[Any]:
+        """Attachments to a frame, body by body."""
         bodies = sorted(self.attachments, key=lambda body: body.index)
         return [each for body in bodies for each in self.attachments[body] if each.frame is frame]
 
     def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
-        """Give pinned particles the velocities of the coming step."""
+        """Set the velocities of pinned particles for the next step."""
         if self.has_work:
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
         self.past, self.present = self.present, self.coming.copy()
 
     def way(self, body: SoftBody) -> float:
-        """How far frames moved a particle of a body in the last step, which was undone for it [m]."""
+        """Largest distance that frames moved a particle in the last, undone step [m]."""
         x, longest = body.positions().astype(np.float64), 0.0
         for each in self.holding(body):
             (a, start), (b, end) = (
@@ -87,34 +87,34 @@ class Frames(Slice):
         return longest
 
     def entries(self) -> list[list[Any]]:
-        """Of each row the number of its handle, 0 where it is free, and both poses."""
+        """List the handle number of each row (0 if free) and both poses."""
         return [
             [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
             for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)
         ]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """Of those rows that are not free."""
+        """Handle numbers of the rows in use."""
         return [serial for serial, _, _ in entries if serial != 0]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
-        """Rows of `entries`. Raises: ValueError for one out of reach."""
+        """Parse rows of `entries`. Raises: ValueError for a pose out of range."""
         found = []
         for serial, *poses in entries:
             present, coming = (vector_of(pose, 12) for pose in poses)
             if not max(np.abs(present).max(), np.abs(coming).max()) <= POSITION_LIMIT:
-                raise ValueError("a frame is out of reach")
+                raise ValueError("a frame is out of range")
             found.append((int(serial), present.astype(np.float32), coming.astype(np.float32)))
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where a particle goes with a frame that there never was."""
+        """Raise a ValueError if a particle follows an unknown frame."""
         require_below(rows_of(self.context.built.state.particle_aim), WITH_FRAME + len(read))
 
     def restore(self, read: Any) -> None:
-        """Let there be the frames that were `read`, and no other. Pins are aimed before the next step."""
+        """Replace all frames by those from `read`. Pins get their velocities before the next step."""
         self.rows = [None] * len(read)
         self.present = np.zeros((max(len(read), 1), 12), dtype=np.float32)
         self.coming = self.present.copy()
@@ -132,16 +132,16 @@ class Frames(Slice):
 
 
 class Frame(Handle):
-    """A place that moves as the engine says: a bone, a vehicle, a hand. Made by `World.add_frame`."""
+    """A pose that the game moves: a bone, a vehicle, a hand. Returned by `World.add_frame`."""
 
     def __init__(self, frames: Frames, position: ArrayLike, rotation: Any) -> None:
-        """Made by `World.add_frame`."""
+        """Use `World.add_frame` instead."""
         self._frames = frames
         self._number = frames.add(self, _pose(position, rotation))
 
     @classmethod
     def _at(cls, frames: Frames, number: int) -> Frame:
-        """A handle to a frame that there is."""
+        """Make a handle to an existing frame."""
         frame = cls.__new__(cls)
         frame._frames, frame._number = frames, number
         return frame
@@ -153,7 +153,7 @@ class Frame(Handle):
 
     @property
     def is_alive(self) -> bool:
-        """False once it was removed, or the world put back to a state without it."""
+        """False after it was removed, or the world was restored to a state without it."""
         rows = self._frames.rows
         return self._number < len(rows) and rows[self._number] is self
 
@@ -165,7 +165,7 @@ class Frame(Handle):
 
     @property
     def position(self) -> NDArray[np.float32]:
-        """Where its origin is after the last step, (3,) [m]."""
+        """Position of its origin after the last step, (3,) [m]."""
         self._require_alive()
         return np.array(self._frames.present[self._number, 9:])
 
@@ -177,14 +177,14 @@ class Frame(Handle):
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Say where it is at the end of the coming step; it stays there until it is moved again.
+        """Move the frame to a pose over the next step. It stays there until it is moved again.
 
-        What hangs from it is dragged along, and breaks where that is farther in a step than it is large: a
-        jump is one of `teleport`.
+        Attached bodies are dragged along. A body that is dragged farther than its size in one step fails: use
+        `teleport` for jumps.
         Args:
-            position: of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its axes as they are.
-        Raises: OptionError for bad numbers.
+            position: position of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its rotation.
+        Raises: OptionError for invalid numbers.
         """
         self._require_alive()
         axes = self._frames.coming[self._number, :9].copy()
@@ -197,28 +197,28 @@ class Frame(Handle):
     def teleport(
         self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
     ) -> None:
-        """Be there at once, with the whole of every body attached to it, by the same rigid motion.
+        """Jump to a pose, and move every attached body as a whole by the same rigid motion.
 
-        Pictures between two steps jump with them, and so do targets that were set for their pins. Bodies that
-        are joined to them, and grabs, stay where they are. A `move_to` that was said before is forgotten.
-        What then lies below the floor or in a collider is pressed out, and breaks where that is far.
+        Interpolated frames and the targets of pins jump too. Joined bodies and grabs do not move. An earlier
+        `move_to` is discarded. Parts that are then below the floor or inside a collider are pushed out, and
+        the body fails if that is far.
         Args:
-            position: of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its axes as they are.
-            keep_velocity: True turns velocities with the bodies, False stops them.
-        Raises: OptionError for bad numbers or where a body would be out of reach; StateError for a body that
-            hangs from another frame as well.
+            position: position of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its rotation.
+            keep_velocity: True rotates velocities with the bodies, False stops them.
+        Raises: OptionError for invalid numbers or a body that would be out of range; StateError for a body
+            that is also attached to another frame.
         """
         self._require_alive()
         frames, keep = self._frames, as_flag(keep_velocity, "keep_velocity")
         pose, present = _pose(position, rotation), frames.present[self._number].copy()
         if rotation is None:
             pose[:9] = present[:9]
-        bodies = list(dict.fromkeys(each.body for each in frames.hanging(self)))
+        bodies = list(dict.fromkeys(each.body for each in frames.attachments_to(self)))
         for body in bodies:
             if any(each.frame is not self for each in frames.holding(body)):
                 raise StateError(
-                    f"body {body.index} hangs from another frame as well: release it there before this jumps"
+                    f"body {body.index} is also attached to another frame: release it there first"
                 )
         (axes, start), (pose_axes, end) = _axes_and_place(present), _axes_and_place(pose)
         turn = np.eye(3) if rotation is None else turned(pose_axes, axes)
@@ -227,15 +227,15 @@ class Frame(Handle):
 
     @recorded
     def remove(self) -> None:
-        """Take it out of the world; what is attached to it is released, with the velocity that it had."""
+        """Remove the frame from the world and release its attachments; particles keep their velocity."""
         self._require_alive()
-        for attachment in self._frames.hanging(self):
+        for attachment in self._frames.attachments_to(self):
             attachment.release()
         self._frames.rows[self._number] = None
 
 
 def _axes_and_place(pose: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes as columns (3, 3), and origin (3,) [m]."""
+    """Split a pose into axes as columns (3, 3), and origin (3,) [m]."""
     return pose[:9].reshape(3, 3).astype(np.float64), pose[9:].astype(np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Friction of bodies against each other, and of a floor that is no collider, changed while they move."""
+"""Change the friction between bodies, and of a floor that is not a collider."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from taichi_soft.core.errors import StateError
 
 
 def set_floor_friction(context: Context, friction: float) -> None:
-    """As `World.set_friction`, where the floor is no collider."""
+    """Implement `World.set_friction` for a floor that is not a collider."""
     coefficient = as_friction(friction)
     if context.settings.floor is None:
         raise StateError(
-            "the world has no floor: a collider's friction is changed by Collider.set_friction, that between "
-            "bodies by Body.set_friction"
+            "the world has no floor: use Collider.set_friction for a collider, or Body.set_friction for "
+            "contact between bodies"
         )
     if coefficient != context.settings.friction:
         context.apply_settings(replace(context.settings, friction=coefficient))
@@ -27,19 +27,19 @@ def set_floor_friction(context: Context, friction: float) -> None:
 
 
 def set_friction(body: SoftBody, friction: float) -> None:
-    """As `Body.set_friction`."""
+    """Implement `Body.set_friction`."""
     context, coefficient = context_of(body), as_friction(friction)
     if not context.built.state.capacity.contact.soft:
         raise StateError(
-            "a body's friction counts between bodies, and these do not touch each other: make the world with "
-            "soft_contact, or change the floor's by World.set_friction, a collider's by Collider.set_friction"
+            "a body's friction applies between bodies, and this world has no soft contact: make it with "
+            "soft_contact, or use World.set_friction for the floor and Collider.set_friction for a collider"
         )
     if coefficient != body.friction:
         change(body, give_friction, body, coefficient)
 
 
 def give_friction(state: Any, body: SoftBody, friction: float | None) -> None:
-    """Not a kernel, but called like one: note the friction of a body, and write it. None is its asset's."""
+    """Store and write the friction of a body; None takes its asset's. Called like a kernel."""
     record = record_of(body)
     record.friction = None if friction == body.asset.contact.friction else friction
     if state.capacity.contact.soft:

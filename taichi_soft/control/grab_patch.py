@@ -1,6 +1,6 @@
-"""The part of a body that a hand takes hold of, and how strongly that may be pulled: numpy only.
+"""The part of a body that a grab holds, and the largest force on it. Numpy only.
 
-Each sum of a patch is written out in its order: the native library gets the same bits.
+Sums have an explicit order, so that the native library is bit-identical.
 """
 
 from __future__ import annotations
@@ -18,25 +18,26 @@ from taichi_soft.core.math.rotations import length_of
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
-"""Radius of a patch over the diagonal of the body: about the hold of a hand."""
+"""Radius of a patch over the diagonal of the body, about the size of a hand's grip."""
 
 FARTHEST_PULL = 0.5
-"""How far a patch may be pulled out of the body, over its radius, by the estimate below. Measured: elements
-then stretch by a quarter or a third, which the longest stable substeps still bear; at four times that they
-tear."""
+"""Largest displacement of a patch over its radius, by the estimate below. Elements then stretch by a quarter
+to a third, which is stable with the longest stable substeps; four times as much is not."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Vertices round a point, with their shares of a pull, which add up to 1."""
+    """Vertices around a point, with their shares of the force, which have the sum 1."""
 
     vertices: NDArray[np.int32]
     shares: NDArray[np.float64]
-    strength: float  # [N] that moves it by `FARTHEST_PULL` of its radius against the rest of the body
+    strength: (
+        float  # force that moves it by `FARTHEST_PULL` of its radius relative to the rest of the body [N]
+    )
 
 
-def patch_round(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """The patch round a point at rest, given in barycentric coordinates of three or four vertices."""
+def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
+    """Make the patch around a rest point, given in barycentric coordinates of three or four vertices."""
     x = body.mesh.vertices
     distance = _lengths(x - point_between(x[corners], weights))
     radius = max(PATCH_SIZE * length_of(np.ptp(x, axis=0)), 1.2 * float(distance[corners].max()))
@@ -53,7 +54,7 @@ def patch_round(body: BodyDescription, corners: NDArray[np.int32], weights: NDAr
 
 
 def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The point with barycentric coordinates (k,) among corners (k, 3), in float64."""
+    """Point with barycentric coordinates (k,) among corners (k, 3), in float64."""
     point = np.zeros(3)
     for corner, weight in zip(corners.astype(np.float64), weights.tolist(), strict=True):
         point += weight * corner
@@ -61,7 +62,7 @@ def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArra
 
 
 def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """What holds a patch back: vertices of each element, and its stiffness.
+    """Vertices and stiffness of each element, which resist the patch's motion.
 
     Returns: springs (e, 2) and k / 3 [N/m], as a third of them lies along any direction; or tetrahedra (m, 4)
     and V mu [N m].
@@ -74,7 +75,7 @@ def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.fl
 
 
 def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
-    """Force per distance [N/m] by which particles moved each by its `falloff` w are held back, at least.
+    """Lower bound of the stiffness [N/m] against moving each particle by its `falloff` w.
 
     Twice the energy of that shape per distance squared: sum V mu |grad w|^2 in tetrahedra; in springs
     sum k (w_i - w_j)^2 / 3.
@@ -95,14 +96,14 @@ def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Components of the products of rows (n, 3)."""
+    """Components of the cross products of rows (n, 3)."""
     x, y, z = (a[:, k] for k in range(3))
     u, v, w = (b[:, k] for k in range(3))
     return [y * w - z * v, z * u - x * w, x * v - y * u]
 
 
 def _sum_of_three(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    """Of products, one after the other."""
+    """Sum of three products, in order."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -112,20 +113,20 @@ def _lengths(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _sum(numbers: NDArray[np.float64]) -> float:
-    """One after the other."""
+    """Sum in order."""
     return float(np.cumsum(numbers)[-1])
 
 
 def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
-    """The smallest of each tetrahedron, (m,) [Pa]."""
+    """Smallest shear modulus of each tetrahedron, (m,) [Pa]."""
     moduli = body.stiffness_matrices()
     return np.asarray(moduli[:, range(3, 6), range(3, 6)].min(axis=1))
 
 
 def wave_speed(body: BodyDescription) -> float:
-    """With which what is done to a part of a body reaches the rest, at least [m/s].
+    """Lower bound of the wave speed in a body [m/s].
 
-    sqrt(mu / density); in springs, a sqrt(k / m) of the mean edge a and the mean mass m.
+    sqrt(mu / density); for springs, a sqrt(k / m) with the mean edge a and the mean mass m.
     """
     mesh: Any = body.mesh
     if isinstance(body.material, SpringMaterial):

@@ -1,4 +1,4 @@
-"""Taking hold of a body and pulling it about."""
+"""Grab a body and pull it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
-from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of
-from taichi_soft.control.grab_patch import Patch, patch_round, point_between
+from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of
+from taichi_soft.control.grab_patch import Patch, patch_around, point_between
 from taichi_soft.control.kernels.grabs import (
     CORNERS,
     FORCE,
@@ -34,17 +34,17 @@ from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
 
 WEIGHTS = 10.0
-"""Strongest pull in weights of the body on Earth, where nothing else is asked for."""
+"""Default largest force, in weights of the body on Earth."""
 
 HIGHEST_SPEED = 50.0
-"""[m/s] at which a grab still pulls the body along: faster than any hand."""
+"""Largest speed of a grabbed body [m/s]; faster than any hand."""
 
 
 class Grab(Handle):
-    """A hand on a body. Made by `Body.grab` and `World.grab`."""
+    """A grab of a body. Returned by `Body.grab` and `World.grab`."""
 
     def __init__(self, body: SoftBody, number: int, point: NDArray[np.float64]) -> None:
-        """Made by `Body.grab`."""
+        """Use `Body.grab` instead."""
         self.body = body
         self._number = number
         self._point = point
@@ -54,30 +54,30 @@ class Grab(Handle):
 
     @property
     def is_held(self) -> bool:
-        """False once released, and once the body was removed."""
+        """False after release, or after the body was removed."""
         return self.body.is_alive and context_of(self.body).of(Grabs).by_number.get(self._number) is self
 
     @property
     def point(self) -> NDArray[np.float64]:
-        """Where it pulls to, (3,) [m]."""
+        """Target of the grab, (3,) [m]."""
         return np.array(self._point)
 
     @property
     def force(self) -> NDArray[np.float32]:
-        """With what it pulls the body, in the last substep, (3,) [N]; 0 while the body is frozen.
+        """Force on the body in the last substep, (3,) [N]; 0 while the body is frozen.
 
-        Raises: StateError once released.
+        Raises: StateError after release.
         """
         self._require_held()
         return _read(self)[1][FORCE]
 
     @recorded
     def move(self, point: ArrayLike) -> None:
-        """Pull to `point`, (3,) [m], from now on.
+        """Move the target to `point`.
 
         Args:
             point: target of the grabbed point, (3,) [m].
-        Raises: StateError once released.
+        Raises: StateError after release.
         """
         target = as_vector(point, "point", "m")
         self._require_held()
@@ -86,7 +86,7 @@ class Grab(Handle):
 
     @recorded
     def release(self) -> None:
-        """Let go. Raises: StateError if it was done before."""
+        """Release the body. Raises: StateError if already released."""
         self._require_held()
         change(self.body, end_grab, self._number, self.body.index)
         del context_of(self.body).of(Grabs).by_number[self._number]
@@ -104,7 +104,7 @@ class Grabs(Numbered[Grab]):
     most, way_out = MOST_GRABS, "release"
 
     def release_body(self, body: SoftBody) -> None:
-        """Release all that hold a body."""
+        """Release all grabs of a body."""
         for grab in self.holding(body):
             grab.release()
 
@@ -112,37 +112,37 @@ class Grabs(Numbered[Grab]):
         """Grab a body that has a surface, move it and release it."""
         if len(body.surface) == 0:
             return
-        with contextlib.suppress(StateError):  # all are in use, which compiles them too
+        with contextlib.suppress(StateError):  # all grabs are in use, so the kernels are compiled
             grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)
             grab.move(grab.point)
             _ = grab.force
             grab.release()
 
     def entries(self) -> list[list[Any]]:
-        """Numbers of handle, grab and body, and where each pulls to."""
+        """List numbers of handle, grab and body, and the targets."""
         return [
             [serial_of(grab), number, grab.body.index, grab.point.tolist()]
             for number, grab in sorted(self.by_number.items())
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Of grabs; of those up to the last in use; of the rows of their patches."""
+        """Numbers of grabs, of grabs up to the last one in use, and of patch rows."""
         used = max((int(number) for _, number, _, _ in entries), default=-1) + 1
         return [MOST_GRABS, used, used * PATCH_ROWS]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, NDArray[np.float64]]]:
-        """Rows of `entries`. Raises: ValueError for a grab of nobody."""
+        """Parse rows of `entries`. Raises: ValueError for a missing body."""
         found = []
         for serial, number, slot, point in entries:
             if not vertex_counts[below(slot, len(vertex_counts))]:
-                raise ValueError("a grab holds no body")
+                raise ValueError("a grab has no body")
             found.append((int(serial), below(number, MOST_GRABS), int(slot), vector_of(point, 3)))
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where the fields name what there is not, or are not finite."""
+        """Raise a ValueError if the fields have invalid indices or values that are not finite."""
         fields, particles = self.context.built.state.grabs, self.context.layout.particle_count
         require_below(rows_of(fields.body), len(self.context.slots.slots) + 1)
         require_below(rows_of(fields.corners), particles)
@@ -152,7 +152,7 @@ class Grabs(Numbered[Grab]):
             require_finite(rows_of(field))
 
     def restore(self, read: Any) -> None:
-        """Let there be the grabs that were `read`, and no other."""
+        """Replace all grabs by those from `read`."""
         self.by_number.clear()
         for serial, number, slot, point in read:
             body = self.context.slots.slots[slot]
@@ -164,7 +164,7 @@ class Grabs(Numbered[Grab]):
 
 
 def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
-    """Frequency [Hz] and strongest force [N] of a grab, if they can be. Raises: OptionError."""
+    """Check frequency [Hz] and largest force [N] of a grab. Raises: OptionError."""
     hertz = as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
     if max_force is None:
         return hertz, None
@@ -179,25 +179,25 @@ def grab_at(
     frequency: float,
     max_force: float | None,
 ) -> Grab:
-    """As `Body.grab`; `point` is where it pulls to at first, None where the body is."""
+    """Implement `Body.grab`; `point` is the initial target, None for the grabbed point itself."""
     if len(body.surface) == 0:
-        raise MeshError(f"body {body.index} has no surface to take hold of")
+        raise MeshError(f"body {body.index} has no surface to grab")
     number = as_count(triangle, "triangle", 0, len(body.surface) - 1)
     weights = as_array(barycentrics, "barycentrics", (3,))
     if weights.min() < -1e-3 or abs(weights.sum() - 1) > 1e-3:
-        raise OptionError(f"barycentrics must be 0 or more and add up to 1, got {weights.tolist()}")
+        raise OptionError(f"barycentrics must be 0 or more and have the sum 1, got {weights.tolist()}")
     weights = np.maximum(weights, 0) / np.maximum(weights, 0).sum()
     hertz, limit = as_pull(frequency, max_force)
     omega, mass = 2 * np.pi * hertz, mass_of(body, np.arange(body.vertex_count, dtype=np.int32))
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
-    require_substeps(context_of(body), "grabs")
+    require_per_body(context_of(body), "grabs")
     corners = body.surface[number]
     target = point_between(body.positions()[corners], weights)
     if point is not None:
         target = as_vector(point, "point", "m")
     grabs = context_of(body).of(Grabs).by_number
     free = context_of(body).of(Grabs).free_number()
-    patch = patch_round(record_of(body).description, corners, weights)
+    patch = patch_around(record_of(body).description, corners, weights)
     spring = (mass * (omega * omega), 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     limits = (min(strongest, patch.strength), strongest, 1 / mass)
     row = numbers(weights, 0.0, target, *spring, limits, np.zeros(3))
@@ -208,7 +208,7 @@ def grab_at(
 
 
 def place_of(grab: Grab) -> NDArray[np.float64]:
-    """The point of its body that a grab pulls at, in the rest shape, (3,) [m]."""
+    """Grabbed point in the rest shape of the body, (3,) [m]."""
     body, (corners, row) = grab.body, _read(grab)
     rows = rows_of(body, np.arange(body.vertex_count, dtype=np.int32))
     order = np.argsort(rows)
@@ -218,20 +218,20 @@ def place_of(grab: Grab) -> NDArray[np.float64]:
 
 
 def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
-    """Let a grab hold the tetrahedra that its body has now, round a point of the rest shape, (3,) [m].
+    """Move a grab to the body's current tetrahedra, around a point of the rest shape, (3,) [m].
 
-    Its target, spring and strongest pull stay, and the force of the last substep.
+    Target, spring, largest force and the force of the last substep are kept.
     """
     body, (_, row) = grab.body, _read(grab)
     corners, weights = _tetrahedron_at(body, place)
-    patch = patch_round(record_of(body).description, corners, weights)
+    patch = patch_around(record_of(body).description, corners, weights)
     on_patch, strongest = LIMITS.start, LIMITS.start + 1
     row[PLACE], row[on_patch] = weights, min(row[strongest], patch.strength)
     _write(body, grab._number, corners, row, patch)
 
 
 def _read(grab: Grab) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Rows of the corners and the numbers of a grab, as `write_grab` takes them."""
+    """Read corners and numbers of a grab, in the layout of `write_grab`."""
     corners, row = np.empty(CORNERS, dtype=np.int32), np.empty(FORCE.stop, dtype=np.float32)
     read_grab(context_of(grab.body).built.state, grab._number, corners, row)
     return corners, row
@@ -247,7 +247,7 @@ def _write(
 def _tetrahedron_at(
     body: SoftBody, place: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Corners and barycentric coordinates of a point of the rest shape, (4,) each; of one outside in the
+    """Corners and barycentric coordinates of a point of the rest shape, (4,) each. A point outside uses the
     tetrahedron that it is least outside of."""
     weights = barycentric(place, body.mesh.vertices[body.tets])
     best = weights.min(axis=1).argmax()

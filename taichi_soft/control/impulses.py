@@ -1,6 +1,6 @@
-"""Impulses: sudden changes of momentum. Velocities change at once, positions with the next step.
+"""Impulses: instantaneous changes of momentum. Velocities change at once, positions with the next step.
 
-A pinned particle passes its share on to what holds it.
+The share of a pinned particle goes to the constraint that holds it.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
 LARGEST_IMPULSE = 1e20
-"""[N s], and for forces [N]: beyond, float32 has no room for squares."""
+"""Largest impulse [N s] and force [N], whose squares still fit float32."""
 
 
 def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | None) -> None:
-    """As `Body.apply_impulse`."""
+    """Implement `Body.apply_impulse`."""
     momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
     velocity = momentum / mass_of(body, vertices)
@@ -37,7 +37,7 @@ def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | Non
 
 
 def apply_impulse_at_point(body: SoftBody, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
-    """As `Body.apply_impulse_at_point`."""
+    """Implement `Body.apply_impulse_at_point`."""
     momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
     center = as_vector(point, "point", "m")
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
@@ -48,13 +48,13 @@ def apply_impulse_at_point(body: SoftBody, impulse: ArrayLike, point: ArrayLike,
     if nearest >= reach:
         raise OptionError(
             f"point {center.tolist()} is {nearest:.4g} m from the nearest particle of body {body.index}, "
-            f"beyond radius={reach:g} m: aim at the body, or reach farther"
+            f"beyond radius={reach:g} m: move the point to the body, or increase the radius"
         )
     mark_modified(body)
 
 
 def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, radius: float) -> None:
-    """As `World.apply_radial_impulse`."""
+    """Implement `World.apply_radial_impulse`."""
     origin = as_vector(center, "center", "m")
     momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
@@ -68,5 +68,5 @@ def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, ra
 def _require_speed(speed: float, name: str) -> None:
     if not speed < VELOCITY_LIMIT:
         raise OptionError(
-            f"{name} would change velocities by {speed:.4g} m/s: keep below {VELOCITY_LIMIT:g} m/s"
+            f"{name} would change velocities by {speed:.4g} m/s: stay below {VELOCITY_LIMIT:g} m/s"
         )

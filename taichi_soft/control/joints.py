@@ -1,4 +1,4 @@
-"""Particles of one body held by another, and what passes between the two."""
+"""Joints: particles of one body attached to another body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,14 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     require_alive,
 )
-from taichi_soft.control.change import change, mass_of, named_particles, rows_of, some_particles
+from taichi_soft.control.change import (
+    change,
+    mass_of,
+    named_particles,
+    require_per_body,
+    rows_of,
+    some_particles,
+)
 from taichi_soft.control.embedding import Places, places_at, places_on
 from taichi_soft.control.grab_patch import wave_speed
 from taichi_soft.control.kernels.joints import (
@@ -35,15 +42,15 @@ from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below, require_below
 
 DRAW = 0.25
-"""Speed at which a gap closes at most, over that of waves in the body times the root of the part of its mass
-that is held: pulled so, a body follows before its elements stretch by much more than a quarter."""
+"""Largest closing speed of a gap, over the wave speed in the body times the square root of the held fraction
+of its mass. At this speed, elements stretch by about a quarter at most."""
 
 
 class Joint(Handle):
-    """Particles of a body held by another body. Made by `Body.attach_to`."""
+    """Particles of a body attached to another body. Returned by `Body.attach_to`."""
 
     def __init__(self, body: SoftBody, other: SoftBody, number: int, particles: NDArray[np.int32]) -> None:
-        """Made by `Body.attach_to`."""
+        """Use `Body.attach_to` instead."""
         self.body = body
         self.other = other
         self.particles = particles
@@ -56,7 +63,7 @@ class Joint(Handle):
 
     @property
     def is_attached(self) -> bool:
-        """False once released, and once one of the two bodies was removed."""
+        """False after release, or after one of the two bodies was removed."""
         return self.body.is_alive and self._joints.by_number.get(self._number) is self
 
     @property
@@ -65,9 +72,9 @@ class Joint(Handle):
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """With what `other` pulls `body`, mean over the last step, (3,) [N]; 0 for one in which either froze.
+        """Force of `other` on `body`, mean over the last step, (3,) [N]; 0 if either body froze in it.
 
-        Raises: StateError once released.
+        Raises: StateError after release.
         """
         self._require_attached()
         context = context_of(self.body)
@@ -77,9 +84,9 @@ class Joint(Handle):
 
     @recorded
     def release(self) -> None:
-        """Let the particles go, with the velocity that they have.
+        """Release the particles; they keep their velocity.
 
-        Raises: StateError if it was done before.
+        Raises: StateError if already released.
         """
         self._require_attached()
         built = context_of(self.body).built
@@ -103,57 +110,57 @@ class Joints(Numbered[Joint]):
 
     @property
     def rows_in_use(self) -> int:
-        """Particles that all joints hold together."""
+        """Number of particles of all joints."""
         return sum(len(joint.particles) for joint in self.by_number.values())
 
     def holding(self, body: SoftBody) -> list[Joint]:
-        """Those that hold a body, from either side."""
+        """Joints of a body, on either side."""
         return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
     def release_body(self, body: SoftBody) -> None:
-        """Release all that hold a body."""
+        """Release all joints of a body."""
         for joint in self.holding(body):
             joint.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Join two bodies, where they can be."""
+        """Join two bodies, if possible."""
         context = self.context
         if other is None or not context.built.program.has_contact:
             return
-        with contextlib.suppress(StateError):  # all are in use already
+        with contextlib.suppress(StateError):  # all joints are in use
             joint = self.join(body, other, [0], [0])
             step()
             _ = joint.force, body.velocities()
             joint.release()
 
     def entries(self) -> list[list[Any]]:
-        """Numbers of handle, joint and both bodies, and the particles that are held."""
+        """List numbers of handle, joint and both bodies, and the held particles."""
         return [
             [serial_of(joint), number, joint.body.index, joint.other.index, joint.particles.tolist()]
             for number, joint in sorted(self.by_number.items())
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Of joints, their rows, and the ends of these."""
+        """Numbers of joints, of their rows, and of the ends of the rows."""
         rows = sum(len(particles) for *_, particles in entries)
         return [MOST_JOINTS, rows, rows * ENDS]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, int, NDArray[np.int32]]]:
-        """Rows of `entries`. Raises: ValueError for joints of nobody, or in a world that has none."""
+        """Parse rows of `entries`. Raises: ValueError for missing bodies, or in a world without joints."""
         found = []
         for serial, number, body, other, particles in entries:
             a, b = (below(slot, len(vertex_counts)) for slot in (body, other))
             has_contact = self.context.built.program.has_contact
             if a == b or not (vertex_counts[a] and vertex_counts[b] and has_contact):
-                raise ValueError("a joint holds no bodies")
+                raise ValueError("a joint has no bodies")
             held = indices_below(particles, vertex_counts[a])
             found.append((int(serial), below(number, MOST_JOINTS), a, b, held))
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where the fields do not say what was `read`."""
+        """Raise a ValueError if the fields differ from the result of `read`."""
         if not self.context.built.program.has_contact:
             return
         fields = self.context.built.state.joints
@@ -167,15 +174,15 @@ class Joints(Numbered[Joint]):
         spans = sorted(rows[used].tolist())
         ends = [0, *(end for _, end in spans)]
         if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
-            raise ValueError("its joints are not those that it names")
+            raise ValueError("its joints differ from its fields")
 
     def clear(self) -> None:
-        """Forget which particles are held: each step finds anew which are."""
+        """Clear the marks of held particles; each step finds them again."""
         if self.context.built.program.has_contact:
             forget_held(self.context.built.state)
 
     def restore(self, read: Any) -> None:
-        """Let there be the joints that were `read`, and no other."""
+        """Replace all joints by those from `read`."""
         self.by_number.clear()
         for serial, number, a, b, particles in read:
             body, other = (self.context.slots.slots[slot] for slot in (a, b))
@@ -188,20 +195,19 @@ class Joints(Numbered[Joint]):
         self.context.built.mark_joints_changed()
 
     def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
-        """As `Body.attach_to`."""
+        """Implement `Body.attach_to`."""
         context = self.context
         if not isinstance(other, SoftBody) or other is body or not belongs_to(other, context):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
         require_alive(other)
         vertices, places = _find_places(body, other, particles, onto)
-        if not context.built.program.has_contact:
-            raise StateError("schedule 'flat' has no joints: make the world with schedule='per_body'")
+        require_per_body(context, "joints")
         free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > JOINT_ROWS:
             raise StateError(
-                f"the joints of a world hold at most {JOINT_ROWS} particles: {used} are held, and "
-                f"{len(vertices)} more were asked for. Release a joint, or name fewer"
+                f"the joints of a world have at most {JOINT_ROWS} particles: {used} are in use, and "
+                f"{len(vertices)} more were requested. Release a joint, or give fewer"
             )
         context.built.wake(other.index)
         held = np.concatenate([rows_of(body, vertices)[:, None], rows_of(other, places.vertices)], axis=1)
@@ -226,7 +232,7 @@ class Joints(Numbered[Joint]):
 def _find_places(
     body: SoftBody, other: SoftBody, particles: ArrayLike, onto: ArrayLike | None
 ) -> tuple[NDArray[np.int32], Places]:
-    """Vertices of `body` and where `other` holds them. Raises: OptionError."""
+    """Return vertices of `body` and their embedding in `other`. Raises: OptionError."""
     vertices = named_particles(body, particles)
     if onto is None:
         points = body.positions()[vertices].astype(np.float64)
@@ -234,22 +240,20 @@ def _find_places(
     named_particles(other, onto, "onto")
     given, partners = np.asarray(particles), np.asarray(onto)
     if len(vertices) != len(given):
-        raise OptionError(f"particles names {len(given) - len(vertices)} vertices twice: name each once")
+        raise OptionError(f"particles has {len(given) - len(vertices)} vertices twice: give each one once")
     if len(partners) != len(given):
-        raise OptionError(
-            f"onto names {len(partners)} vertices for {len(given)} particles: name one for each"
-        )
+        raise OptionError(f"onto has {len(partners)} vertices for {len(given)} particles: give one for each")
     return vertices, places_on(other, partners[np.argsort(given, kind="stable")].astype(np.int32))
 
 
 def _draw_speed(body: SoftBody, other: SoftBody, vertices: NDArray[np.int32], places: Places) -> float:
-    """[m/s] at which a gap between the two may close."""
+    """Largest closing speed of a gap between two bodies [m/s]."""
     holders = np.unique(places.vertices[places.weights != 0.0])
     slowest = min(_follow_speed(body, vertices), _follow_speed(other, holders))
     return DRAW * slowest
 
 
 def _follow_speed(body: SoftBody, held: NDArray[np.int32]) -> float:
-    """[m/s] at which what is held of a body may follow."""
+    """Largest speed at which held particles of a body can follow [m/s]."""
     share = mass_of(body, held) / mass_of(body, some_particles(body, None))
     return wave_speed(record_of(body).description) * float(np.sqrt(share))

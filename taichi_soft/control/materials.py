@@ -1,4 +1,4 @@
-"""What a body is made of, changed while it moves."""
+"""Change the material of a body while it moves."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from taichi_soft.elements.laws import fit_model
 
 
 def set_material(body: SoftBody, material: Any) -> None:
-    """As `Body.set_material`."""
+    """Implement `Body.set_material`."""
     before = record_of(body).description
     if type(material) is not type(before.material):
         raise MaterialError(
-            f"body {body.index} is made of a {type(before.material).__name__} and stays so: "
+            f"body {body.index} has a {type(before.material).__name__}, and its type cannot change: "
             f"got {type(material).__name__}"
         )
     fit_model(before.model, before.mesh, material)
@@ -24,5 +24,5 @@ def set_material(body: SoftBody, material: Any) -> None:
 
 
 def set_damping(body: SoftBody, damping: Any) -> None:
-    """As `Body.set_damping`."""
+    """Implement `Body.set_damping`."""
     set_material(body, replace(body.material, damping=damping))

@@ -1,4 +1,4 @@
-"""Motors: a part of a body turned about an axis, or pushed along it, towards a speed."""
+"""Motors: rotate a part of a body about an axis, or push it along the axis, towards a speed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of
-from taichi_soft.control.change import change, named_particles, numbers, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, numbers, require_per_body, rows_of
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
     MOTOR_ROWS,
@@ -31,15 +31,15 @@ from taichi_soft.core.residue import kept
 from taichi_soft.core.serialisation import below, indices_below, require_finite, vector_of
 
 LARGEST_LIMIT = 1e12
-"""Of torque [N m] and force [N]."""
+"""Largest limit of torque [N m] and force [N]."""
 
 
 @dataclass
 class Drive:
-    """What a motor does."""
+    """Settings of a motor."""
 
-    turns: bool  # about the axis, or pushes along it
-    is_fixed: bool  # the axis keeps its direction, or turns with the particles
+    turns: bool  # True: rotates about the axis, False: pushes along it
+    is_fixed: bool  # True: the axis keeps its direction, False: it rotates with the particles
     axis: NDArray[np.float64]  # of unit length, (3,), in space or in the rest shape
     point: NDArray[np.float64] | None  # on the axis, (3,) [m]; None for the centre of the particles
     speed: float  # [rad/s] or [m/s]
@@ -47,19 +47,19 @@ class Drive:
 
     @property
     def unit(self) -> str:
-        """Of its speed."""
+        """Unit of its speed."""
         return "rad/s" if self.turns else "m/s"
 
 
 THINNEST = 1e-3
-"""Width of the driven part over its length, below which nobody can see how it has turned about that."""
+"""Smallest width of the driven part over its length for which its rotation about that length is defined."""
 
 
 class Motor(Handle):
-    """What turns a part of a body, or pushes it. Made by `World.add_motor`."""
+    """A motor that rotates or pushes a part of a body. Returned by `World.add_motor`."""
 
     def __init__(self, body: SoftBody, number: int, particles: NDArray[np.int32], drive: Drive) -> None:
-        """Made by `World.add_motor`."""
+        """Use `World.add_motor` instead."""
         self.body = body
         self.particles = particles
         self._number = number
@@ -71,29 +71,29 @@ class Motor(Handle):
 
     @property
     def is_mounted(self) -> bool:
-        """False once removed, and once the body was."""
+        """False after the motor or its body was removed."""
         return self.body.is_alive and self._motors.by_number.get(self._number) is self
 
     @property
     def turns(self) -> bool:
-        """Whether it turns its particles about the axis; otherwise it pushes them along it."""
+        """True if it rotates its particles about the axis, False if it pushes them along it."""
         return self._drive.turns
 
     @property
     def speed(self) -> float:
-        """Towards which it drives [rad/s], or [m/s] where it pushes."""
+        """Target speed [rad/s], or [m/s] if it pushes."""
         return self._drive.speed
 
     @property
     def limit(self) -> float:
-        """Largest torque [N m], or force [N] where it pushes."""
+        """Largest torque [N m], or force [N] if it pushes."""
         return self._drive.limit
 
     @property
     def measured_speed(self) -> float:
-        """That its particles have about the axis, or along it [rad/s] or [m/s]; 0 while the body is frozen.
+        """Speed of its particles about the axis [rad/s] or along it [m/s]; 0 while the body is frozen.
 
-        Raises: StateError once removed.
+        Raises: StateError after removal.
         """
         self._require_mounted()
         state = context_of(self.body).built.state
@@ -101,9 +101,9 @@ class Motor(Handle):
 
     @property
     def effort(self) -> float:
-        """Torque [N m] or force [N] that it gave, mean over the last step; 0 while the body is frozen.
+        """Torque [N m] or force [N] of the motor, mean over the last step; 0 while the body is frozen.
 
-        Raises: StateError once removed.
+        Raises: StateError after removal.
         """
         self._require_mounted()
         context = context_of(self.body)
@@ -112,27 +112,27 @@ class Motor(Handle):
 
     @recorded
     def set_speed(self, speed: float) -> None:
-        """Drive towards another speed from now on [rad/s], or [m/s] where it pushes.
+        """Set the target speed.
 
         Args:
-            speed: about the axis [rad/s], or along it [m/s] where it pushes. Negative values reverse it.
-        Raises: OptionError for a number out of range; StateError once removed.
+            speed: about the axis [rad/s], or along it [m/s] if it pushes. Negative values reverse it.
+        Raises: OptionError for a number out of range; StateError after removal.
         """
         self._set(_as_speed(speed, self._drive.turns), self.limit)
 
     @recorded
     def set_limit(self, limit: float) -> None:
-        """Allow another torque [N m] or force [N] from now on; with 0 the particles coast.
+        """Set the limit of the torque or force; with 0 the particles coast.
 
         Args:
-            limit: largest torque [N m], or force [N] where it pushes; 0 or more.
+            limit: largest torque [N m], or force [N] if it pushes; 0 or more.
         Raises: as `set_speed`.
         """
         self._set(self.speed, _as_limit(limit, "limit"))
 
     @recorded
     def remove(self) -> None:
-        """Drive no longer; the particles keep their velocities. Raises: StateError if it was done before."""
+        """Remove the motor; the particles keep their velocities. Raises: StateError if already removed."""
         self._require_mounted()
         motors = self._motors
         del motors.by_number[self._number]
@@ -160,17 +160,17 @@ class Motors(Numbered[Motor]):
 
     @property
     def rows_in_use(self) -> int:
-        """Particles that all motors drive together."""
+        """Number of particles of all motors."""
         return sum(len(motor.particles) for motor in self.by_number.values())
 
     def release_body(self, body: SoftBody) -> None:
-        """Remove all that drive a body."""
+        """Remove all motors of a body."""
         for motor in self.holding(body):
             motor.remove()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Drive a body, and read what that did."""
-        with contextlib.suppress(StateError):  # all are in use already, which compiles them too
+        """Add a motor to a body, and read its effort."""
+        with contextlib.suppress(StateError):  # all motors are in use, so the kernels are compiled
             motor = self.add(body, [0], (0.0, 0.0, 1.0), 0.0, None, 0.0, True, None)
             motor.set_speed(1.0)
             step()
@@ -178,7 +178,7 @@ class Motors(Numbered[Motor]):
             motor.remove()
 
     def rows(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
-        """All motors as `write_motors` takes them, their particles one after the other."""
+        """All motors in the layout of `write_motors`, with concatenated particles."""
         wholes, reals, particles, first = [], [], [], 0
         for number, motor in sorted(self.by_number.items()):
             drive, end = motor._drive, first + len(motor.particles)
@@ -194,7 +194,7 @@ class Motors(Numbered[Motor]):
         )
 
     def entries(self) -> list[list[Any]]:
-        """Numbers of handle, motor and body, the particles, and what it does."""
+        """List numbers of handle, motor and body, the particles, and the settings."""
         return [
             [
                 *(serial_of(motor), number, motor.body.index, motor.particles.tolist()),
@@ -206,18 +206,18 @@ class Motors(Numbered[Motor]):
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Of motors up to the last in use."""
+        """Number of motors up to the last one in use."""
         return [max((int(number) for _, number, *_ in entries), default=-1) + 1]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, NDArray[np.int32], Drive]]:
-        """Rows of `entries`. Raises: ValueError for a motor of nobody, or what no motor does."""
+        """Parse rows of `entries`. Raises: ValueError for a missing body or invalid settings."""
         found = []
         for serial, number, slot, particles, turns, is_fixed, axis, point, speed, limit in entries:
             count = vertex_counts[below(slot, len(vertex_counts))]
             if not (count and self.context.built.program.has_contact):
-                raise ValueError("a motor drives no body")
+                raise ValueError("a motor has no body")
             drive = Drive(
                 as_flag(turns, "turns"),
                 as_flag(is_fixed, "is_fixed"),
@@ -234,11 +234,11 @@ class Motors(Numbered[Motor]):
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where what motors did is not finite."""
+        """Raise a ValueError if results of motors are not finite."""
         require_finite(rows_of(self.context.built.state.motors.impulse))
 
     def restore(self, read: Any) -> None:
-        """Let there be the motors that were `read`, and no other."""
+        """Replace all motors by those from `read`."""
         had_any = bool(self.by_number)
         self.by_number.clear()
         for serial, number, slot, particles, drive in read:
@@ -262,7 +262,7 @@ class Motors(Numbered[Motor]):
         is_fixed: bool,
         point: ArrayLike | None,
     ) -> Motor:
-        """As `World.add_motor`, of a body of this world."""
+        """Implement `World.add_motor` for a body of this world."""
         context = self.context
         vertices = named_particles(body, particles)
         if (max_torque is None) == (max_force is None):
@@ -276,16 +276,14 @@ class Motors(Numbered[Motor]):
         direction = as_vector(axis, "axis", "")
         length = length_of(direction)
         if not length > 0.0:
-            raise OptionError(f"axis must have a direction, got {direction.tolist()}")
+            raise OptionError(f"axis must have a length above 0, got {direction.tolist()}")
         if point is not None and not (turns and stays):
             raise OptionError(
-                "point is of an axis that particles turn about, and that stays in space: give max_torque and "
-                "is_fixed=True with it, or leave it out"
+                "point is only for a rotation about a fixed axis: give max_torque and is_fixed=True too, or "
+                "leave out point"
             )
         place = None if point is None else as_vector(point, "point", "m")
-        require_substeps(context, "motors")
-        if not context.built.program.has_contact:
-            raise StateError("schedule 'flat' has no motors: make the world with schedule='per_body'")
+        require_per_body(context, "motors")
         positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
         drive = Drive(turns, stays, direction / length, place, wanted, limit)
         if not stays:
@@ -296,8 +294,8 @@ class Motors(Numbered[Motor]):
         used = self.rows_in_use
         if used + len(vertices) > MOTOR_ROWS:
             raise StateError(
-                f"the motors of a world drive at most {MOTOR_ROWS} particles: {used} are driven, and "
-                f"{len(vertices)} more were asked for. Remove a motor, or name fewer"
+                f"the motors of a world have at most {MOTOR_ROWS} particles: {used} are in use, and "
+                f"{len(vertices)} more were requested. Remove a motor, or give fewer"
             )
         change(body, forget_impulse, free)
         motor = self.by_number[free] = Motor(body, free, vertices, drive)
@@ -318,10 +316,10 @@ def _as_limit(limit: Any, name: str) -> float:
 
 
 def _require_width(rest: NDArray[np.float64], masses: NDArray[np.float64]) -> None:
-    """Raises: OptionError where particles lie on a line, so that their turn about it cannot be seen."""
+    """Raise an OptionError if particles are on a line, so that their rotation about it is undefined."""
     arms = (rest - masses @ rest / masses.sum()) * np.sqrt(masses)[:, None]
     spreads = np.linalg.svd(arms, compute_uv=False)
     if len(spreads) < 2 or not spreads[1] > THINNEST * spreads[0]:
         raise OptionError(
-            "particles lie on a line, so an axis cannot turn with them: name more, or give is_fixed=True"
+            "particles are on a line, so an axis cannot rotate with them: give more, or set is_fixed=True"
         )

@@ -1,4 +1,4 @@
-"""Slices whose handles have numbers: so many at a time, the lowest free one first."""
+"""Slices with a fixed number of handles; a new one takes the lowest free index."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ Kind = TypeVar("Kind", bound=Handle)
 
 
 class Numbered(Slice, Generic[Kind]):
-    """Grabs, joints, motors: all of one world, by number."""
+    """Base of grabs, joints and motors: all of one world, by index."""
 
-    most = 0  # at a time
-    way_out = ""  # for who wants more
+    most = 0  # largest number of handles
+    way_out = ""  # verb of the advice if all are in use
 
     def __init__(self, context: Context) -> None:
-        """None yet."""
+        """Start without handles."""
         super().__init__(context)
         self.by_number: dict[int, Kind] = {}
 
     @property
     def handles(self) -> list[Kind]:
-        """Of all there are, by number."""
+        """All handles, by index."""
         return [each for _, each in sorted(self.by_number.items())]
 
     def holding(self, body: SoftBody) -> list[Kind]:
-        """Those that hold a body, by number."""
+        """Handles of a body, by index."""
         return [each for each in self.handles if each.body is body]  # type: ignore[attr-defined]
 
     def holds(self, body: SoftBody) -> bool:
-        """Whether there are such."""
+        """True if a body has handles."""
         return bool(self.holding(body))
 
     def free_number(self) -> int:
-        """The lowest. Raises: StateError where there is none."""
+        """Lowest free index. Raises: StateError if all are in use."""
         free = next((number for number in range(self.most) if number not in self.by_number), None)
         if free is None:
             raise StateError(

@@ -1,4 +1,4 @@
-"""Particles that are held, or moved by hand."""
+"""Pin particles, and move pinned particles."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from taichi_soft.core.errors import OptionError, StateError
 
 
 def pinned_vertices(body: SoftBody) -> NDArray[np.int32]:
-    """As `Body.pinned`, of a built world."""
+    """Implement `Body.pinned` for a built world."""
     flags = np.empty(body.vertex_count, dtype=np.int32)
     context_of(body).built.read(body.index, read_pinned, flags)
     return np.flatnonzero(flags).astype(np.int32)
 
 
 def pin(body: SoftBody, particles: ArrayLike) -> None:
-    """As `Body.pin`."""
+    """Implement `Body.pin`."""
     vertices = named_particles(body, particles)
     require_unattached(body, vertices)
     change(body, pin_particles, rows_of(body, vertices))
 
 
 def unpin(body: SoftBody, particles: ArrayLike | None) -> None:
-    """As `Body.unpin`."""
+    """Implement `Body.unpin`."""
     if particles is None:
         vertices = np.setdiff1d(body.pinned, attached_vertices(body))
     else:
@@ -47,14 +47,14 @@ def unpin(body: SoftBody, particles: ArrayLike | None) -> None:
 
 
 def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> None:
-    """As `Body.set_targets`."""
+    """Implement `Body.set_targets`."""
     vertices = named_particles(body, particles)
     given = np.asarray(particles)
     if len(vertices) != len(given):
-        raise OptionError(f"particles names {len(given) - len(vertices)} vertices twice: name each once")
+        raise OptionError(f"particles has {len(given) - len(vertices)} vertices twice: give each one once")
     targets = as_array(positions, "positions", (len(given), 3), "m")
     if not np.abs(targets).max() < POSITION_LIMIT:
-        raise OptionError(f"positions must lie within {POSITION_LIMIT:g} m of zero")
+        raise OptionError(f"positions must be within {POSITION_LIMIT:g} m of the origin")
     require_unattached(body, vertices)
     order = np.argsort(given, kind="stable")
     rows, found = targets[order].astype(np.float32), np.empty(1, dtype=np.int32)

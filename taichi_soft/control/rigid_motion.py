@@ -1,4 +1,4 @@
-"""A whole body set in motion, or put somewhere else, as a rigid one."""
+"""Set the velocity of a whole body, or move it, as a rigid body."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from taichi_soft.core.math.rotations import turned
 
 
 def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
-    """As `Body.set_velocity`."""
+    """Implement `Body.set_velocity`."""
     motion = numbers(
         as_vector(linear, "linear", "m/s", VELOCITY_LIMIT), as_vector(angular, "angular", "rad/s")
     )
@@ -29,13 +29,13 @@ def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
     fastest = float(found[0])
     if not fastest < VELOCITY_LIMIT:
         raise OptionError(
-            f"linear and angular make some vertices {fastest:.4g} m/s fast: keep below {VELOCITY_LIMIT:g} m/s"
+            f"linear and angular move a vertex at {fastest:.4g} m/s: stay below {VELOCITY_LIMIT:g} m/s"
         )
     mark_modified(body)
 
 
 def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: bool) -> None:
-    """As `Body.teleport`."""
+    """Implement `Body.teleport`."""
     target, turn = as_vector(position, "position", "m"), as_rotation(rotation)
     keep = as_flag(keep_velocity, "keep_velocity")
     require_unattached(body, some_particles(body, None))
@@ -48,7 +48,7 @@ def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: 
     lowest = -np.inf if floor is None else floor
     bottom, top, farthest = jump_to(body, target, turn, lowest=lowest, keep=keep)
     if not farthest < POSITION_LIMIT:
-        raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+        raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: move it closer to the origin")
     if bottom < lowest - 1e-3 * (top - bottom):
         raise OptionError(
             f"position={target.tolist()} puts the body {lowest - bottom:.4g} m below the floor: raise it"

@@ -1,4 +1,4 @@
-"""Jumps of whole bodies, deformed as they are, by a rigid motion."""
+"""Move whole bodies by a rigid motion, keeping their deformation."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 def jump_to(
     body: SoftBody, center: Floats, turn: Floats, *, lowest: float, keep: bool
 ) -> tuple[float, float, float]:
-    """Turn a body about its centre of mass and put that at `center`, its velocity turned or stopped.
+    """Rotate a body about its centre of mass and move it to `center`, with its velocity rotated or stopped.
 
-    Returns: its lowest height, its highest, and its largest coordinate then [m]. Where the first is below
-        `lowest` or the last out of reach, nothing was changed; else the caller has to `mark_modified` it.
+    Returns: its new lowest and highest height and largest coordinate [m]. If the first is below `lowest` or
+        the last is out of range, nothing was changed; otherwise the caller must call `mark_modified`.
     """
     found = np.empty(3)
     attempt(body, jump, body.index, np.array([*center, lowest, float(keep)]), turn, found)
@@ -32,16 +32,16 @@ def jump_to(
 
 
 def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, *, keep: bool) -> None:
-    """Move bodies by the rigid motion that takes the point `start` to `end` [m], and wake what lay on them.
+    """Move bodies by the rigid motion that maps the point `start` to `end` [m], and wake bodies on them.
 
-    Raises: OptionError, with nothing changed, where one of them would be out of reach.
+    Raises: OptionError if one of them would be out of range. Then nothing is changed.
     """
     centers = [turned((body.center_of_mass() - start)[None], turn)[0] + end for body in bodies]
     for body, center in zip(bodies, centers, strict=True):
-        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # only looks
+        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # changes nothing
         if not farthest < POSITION_LIMIT:
             raise OptionError(
-                f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: stay nearer the origin"
+                f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: move it closer to the origin"
             )
     for body, center in zip(bodies, centers, strict=True):
         simulation = context_of(body).built

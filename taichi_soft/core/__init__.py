@@ -1,1 +1,1 @@
-"""The ground: errors, checks, types, the one start of Taichi, and bytes. Knows nothing of bodies."""
+"""Foundation of the package, independent of bodies: errors, checks, types, Taichi's start, serialisation."""

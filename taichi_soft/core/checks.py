@@ -1,4 +1,4 @@
-"""Arguments of the public face, checked before anything is changed."""
+"""Checks of arguments of the public interface, made before anything is changed."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 LARGEST_COUNT = 1_000_000
-"""Substeps, bodies or pixels: more would not end within minutes, or not fit 32 bits."""
+"""Largest number of substeps, bodies or pixels: more would take too long or exceed 32 bits."""
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
+"""Range of fixed steps [s]: shorter ones vanish in float32, longer ones would take days of computing."""
 
 
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
-    """`value` as a float within [low, high]. Raises: OptionError saying `text`, or the range."""
+    """Convert `value` to a float within [low, high]. Raises: OptionError with `text`, or the range."""
     wanted = text or f"a number from {low:g} to {high:g}"
     if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
         raise OptionError(f"{name} must be {wanted}, got {value!r}")
@@ -40,7 +40,7 @@ def as_number(value: Any, name: str, low: float, high: float, text: str = "") ->
 
 
 def as_positive(value: Any, name: str, unit: str) -> float:
-    """`value` as a float above 0. Raises: OptionError."""
+    """Convert `value` to a float above 0. Raises: OptionError."""
     number = as_number(value, name, 0.0, np.inf, f"a number above 0 {unit}")
     if number == 0.0:
         raise OptionError(f"{name} must be a number above 0 {unit}, got 0")
@@ -48,12 +48,12 @@ def as_positive(value: Any, name: str, unit: str) -> float:
 
 
 def as_step(dt: float) -> float:
-    """`dt` if it can be the length of a fixed step [s]. Raises: OptionError."""
+    """Check the length of a fixed step [s]. Raises: OptionError."""
     return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
 
 
 def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> int:
-    """`value` as a whole number from `low` to `high`. Raises: OptionError."""
+    """Check that `value` is an integer from `low` to `high`. Raises: OptionError."""
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
         raise OptionError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
@@ -61,7 +61,7 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
 
 
 def choose_one_of(names: Iterable[str], given: Any) -> str:
-    """End an error about an unknown name: list the known names, and name the closest one."""
+    """Write advice for an unknown name: the known names, and the closest one."""
     known = list(names)
     close = get_close_matches(given, known, n=1) if isinstance(given, str) else []
     guess = f". Did you mean {close[0]!r}?" if close else ""
@@ -69,7 +69,7 @@ def choose_one_of(names: Iterable[str], given: Any) -> str:
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """`value` if it is True or False. Raises: OptionError."""
+    """Check that `value` is True or False. Raises: OptionError."""
     if not isinstance(value, (bool, np.bool_)):
         raise OptionError(f"{name} must be True or False, got {value!r}")
     return bool(value)
@@ -80,11 +80,9 @@ def _is_plain(value: Any) -> bool:
 
 
 def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
-    """`value` as three numbers nearer to zero than `limit`. Raises: OptionError."""
+    """Convert `value` to three numbers within `limit`. Raises: OptionError."""
     if isinstance(value, tuple) and len(value) == 3 and all(_is_plain(x) and abs(x) < limit for x in value):
-        return np.array(
-            value, dtype=np.float64
-        )  # the same, ten times as fast: games move many things a frame
+        return np.array(value, dtype=np.float64)  # fast path: games move many objects per frame
     vector = as_array(value, name, (3,), unit)
     if not np.abs(vector).max() < limit:
         raise OptionError(f"{name} must lie within {limit:g} {unit} of zero, got {vector.tolist()}")
@@ -92,19 +90,19 @@ def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LI
 
 
 def as_gravity(value: ArrayLike) -> Floats:
-    """`value` as the gravity of a world, (3,) [m/s^2], read-only. Raises: OptionError."""
+    """Convert `value` to the gravity of a world, (3,) [m/s^2], read-only. Raises: OptionError."""
     gravity = as_vector(value, "gravity", "m/s^2")
     gravity.flags.writeable = False
     return gravity
 
 
 def as_friction(value: Any) -> float:
-    """`value` as a Coulomb coefficient. Raises: OptionError."""
+    """Convert `value` to a Coulomb coefficient. Raises: OptionError."""
     return as_number(value, "friction", 0.0, 1e6, "a number from 0 to 1,000,000")
 
 
 def to_array(values: Any, name: str) -> NDArray[Any]:
-    """`values` as an array of whatever they hold. Raises: OptionError for rows of unequal lengths."""
+    """Convert `values` to an array of any type. Raises: OptionError for rows of unequal lengths."""
     try:
         return np.asarray(values)
     except (ValueError, TypeError) as error:
@@ -112,7 +110,7 @@ def to_array(values: Any, name: str) -> NDArray[Any]:
 
 
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
-    """`values` as finite float64 of that shape (None: any length), copied. Raises: OptionError."""
+    """Copy `values` to finite float64 of a shape (None means any length). Raises: OptionError."""
     lengths = ", ".join("n" if length is None else str(length) for length in shape)
     wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
     array = to_array(values, name)
@@ -122,8 +120,8 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
         want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
     ):
         raise OptionError(f"{name} must have shape {wanted}, got shape {array.shape}")
-    real = array.astype(np.float64)  # a copy, also of float64
-    # The sum is finite for all sound arrays but absurd ones, and quicker than looking at every number.
+    real = array.astype(np.float64)  # always a copy
+    # Check the sum first, which is faster than checking every number.
     if not np.isfinite(real.sum()) and not np.isfinite(real).all():
         first = int(np.argmin(np.isfinite(real.reshape(len(real), -1)).all(axis=1)))
         raise OptionError(f"{name} must be finite, but entry {first} is {real[first].tolist()}")
@@ -131,7 +129,7 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
 
 
 def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
-    """`values` as distinct whole numbers from 0 to `count` - 1, ascending. Raises: OptionError."""
+    """Convert `values` to unique integers from 0 to `count` - 1, ascending. Raises: OptionError."""
     array = to_array(values, name)
     if array.size == 0 and array.ndim == 1:
         return np.zeros(0, dtype=np.int32)
@@ -144,7 +142,7 @@ def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
 
 
 def as_buffer(out: Any, name: str, count: int) -> Floats32:
-    """`out` if (count, 3) positions or normals can be written to it, or a new array for None.
+    """Check that `out` can receive (count, 3) positions or normals; None makes a new array.
 
     Raises: OptionError.
     """
@@ -164,7 +162,7 @@ def as_buffer(out: Any, name: str, count: int) -> Floats32:
 
 
 def as_path(value: Any) -> Path:
-    """`value` as the path of a file. Raises: OptionError."""
+    """Convert `value` to the path of a file. Raises: OptionError."""
     if not isinstance(value, (str, os.PathLike)):
         raise OptionError(f"path must be a string or a Path, got {value!r}")
     path = Path(os.fsdecode(value))
@@ -174,7 +172,7 @@ def as_path(value: Any) -> Path:
 
 
 def as_rotation(value: Any) -> Floats:
-    """A rotation matrix from a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation.
+    """Convert a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation to a rotation matrix.
 
     Raises: OptionError if it is neither orthonormal with determinant +1 nor of length 1.
     """
@@ -190,9 +188,9 @@ def as_rotation(value: Any) -> Floats:
 
 
 def as_rotations(value: Any, name: str) -> Floats:
-    """Rotation matrices (m, 3, 3) from such matrices, or from quaternions (m, 4) of x, y, z, w.
+    """Convert matrices (m, 3, 3) or quaternions (m, 4) of x, y, z, w to rotation matrices (m, 3, 3).
 
-    Raises: OptionError with the first that is no rotation.
+    Raises: OptionError with the first invalid rotation.
     """
     if to_array(value, name).ndim == 2:
         return _from_quaternions(as_array(value, name, (None, 4), "quaternions x, y, z, w"), name)
@@ -200,7 +198,7 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # whose squares might overflow
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # their squares might overflow
     sound = matrices[~bad]
     gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
     bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)

@@ -1,11 +1,11 @@
-"""How far a world has come."""
+"""Clock of a world."""
 
 from dataclasses import dataclass
 
 
 @dataclass
 class Clock:
-    """Of one world: its fixed steps so far, and the time that they took."""
+    """Number of fixed steps of one world, and their simulated time."""
 
     steps: int = 0
     time: float = 0.0  # simulated [s]

@@ -1,29 +1,29 @@
-"""Numbers with a unit and a reason."""
+"""Constants with their units and reasons."""
 
 from __future__ import annotations
 
 GRAVITY_EARTH = 9.81
-"""Standard fall on Earth [m/s^2], as the thesis uses it."""
+"""Gravity on Earth [m/s^2], the thesis's value."""
 
 LANES = 8
-"""Tetrahedra per block. Eight float32 fill one AVX register: the compiler then computes a block in
-vector instructions. Four were 1.3 times slower, sixteen compiled ten times longer for no gain."""
+"""Tetrahedra per block. Eight float32 fill one AVX register, so that the compiler vectorises a block. Four
+are slower, and sixteen compile much longer without gain."""
 
 HALF = LANES // 2
-"""Edges of one particle in half a block of edges. Where each has some nine edges, few particles can own eight
-and most can own four: so blocks are full that would be two thirds full otherwise."""
+"""Edges of one particle in half a block of edges. A particle has about nine edges, so few particles can own
+eight and most can own four: half blocks fill the blocks completely."""
 
 ROW_BITS = (1 << 28) - 1
-"""Mask that leaves every row of a field unchanged, and shows the compiler that adding a lane to it does not
-overflow: without it nothing becomes vector instructions."""
+"""Mask that keeps every row of a field, and proves to the compiler that adding a lane does not overflow,
+which vectorisation requires."""
 
 POSITION_LIMIT = 1.0e7
-"""Farthest coordinate [m] that still counts as finite. Beyond it float32 cannot resolve a body at all
-(its spacing is 1 m), so a particle out there has been thrown by an explosion."""
+"""Largest valid coordinate [m]. Beyond it float32 cannot resolve a body (its spacing is 1 m), so a particle
+there comes from an explosion."""
 
 VELOCITY_LIMIT = 2.0e4
-"""Highest velocity [m/s] that still counts as sound: twice what leaves the Earth. A lower bound stops an
-explosion while the body is still somewhere near its shape."""
+"""Largest valid velocity [m/s]: about twice Earth's escape velocity. The limit stops an explosion while the
+body still resembles its shape."""
 
 ALL_GROUPS = 0x7FFFFFFF
-"""A mask that meets every group of colliders and bodies."""
+"""Mask that matches every group of colliders and bodies."""

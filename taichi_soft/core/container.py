@@ -1,4 +1,4 @@
-"""Bytes that tell whether they are whole: a mark, a version, parts of any length, and a checksum."""
+"""Container of bytes with a magic mark, a version, parts of any length, and a checksum."""
 
 from __future__ import annotations
 
@@ -14,26 +14,25 @@ _DIGEST = 16
 
 
 def seal(mark: bytes, version: int, parts: list[bytes]) -> bytes:
-    """Put parts together, with their lengths in front and a BLAKE2b digest of everything behind."""
+    """Join parts, with their lengths first and a BLAKE2b digest of everything at the end."""
     lengths = [_LENGTH.pack(len(part)) for part in parts]
     whole = b"".join([_HEAD.pack(mark, version, len(parts)), *lengths, *parts])
     return whole + _digest(whole)
 
 
 def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
-    """The parts again.
+    """Check and split sealed bytes into their parts.
 
-    Raises: OptionError for what is not bytes; SnapshotError for what is something else, of another version,
-        or damaged.
+    Raises: OptionError for data that is not bytes; SnapshotError for other data, another version, or damage.
     """
     if not isinstance(data, (bytes, bytearray, memoryview)):
         raise OptionError(f"{name} must be bytes, got {type(data).__name__}")
     whole = memoryview(data).cast("B")
     if len(whole) < _HEAD.size + _DIGEST:
-        raise SnapshotError(f"this is no {name}: {len(whole)} bytes are too few, it is cut off or empty")
+        raise SnapshotError(f"this is not a {name}: {len(whole)} bytes are too few, it is cut off or empty")
     found, made_by, count = _HEAD.unpack_from(whole)
     if found != mark:
-        raise SnapshotError(f"this is no {name}: it begins with {bytes(found)!r} instead of {mark!r}")
+        raise SnapshotError(f"this is not a {name}: it begins with {bytes(found)!r} instead of {mark!r}")
     if made_by != version:
         raise SnapshotError(
             f"this {name} has version {made_by}, and this package reads version {version}: use the package "
@@ -51,7 +50,7 @@ def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
 
 
 def name_of_sealed(data: bytes) -> bytes:
-    """A name of what `seal` put together, that nothing else has."""
+    """Unique name of sealed bytes: their digest."""
     return bytes(memoryview(data).cast("B")[-_DIGEST:])
 
 

@@ -1,4 +1,4 @@
-"""Processor cores, and the threads that are bound to them: on Linux."""
+"""CPU cores, and binding threads to them on Linux."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _TASKS = "/proc/self/task"
 
 
 def available_cores() -> list[int]:
-    """Numbers of the cores that this process may run on, ascending."""
+    """Numbers of the cores that this process can run on, ascending."""
     if hasattr(os, "sched_getaffinity"):
         return sorted(os.sched_getaffinity(0))
     return list(range(os.cpu_count() or 1))
 
 
 def can_bind() -> bool:
-    """Whether threads can be told apart and bound to cores on this system."""
+    """True if this system can identify threads and bind them to cores."""
     return sys.platform.startswith("linux") and Path(_TASKS).is_dir()
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
-    """Different ones of the cores that are `there`, in the order given. Raises: OptionError."""
+    """Check that cores are distinct and among those that are `there`. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"
@@ -38,17 +38,17 @@ def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
         found = ()
     is_known = all(type(core) is int and core in there for core in found)
     if isinstance(cores, str) or not found or not is_known or len(set(found)) < len(found):
-        raise OptionError(f"cores must be different ones of {there}, got {cores!r}")
+        raise OptionError(f"cores must be distinct numbers from {there}, got {cores!r}")
     return found
 
 
 def thread_ids() -> set[int]:
-    """The system's numbers of the threads of this process."""
+    """System ids of the threads of this process."""
     return {int(name) for name in os.listdir(_TASKS)}
 
 
 def number_now() -> int:
-    """The number of a thread that began just now: the system gives them in turn, and again from the first."""
+    """Id of a thread that starts now; the system assigns ids in ascending order and wraps around."""
     thread = threading.Thread(target=int)
     thread.start()
     thread.join()
@@ -57,11 +57,11 @@ def number_now() -> int:
 
 
 def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None:
-    """Bind the threads that were started last to a core each, to the first core the oldest of them.
+    """Bind the youngest threads to one core each, the oldest of them to the first core.
 
     Args:
-        threads: started after the one of number `since`.
-    Raises: DeviceError where the system does not let us; then all are as they were.
+        threads: threads started after the one with the id `since`.
+    Raises: DeviceError if the system refuses. Then no binding is changed.
     """
     masks: dict[int, set[int]] = {}
     try:

@@ -1,31 +1,31 @@
-"""What can go wrong, by kind. Every message names the value received and the way out."""
+"""Errors and warnings. Every message has the value received and what to do."""
 
 
 class TaichiSoftError(Exception):
-    """Base of every error this package raises on purpose. Its text is one line, whatever was received."""
+    """Base of all errors of this package. Its text is always one line."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
 
 
 class MeshError(TaichiSoftError, ValueError):
-    """A mesh, or the file it comes from, cannot be simulated as it is."""
+    """A mesh or its file cannot be simulated."""
 
 
 class MaterialError(TaichiSoftError, ValueError):
-    """A material constant lies outside its physical range."""
+    """A material constant is outside its physical range."""
 
 
 class OptionError(TaichiSoftError, ValueError):
-    """An argument has a value that this call does not take."""
+    """An argument has an invalid value."""
 
 
 class MissingExtraError(OptionError, ImportError):
-    """What was asked for needs packages of an extra that are not installed."""
+    """A feature needs packages of an extra that are not installed."""
 
 
 class StateError(TaichiSoftError, RuntimeError):
-    """The call is right but comes at the wrong time (for example `step` before `build`)."""
+    """The call is not allowed in the current state (for example `step` before `build`)."""
 
 
 class SnapshotError(TaichiSoftError, ValueError):
@@ -33,40 +33,40 @@ class SnapshotError(TaichiSoftError, ValueError):
 
 
 class DeviceError(TaichiSoftError, RuntimeError):
-    """The device asked for is not there."""
+    """The requested device is not available."""
 
 
 class VideoError(TaichiSoftError, OSError):
-    """A video or picture could not be written as asked."""
+    """A video or image could not be written."""
 
 
 class BakeError(TaichiSoftError, OSError):
-    """A bake could not be written as asked."""
+    """A bake could not be written."""
 
 
 class SlowStepWarning(UserWarning):
-    """A step takes more than 500 substeps. It names the body, what asks for them, and the way out."""
+    """A step takes more than 500 substeps. The text names the body, the cause and what to do."""
 
 
 class TooSoftWarning(UserWarning):
-    """A body's weight on its foot exceeds a fifth of its Young's modulus: it cannot bear it."""
+    """A body's pressure on its base exceeds a fifth of its Young's modulus: it collapses."""
 
 
 class UnstableStepWarning(UserWarning):
-    """The substep is larger than the estimate of what stays stable."""
+    """The substep is longer than the estimated stable step."""
 
 
 class FrozenBodyWarning(UserWarning):
-    """A body went non-finite, was put back to its last finite state and frozen."""
+    """A body became non-finite and was frozen in its last finite state."""
 
 
 class DroppedEventsWarning(UserWarning):
-    """More events happened than there is room for, because nobody drained them."""
+    """Events were dropped, because too many waited for `drain_events`."""
 
 
 class SolverWarning(UserWarning):
-    """An implicit solve stopped before it was as exact as asked for, or tetrahedra stay inside out."""
+    """An implicit solve did not reach its tolerance, or tetrahedra stay inverted."""
 
 
 class SkippedCellsWarning(UserWarning):
-    """A mesh file holds cells that are not tetrahedra, and the body is without them."""
+    """A mesh file has cells that are not tetrahedra, which the body leaves out."""

@@ -1,4 +1,4 @@
-"""Extras: packages that a game need not install, and how to get them where one is missing."""
+"""Extras: optional packages, and advice to install missing ones."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ EXTRAS = {
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }
-"""By extra: its modules, and the packages that have them, as in pyproject.toml."""
+"""By extra: its modules and the packages that provide them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """Packages of the extra, or those of these modules, that are not installed."""
+    """Missing packages of an extra, or of these modules of it."""
     return missing_among(EXTRAS[extra], *modules)
 
 
 def missing_among(packages: Mapping[str, str], *modules: str) -> list[str]:
-    """Packages that are not installed, of those by module, or of those of these modules."""
+    """Missing packages of a table by module, or of these modules of it."""
     return [packages[module] for module in modules or packages if not _is_there(module)]
 
 
@@ -46,11 +46,11 @@ def _is_there(module: str) -> bool:
 
 
 def require_extra(extra: str, what: str, *modules: str) -> None:
-    """Raises: MissingExtraError in one line where a package of the extra is missing.
+    """Raise a MissingExtraError if a package of the extra is missing.
 
     Args:
-        what: what needs it, and a verb: "a film needs".
-        modules: of the extra, where it needs these only.
+        what: feature that needs it, and a verb: "a film needs".
+        modules: required modules of the extra; by default all.
     """
     missing = missing_packages(extra, *modules)
     if missing:

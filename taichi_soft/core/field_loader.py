@@ -1,7 +1,6 @@
-"""Rows of NumPy arrays into fields, many fields with one kernel.
+"""Write NumPy arrays to many fields with one kernel.
 
-Taichi compiles a kernel for each field that is written alone: for those of a world they took longer than
-the step's.
+Writing fields separately would compile one kernel per field, which takes longer than compiling the step.
 """
 
 from typing import Any
@@ -17,12 +16,12 @@ class Loader:
     """Fields that are always written together, in the same order."""
 
     def __init__(self) -> None:
-        """Without fields: the first `write` fixes which they are."""
+        """Start without fields; the first `write` fixes them."""
         self.pieces: list[tuple[Any, int, int, int]] = []
         self._waiting: list[tuple[Any, NDArray[Any]]] = []
 
     def fill(self, field: Any, rows: NDArray[Any]) -> None:
-        """Note `rows` for the front of a field of one dimension or of none, and zeros behind them."""
+        """Set the first rows of a field with at most one dimension, and zeros for the rest, for `write`."""
         width = getattr(field, "n", 1)
         whole = np.zeros((_rows_of(field), width), np.int32 if field.dtype == ti.i32 else np.float64)
         if len(rows):
@@ -30,7 +29,7 @@ class Loader:
         self._waiting.append((field, whole.reshape(-1)))
 
     def write(self) -> None:
-        """Write all that was to be filled."""
+        """Write all filled fields."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
         pieces, sizes = [], [1, 1]
         for field, rows in self._waiting:
@@ -56,8 +55,8 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        # Serial loops become one function, and of many fields that compiles three times as long as a function
-        # per field; but to write the few of a collider, no threads are worth waking up.
+        # Serial loops become one function, which compiles much longer for many fields than one function per
+        # field. But for the few fields of a collider, starting threads is not worthwhile.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

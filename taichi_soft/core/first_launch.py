@@ -1,4 +1,4 @@
-"""What is done when a kernel is first called: it is looked for among those known, or made from its source."""
+"""First launch of kernels: load them from the known kernels, or compile them from source."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ Make = Callable[..., None]
 
 
 class FirstLaunches:
-    """Of all kernels of a process."""
+    """First launches of all kernels of a process."""
 
     def __init__(self) -> None:
         self._known: KnownKernels | None = None
         self._flag: Any = None
-        self._made: list[tuple[Any, Any, str]] = []  # kernel, what Taichi tells its arrays apart by, digest
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its arrays, digest
 
     def make_flag(self) -> None:
-        """Make the field that short bodies set, as Taichi starts."""
+        """Make the field that short bodies set, when Taichi starts."""
         self._flag = ti.field(ti.i32, ())
 
     def open(self, known: KnownKernels) -> None:
-        """From now on look for kernels among those known."""
+        """Start to look up kernels among the known ones."""
         self._known = known
 
     @contextmanager
     def making_anew(self, functions: set[Any]) -> Iterator[None]:
-        """Have these kernels made from their source within, whatever is known of them or was made before."""
+        """Context in which these kernels are compiled from source, even if they are known or compiled."""
         known, self._known = self._known, None
-        made = [vars(function)["_primal"] for function in functions]  # Taichi's own object behind each
+        made = [vars(function)["_primal"] for function in functions]  # Taichi's kernel objects
         before = [(kernel, kernel.compiled_kernels) for kernel in made]
         for kernel in made:
             kernel.compiled_kernels = {}
@@ -55,7 +55,7 @@ class FirstLaunches:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:
-        """Have Taichi ask here."""
+        """Hook into Taichi."""
         plain = kernels.Kernel.materialize
 
         def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
@@ -65,24 +65,24 @@ class FirstLaunches:
         kernels.Kernel.materialize = materialize
 
     def close(self) -> None:
-        """Have Taichi keep a file with a short body for each kernel that was made from its source."""
+        """Let Taichi store a file with a short body for each kernel compiled from source."""
         for kernel, features, digest in self._made:
             program = ti.lang.impl.get_runtime().prog
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # reading it is a kernel too, that the next process asks for
+            _ = self._flag[None]  # reading it is a kernel too, which the next process needs
 
     def keep(self) -> None:
-        """Once Taichi has ended: put the code of these kernels into the files of the short bodies."""
+        """Copy the code of these kernels into the files of the short bodies. Call it after Taichi's end."""
         if self._known is not None:
             self._known.keep({digest: name_of(kernel, digest) for kernel, _, digest in self._made})
 
     def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
-        """Make a kernel, and have its first launch looked at."""
+        """Make a kernel, and intercept its first launch."""
         name = kernel.func.__name__
         start = BURST.begin(name)
-        kernel.runtime.materialize()  # lays out fields, of whose places digests are made
+        kernel.runtime.materialize()  # lays out fields, whose positions are part of digests
         digest = self._digest_of(kernel, args, features)
         is_short = self._known is not None and digest in self._known
         if digest is None:
@@ -95,10 +95,12 @@ class FirstLaunches:
 
         def launch_first(compiled: Any, *given: Any) -> Any:
             nonlocal is_found
-            del kernel.launch_kernel  # from now on that of the class
+            del kernel.launch_kernel  # later launches use the method of the class
             try:
                 found = kernel.launch_kernel(compiled, *given)
-                if is_short and digest is not None and self._flag[None] != 0:  # nothing else has happened
+                if (
+                    is_short and digest is not None and self._flag[None] != 0
+                ):  # the short body has no other effect
                     self._flag[None], is_found = 0, False
                     self._make(kernel, key, args, features, digest)
                     found = kernel.launch_kernel(kernel.compiled_kernels[key], *given)
@@ -109,7 +111,7 @@ class FirstLaunches:
         kernel.launch_kernel = launch_first
 
     def _digest_of(self, kernel: Any, args: Any, features: Any) -> str | None:
-        """None where the kernel cannot be known."""
+        """Digest of a kernel, or None if it cannot be known."""
         is_ours = kernel.func.__module__.startswith("taichi_soft.")
         if self._known is None or not is_ours or kernel.autodiff_mode != kernels.AutodiffMode.NONE:
             return None
@@ -121,13 +123,13 @@ class FirstLaunches:
             return None
 
     def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
-        """Make a kernel from its source, under a name by which its file is found again."""
+        """Compile a kernel from source, under a name that identifies its file."""
         tree, context = tree_of(kernel, args, features)
         kernel.compiled_kernels[key] = _create(kernel, tree, context, name_of(kernel, digest))
         self._made.append((kernel, features, digest))
 
     def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
-        """One with the same arguments whose body is short."""
+        """Make a kernel with the same arguments and a short body."""
         names = [argument.name for argument in kernel.arguments]
         lines = [""] * 32
         function = ast.FunctionDef(
@@ -159,10 +161,10 @@ class FirstLaunches:
 
 
 def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
-    """Taichi's own kernel from the tree of a function, as `Kernel.materialize` of Taichi 1.7 makes it."""
+    """Create Taichi's kernel from a function's syntax tree, as `Kernel.materialize` of Taichi 1.7 does."""
     runtime = kernel.runtime
 
-    def taichi_ast_generator(made: Any) -> None:  # Taichi looks for this name
+    def taichi_ast_generator(made: Any) -> None:  # Taichi requires this name
         kernel.kernel_cpp = made
         runtime.inside_kernel, runtime.current_kernel = True, kernel
         assert runtime.compiling_callable is None

@@ -1,8 +1,7 @@
-"""How a thread computes with floats: as IEEE 754 says, in kernels.
+"""Floating-point environment of threads: kernels follow IEEE 754.
 
-Taichi has the processor take numbers below 1e-38 for zero, in the thread that starts it and in its workers.
-WebAssembly cannot do that, and other libraries change it for threads of their own. A kernel would give other
-bits from one place to the next.
+Taichi turns on flush-to-zero in the thread that starts it and in its workers. WebAssembly does not support
+that, and other libraries change it in their threads. Then a kernel's bits would depend on where it runs.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 Environment = ctypes.c_char * 64
-"""Room for C's `fenv_t`: 32 bytes at most where Taichi runs."""
+"""Buffer for C's `fenv_t`, which has at most 32 bytes on Taichi's platforms."""
 
 
 def _unchanged(_: Any) -> None:
-    """In place of C's functions, where the system's library has none."""
+    """Replacement if the system's library lacks C's functions."""
 
 
 try:
@@ -32,7 +31,7 @@ except (AttributeError, OSError):
 
 
 def _usual_environment() -> Any:
-    """C's `FE_DFL_ENV`; where we do not know it, the environment of the thread that imports the package."""
+    """C's `FE_DFL_ENV`, or if unknown, the environment of the importing thread."""
     here, usual = Environment(), Environment()
     _read(here)
     if sys.platform == "linux":
@@ -46,14 +45,14 @@ _usual = _usual_environment()
 
 
 def usual_environment_call() -> tuple[int, int]:
-    """Addresses of a C function that has its thread compute as usual, and of its argument; 0, 0 for none."""
+    """Addresses of a C function that restores the default environment, and of its argument; 0, 0 for none."""
     if _write is _unchanged:
         return 0, 0
     return ctypes.cast(_write, ctypes.c_void_p).value or 0, ctypes.addressof(_usual)
 
 
 def with_usual_floats(function: Function) -> Function:
-    """Lets a function compute as IEEE 754 says, and leaves its thread as it was."""
+    """Decorate a function to run with IEEE 754 floats, and restore the thread's environment after it."""
 
     @wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:

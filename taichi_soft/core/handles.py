@@ -1,4 +1,4 @@
-"""Numbers of what a world gives out handles to: the same in every world with the same history."""
+"""Handles of a world, and their serial numbers, which are equal in worlds with the same history."""
 
 from __future__ import annotations
 
@@ -15,51 +15,51 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 class Recorder(Protocol):
-    """Who takes note of calls, where a world has one."""
+    """Recorder of API calls, if a world has one."""
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call, and take note of it."""
+        """Make a call and record it."""
 
 
 class Handle:
-    """What a caller holds of a world: a body, a collider, a frame, a grab, an attachment; or the world.
+    """Base of public handles: the world, bodies, colliders, frames, grabs, attachments.
 
-    Its public methods are called by one thread at a time: a second one gets a StateError, before anything is
-    changed.
+    Only one thread at a time can call public methods: a concurrent call raises a StateError before anything
+    is changed.
     """
 
     _handles: Handles
     _serial: int
 
     def _keep(self) -> bytes | None:
-        """Of a world only: as `keep`."""
+        """Implement `keep`, for worlds only."""
         raise NotImplementedError
 
     def _undo(self, data: bytes) -> None:
-        """Of a world only: as `undo`."""
+        """Implement `undo`, for worlds only."""
         raise NotImplementedError
 
     def __init_subclass__(cls) -> None:
-        """Guard the public methods."""
+        """Guard the public methods against concurrent calls."""
         for name, method in list(vars(cls).items()):
             if inspect.isfunction(method) and not name.startswith("_"):
                 setattr(cls, name, one_thread(method))
 
 
 class Handles:
-    """Counts the handles of one world, and finds those that somebody still holds."""
+    """Numbers the handles of one world, and finds those that still exist."""
 
     def __init__(self) -> None:
-        """None yet; 0 is the world itself."""
+        """Start without handles; 0 is the world itself."""
         self.count = 1
         self.turn = Turn()
         self.recorder: Recorder | None = None
         self._known: WeakValueDictionary[int, Handle] = WeakValueDictionary()
 
     def enlist(self, handle: Handle, serial: int | None = None) -> None:
-        """Give a new handle the next number, or the one that it had in an earlier state of the world."""
+        """Assign a new handle the next number, or its number in an earlier state of the world."""
         if serial is None:
             serial = self.count
             self.count += 1
@@ -67,13 +67,13 @@ class Handles:
         self._known[serial] = handle
 
     def find(self, serial: int, kind: type[Kind]) -> Kind | None:
-        """The handle of that number, if it is of that kind and somebody holds it."""
+        """Handle with a number, if it has this type and still exists."""
         handle = self._known.get(serial)
         return handle if isinstance(handle, kind) else None
 
 
 def serial_of(handle: Handle) -> int:
-    """Its number, 0 for the world."""
+    """Number of a handle, 0 for the world."""
     return handle._serial
 
 
@@ -83,20 +83,20 @@ def handles_of(handle: Handle) -> Handles:
 
 
 def keep(world: Handle) -> bytes | None:
-    """A snapshot for `undo`, before changes for a step; None if no step of this world may be refused."""
+    """Snapshot for `undo`, before changes for a step; None if no step of this world can be refused."""
     return world._keep()
 
 
 def undo(world: Handle, data: bytes) -> None:
-    """Put a world back to what it was since `keep`, where no step was made since.
+    """Restore a world to its state at `keep`, if no step was made since.
 
-    Unlike `World.restore` that keeps the events that wait, and does not count as another past.
+    Unlike `World.restore`, this keeps waiting events and does not change `restore_count`.
     """
     world._undo(data)
 
 
 def recorded(method: Method) -> Method:
-    """Lets the recorder of a world that has one take note of the calls of a public method that changes it."""
+    """Decorate a public method that changes a world, so that its recorder records the calls."""
 
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:
@@ -110,5 +110,5 @@ def recorded(method: Method) -> Method:
 
 
 def is_recorded(handle: Handle, name: str) -> bool:
-    """Whether a handle has a method of that name that is recorded: what a file may ask for."""
+    """True if a handle has a recorded method with this name, which files can call."""
     return hasattr(getattr(type(handle), name, None), "is_recorded")

@@ -1,14 +1,15 @@
-"""Kernels that an earlier process compiled, found without walking through their source.
+"""Find kernels that an earlier process compiled, without parsing their source.
 
-Taichi 1.7 keeps compiled kernels on disk under a hash of what it makes of their source. To get at that hash
-it walks through the source of each kernel at every start, which takes most of a start with a full cache.
+Taichi 1.7 stores compiled kernels on disk under a hash of their intermediate representation. To compute that
+hash, it processes the source of each kernel at every start, which takes most of a start with a full cache.
 
-Here a kernel that is known from earlier is made with a short body instead. That body holds a digest of all
-that the kernel's source depends on. When the process ends that compiled the kernel, its code is put into the
-file of the short body. There Taichi finds it, by the hash of the short body, which costs next to nothing.
+Here a known kernel is made with a short body instead, which contains a digest of everything that its code
+depends on. When the process that compiled the kernel ends, its code is copied into the file of the short
+body. Taichi then finds it by the hash of the short body, which is cheap to compute.
 
-The short body sets a flag. If Taichi does not find the file, it compiles that body, and the flag tells so
-after the launch. Nothing else has happened then: the kernel is made from its source and launched.
+The short body sets a flag. If Taichi does not find the file, it compiles and runs the short body, and the
+flag is set after the launch. The short body has no other effect: the kernel is then compiled from source and
+launched.
 """
 
 from __future__ import annotations
@@ -31,22 +32,22 @@ import numpy as np
 PACKAGE = Path(__file__).resolve().parents[1]
 
 INDEX = "taichi_soft.json"
-"""File beside Taichi's own, with the digests of kernels that can be found."""
+"""File next to Taichi's files, with the digests of known kernels."""
 
 FLAG = "__flag"
-"""Name in the short body of the field that it sets."""
+"""Name of the flag in the short body."""
 
 HEADER = 1 << 17
-"""Bytes at the front of Taichi's file of a kernel, among which the names of its functions stand."""
+"""Size of the first part of Taichi's kernel file, which contains the names of its functions [bytes]."""
 
 
 class UnknownPartError(Exception):
-    """A kernel depends on something of which no digest can be made."""
+    """A kernel depends on something without a digest."""
 
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Of the package's own files, the interpreter and NumPy: what decides how a kernel's source is read."""
+    """Digest of the package's files and the versions of Python and NumPy, which determine a kernel's code."""
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
         found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
@@ -54,13 +55,13 @@ def digest_of_sources() -> str:
 
 
 def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) -> str:
-    """Of a kernel and what it is compiled for.
+    """Digest of a kernel and its compile-time arguments.
 
     Args:
         function: the Python function.
-        options: those of Taichi's that code depends on.
-        arguments: of each its value, and whether it is a template argument; of others what Taichi tells them
-            apart by.
+        options: Taichi's options that affect code.
+        arguments: value of each argument, and True for template arguments; other arguments count by their
+            features.
     Raises: UnknownPartError.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
@@ -73,7 +74,7 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
 
 
 def _feature(value: Any) -> str:
-    """Type and dimensions of an array, as Taichi tells arrays apart."""
+    """Type and dimensions of an array, by which Taichi distinguishes arrays."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_feature, value))})"
     text = value.to_string() if hasattr(value, "to_string") else str(value)
@@ -83,7 +84,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Add to `parts` all of a template argument that code can be made of."""
+    """Add everything of a template argument that can affect code to `parts`."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))
@@ -94,7 +95,7 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
     if id(value) in seen:
         parts.append(f"again {seen[id(value)][0]}")
         return
-    seen[id(value)] = len(seen), value  # kept, or another could get its identity
+    seen[id(value)] = len(seen), value  # keeps the object, so that its id is not reused
     if hasattr(value, "snode") and hasattr(value, "vars"):
         parts.append(_field_text(value))
     elif hasattr(value, "field_dict"):  # a field of structures
@@ -126,7 +127,7 @@ _field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 def _field_text(field: Any) -> str:
-    """What a field is and where, which does not change once it is laid out."""
+    """Type and memory position of a field, which are fixed after its layout."""
     if field not in _field_texts:
         places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
         size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
@@ -138,8 +139,8 @@ _places: dict[tuple[int, int], str] = {}
 
 
 def _place_of(node: Any) -> str:
-    """Where a number of a field lies in memory: its own place, and those of all that it lies in. It depends
-    on the sizes of other fields too."""
+    """Memory position of a field's number: its offset and those of its parents. It also depends on the sizes
+    of other fields."""
     tree, first = node.get_snode_tree_id(), node.id
     if (tree, first) not in _places:
         path = []
@@ -157,26 +158,26 @@ def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, tupl
 
 
 def short_body(digest: str) -> list[ast.stmt]:
-    """Statements that set the flag, once with each part of the digest. Each takes time at every start."""
+    """Statements that set the flag to each part of the digest. Each one takes time at every start."""
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return ast.parse("\n".join(f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1))).body
 
 
 def name_of(kernel: Any, digest: str) -> str:
-    """Of a kernel that is made from its source, in Taichi's file of it."""
+    """Name of a kernel compiled from source, in Taichi's file."""
     return f"{kernel.func.__name__}_{digest}"
 
 
 def short_name_of(digest: str) -> str:
-    """Of one with the short body."""
+    """Name of a kernel with the short body."""
     return f"known_{digest}"
 
 
 class KnownKernels:
-    """Those in one folder of Taichi's."""
+    """Known kernels in one folder of Taichi's cache."""
 
     def __init__(self, folder: Path, options: str) -> None:
-        """Read which there are. `options`: as `digest_of` takes them."""
+        """Read the index. `options`: see `digest_of`."""
         self.folder, self.options = folder, options
         self._known = self._read()
 
@@ -190,10 +191,10 @@ class KnownKernels:
             return set()
 
     def keep(self, names: dict[str, str]) -> None:
-        """Put kernels where the short bodies are found.
+        """Copy kernels into the files of their short bodies.
 
         Args:
-            names: by digest, of the kernels that were made from their source. Taichi has written all files.
+            names: names of kernels compiled from source, by digest. Taichi must have written all files.
         """
         files = self._files_of({*names.values(), *map(short_name_of, names)})
         kept = []
@@ -206,7 +207,7 @@ class KnownKernels:
             _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
 
     def _files_of(self, names: set[str]) -> dict[str, Path]:
-        """Files in which these kernels are, by name."""
+        """Files of these kernels, by name."""
         found = {}
         for path in self.folder.glob("*.tic"):
             with path.open("rb") as file:
@@ -217,7 +218,7 @@ class KnownKernels:
 
 
 def _write(path: Path, contents: bytes) -> None:
-    """All of a file at once: others may read it meanwhile."""
+    """Write a file atomically, because other processes may read it."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.write_bytes(contents)
     part.replace(path)

@@ -1,4 +1,4 @@
-"""Where the demos and the thesis's meshes lie: inside the package, or beside it in a checkout."""
+"""Folders of the demos and the thesis's meshes: inside the package, or next to it in a checkout."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ def _folder(name: str) -> Path:
 
 
 DEMOS = _folder("demos")
-"""Python files, each of which sets a stage."""
+"""Python files that each define a stage."""
 
 ASSETS = _folder("assets")
-"""The bodies of the thesis's experiments as .npz; `assets/README.md` of the sources tells of them."""
+"""Bodies of the thesis's experiments as .npz; see `assets/README.md` of the sources."""

@@ -1,4 +1,4 @@
-"""Where a file is made until it is complete: a hidden folder beside its place."""
+"""Hidden temporary folder next to a file's path, for incomplete files."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:
-    """A new folder in `parent`. What processes that have died left there is removed first.
+    """A new folder in `parent`. Removes abandoned folders of ended processes first.
 
-    A process holds a lock on a file in its folder. The system gives it back when the process ends, also where
-    that was killed: a folder whose lock can be taken belongs to nobody.
-    Raises: OSError where there can be none.
+    A process locks a file in its folder. The system releases the lock when the process ends, even if it is
+    killed: a folder whose lock is free is abandoned.
+    Raises: OSError if the folder cannot be created.
     """
 
     def __init__(self, parent: Path) -> None:
         remove_abandoned(parent)
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         self._remove = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
-        # The lock gets its name once it is held, so that no other process finds it free.
+        # Rename the lock file only after locking it, so that no other process finds it free.
         self._lock = (self.path / "new").open("wb")
         _try_lock(self._lock)
         if sys.platform != "win32":
             (self.path / "new").rename(self.path / LOCK)
 
     def remove(self) -> None:
-        """Remove it with all that is in it; once removed, does nothing."""
+        """Remove the folder and its contents. Further calls do nothing."""
         self._lock.close()
         self._remove()
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Remove what processes that have ended left in `parent`."""
+    """Remove abandoned folders in `parent`."""
     for folder in parent.glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):  # it is gone, in use, or not ours
+        with contextlib.suppress(OSError):  # already removed, in use, or not permitted
             if _is_abandoned(folder):
                 shutil.rmtree(folder)
 
 
 def _is_abandoned(folder: Path) -> bool:
-    """Raises: OSError where it cannot be told."""
+    """True if no process holds the folder's lock. Raises: OSError if that cannot be determined."""
     if sys.platform == "win32":
         (folder / "new").unlink()  # refused while it is open
         return True
@@ -58,7 +58,7 @@ def _is_abandoned(folder: Path) -> bool:
 
 
 def _try_lock(lock: IO[bytes]) -> bool:
-    """Take it until the file is closed, if nobody has it."""
+    """Lock a file until it is closed. Returns: False if another process holds the lock."""
     if sys.platform != "win32":
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

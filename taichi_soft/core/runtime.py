@@ -1,7 +1,7 @@
-"""Taichi, started once.
+"""Start Taichi once.
 
-Every other module takes `ti` from here, so that it is mended before it is used, and only this module calls
-`ti.init` (which would reset every field in the process).
+Every other module imports `ti` from here, so that it is patched before use. Only this module calls
+`ti.init`, which resets every field in the process.
 """
 
 from __future__ import annotations
@@ -70,17 +70,16 @@ Result = TypeVar("Result")
 Class = TypeVar("Class", bound=type)
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
+"""Environment variable: 1 turns on index checks in kernels, which are slow and only for tests."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
 
 def holds_fields(cls: Class) -> Class:
-    """Lets a kernel take an object with all its fields as one argument.
+    """Decorate a class so that kernels take an object with all its fields as one argument.
 
-    It is `ti.data_oriented` for classes without kernels of their own. That one makes a call in Python of each
-    attribute that is read, and two where a base class has it too.
+    It replaces `ti.data_oriented` for classes without kernels, which slows down every attribute access.
     """
     cls._data_oriented = True  # type: ignore[attr-defined]
     return cls
@@ -88,12 +87,12 @@ def holds_fields(cls: Class) -> Class:
 
 @dataclass(frozen=True)
 class Device:
-    """What `init` chose."""
+    """Device chosen by `init`."""
 
     arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
-    threads: int  # CPU worker threads (1 on a GPU: the host side is serial)
-    reason: str  # one line for people
-    cores: tuple[int, ...] = ()  # to which the worker threads are bound, one each; none where they are free
+    threads: int  # CPU worker threads (1 on a GPU, where the host code is serial)
+    reason: str  # reason of the choice, one line
+    cores: tuple[int, ...] = ()  # cores that the worker threads are bound to, one each; empty if unbound
 
     @property
     def is_gpu(self) -> bool:
@@ -104,38 +103,35 @@ class Device:
 _log = logging.getLogger(__name__)
 
 _device: Device | None = None
-_process = 0  # that started Taichi
-_checked_kernels: str | None = None  # folder of those that check indices
-_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
+_process = 0  # process that started Taichi
+_checked_kernels: str | None = None  # folder of kernels with index checks
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # jobs for the thread that started Taichi
 _is_served = threading.Lock()
-_home = 0  # identity of that thread
-_first_field: Any = None  # in a layout by itself: an empty one cannot be exported
+_home = 0  # id of that thread
+_first_field: Any = None  # a separate layout, because an empty one cannot be exported
 
 
 @in_turn
 def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
-    """Start Taichi for this process and say what was chosen.
+    """Start Taichi for this process.
 
-    Entry points call this; a library that embeds taichi-soft may call it first with its own choice. Any
-    thread may. A process that is forked later gets a StateError: start processes by "spawn".
-    A second call with compatible arguments does nothing, because starting again would destroy the
-    fields of every world. Where the environment has TAICHI_SOFT_DEBUG=1, kernels check every index.
+    Entry points call this; an embedding program can call it first with its own choice, from any thread.
+    Calls in a process forked later raise a StateError: start processes with "spawn".
+    A second call with compatible arguments does nothing, because a restart would destroy the fields of every
+    world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels check every index.
     Args:
-        arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU,
-            which is faster at what games have (docs/speed.md), and games want their GPU for pictures.
-            "vulkan" and "metal" are untried.
-        threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
-            this process. The system moves them from core to core, and often wakes two on one: short frames
-            then take nearly as long as with one thread.
-        cores: on Linux, numbers of processor cores: as many CPU worker threads, each bound to one of them.
-            Take cores that the rest of the game leaves alone, as a bound thread cannot go elsewhere, and call
-            this before others start threads.
-            With neither `threads` nor `cores` there is a thread for each core available to this process, on
-            Linux bound to it where the system allows that.
+        arch: "auto" or "cpu", or a GPU: "cuda", "vulkan" or "metal". "auto" takes the CPU, which is faster
+            for typical games (docs/speed.md) and leaves the GPU for rendering. "vulkan" and "metal" are
+            untested.
+        threads: number of unbound CPU worker threads, 1 or more, limited to the available cores. The system
+            moves them between cores and can put two on one core, so short frames may gain little.
+        cores: on Linux, core numbers for as many CPU worker threads, each bound to one core. Choose cores
+            that the rest of the game does not use, and call this before other code starts threads.
+            By default there is one thread per available core, bound to it on Linux if the system permits.
     Returns: the device in use.
     Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
-        DeviceError if the device asked for is missing, or threads cannot be bound; StateError in a process
-        that was forked after a start.
+        DeviceError if the device is not available, or threads cannot be bound; StateError in a process that
+        was forked after a start.
     """
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
@@ -146,14 +142,16 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
             f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
         )
     there = available_cores()
-    taken = () if _device is None else _device.cores  # the caller may have left them to our threads since
+    taken = (
+        () if _device is None else _device.cores
+    )  # the caller may have moved its own threads off them since
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(
             f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
             "leave out one or the other"
         )
-    # Taichi starts no more than there are, and the flat schedule waits for all of them.
+    # Taichi starts no more threads than cores, and the flat schedule waits for all of them.
     count = len(bound) or min(threads or len(there), len(there))
     if _device is not None:
         if arch not in ("auto", _device.arch):
@@ -170,11 +168,11 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
         return _device
 
     chosen: ArchName = "cpu" if arch == "auto" else arch
-    reason = "the default" if arch == "auto" else "asked for by name"
+    reason = "the default" if arch == "auto" else "requested"
     if ti.lang.impl.get_runtime().prog is not None:
         raise DeviceError(
-            "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
-            "taichi_soft.init() instead, first in the process"
+            "Taichi was started by ti.init, and a restart would destroy its fields: call taichi_soft.init() "
+            "instead, first in the process"
         )
     is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
     wanted = tuple(there) if is_left_to_us else bound
@@ -194,32 +192,32 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
-    """Start Taichi, with its workers on these cores if there are any, and note the device."""
+    """Start Taichi, bind its workers to these cores if there are any, and store the device."""
     global _device, _process, _checked_kernels, _first_field
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     options = {}
     if is_checked:
-        # What is kept does not notice changed options. But without a cache Taichi 1.7 takes kernels for one
-        # that differ only in which instance of a real function they call.
+        # The cache key ignores changed options. But without a cache, Taichi 1.7 confuses kernels that differ
+        # only in the instance of a real function that they call.
         options["offline_cache_file_path"] = _checked_kernels = tempfile.mkdtemp()
     else:
         await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
-    with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
+    with contextlib.redirect_stdout(io.StringIO()):  # suppress Taichi's banner
         ti.init(
             arch=getattr(ti, arch),
             cpu_max_num_threads=threads,
             default_fp=ti.f32,
             default_ip=ti.i32,
-            fast_math=False,  # would let each processor choose an order of sums, and so the last bits
+            fast_math=False,  # fast math would make the last bits depend on the processor
             debug=is_checked,
             offline_cache=True,
             offline_cache_max_size_of_files=1
-            << 29,  # a game of many kinds of worlds fills the default 100 MB
+            << 29,  # a game with many kinds of worlds exceeds the default 100 MB
             enable_fallback=False,
-            cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
-            detect_read_only=False,  # a GPU might not see what a real function wrote
-            make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
+            cfg_optimization=False,  # off: halves the compile time at the same speed
+            detect_read_only=False,  # off: a GPU might miss writes of a real function
+            make_cpu_multithreading_loop=False,  # off: it would put up to 512 bodies into one thread
             unrolling_limit=0,  # no warning
             log_level=ti.ERROR,
             **options,
@@ -231,7 +229,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if has_known:
         FIRST_LAUNCHES.make_flag()
     _first_field = ti.field(ti.i32, ())
-    ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
+    ti.lang.impl.get_runtime().materialize()  # the first kernel would do it in any thread
     if has_known:
         keep_kernels_apart(VERSION)
         FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), code_options()))
@@ -243,30 +241,30 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
 
 
 def kernel_folder() -> Path:
-    """Where compiled kernels are kept for later processes, as this one ends."""
+    """Folder that stores compiled kernels for later processes when this process ends."""
     return folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)
 
 
 def _end() -> None:
-    """Let Taichi keep the kernels that it compiled: its own parts may go in any order."""
+    """Let Taichi store its compiled kernels now, because its own shutdown has no fixed order."""
     if os.getpid() == _process:
-        with contextlib.suppress(Exception):  # it only makes later starts shorter
+        with contextlib.suppress(Exception):  # a failure only makes later starts slower
             FIRST_LAUNCHES.close()
         await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
         if _checked_kernels is not None:
             shutil.rmtree(_checked_kernels, ignore_errors=True)
-        with contextlib.suppress(OSError):  # the folder takes no files
+        with contextlib.suppress(OSError):  # the folder is not writable
             FIRST_LAUNCHES.keep()
 
 
 def _bound(
     chosen: Device, started: set[int], since: int, cores: tuple[int, ...], is_left_to_us: bool
 ) -> Device:
-    """The device with its workers, which Taichi starts after the threads that compile, bound to cores.
+    """Bind Taichi's workers, which start after its compiler threads, to cores. Returns: the device.
 
-    Where the choice is ours they stay free if the system does not let us, or if somebody else has started
-    threads meanwhile, which we must leave alone.
+    With the default cores, the workers stay unbound if the system refuses, or if other code has started
+    threads meanwhile, which must not be bound.
     """
     if is_left_to_us and len(started) != ti.lang.impl.current_cfg().num_compile_threads + chosen.threads:
         return chosen
@@ -280,7 +278,7 @@ def _bound(
 
 
 def make_fields(function: Callable[[], Result]) -> Result:
-    """Call in turn what makes Taichi fields, and lay these out; whole, where Ctrl-C is pressed meanwhile."""
+    """Call a function that makes Taichi fields exclusively, and lay them out. Ctrl-C waits until then."""
 
     def make() -> Result:
         made = function()
@@ -291,14 +289,13 @@ def make_fields(function: Callable[[], Result]) -> Result:
 
 
 def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
-    """Write kernels for programs without Python: the last thing that this process does with Taichi.
+    """Write kernels for programs without Python. This process cannot use Taichi after that.
 
-    They are made from their source: where a file of a known kernel is missing, its short body would be
-    written here.
+    They are compiled from source, because the short body of a known kernel must not be exported.
 
     Args:
-        kernels: by name, each with its template arguments, and an array like each of the others.
-        fields: the first fields of each of the layouts that they are compiled for.
+        kernels: by name, each with its template arguments, and an example of each array argument.
+        fields: first fields of all layouts that they are compiled for.
     """
 
     def write() -> None:
@@ -315,9 +312,9 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
 
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:
-    """Call what Taichi 1.7 does in one and the same thread only: start, and lay out fields. Whichever thread
-    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's;
-    and where indices are checked, which ends the process in ours."""
+    """Call a function in the thread that Taichi 1.7 requires for starting and for laying out fields. On a
+    CPU this is a dedicated thread, because the first caller's thread may end. On a GPU, and with index
+    checks, which would crash a dedicated thread, it is the caller's."""
     if arch != "cpu" or os.environ.get(DEBUG) == "1":
         return function()
     found: Future[Result] = Future()
@@ -334,14 +331,16 @@ def _at_home(function: Callable[[], Result], arch: str) -> Result:
         _jobs.put(work)
         return found.result()
     except KeyboardInterrupt:
-        last = threading.Event()  # after what is being done, half of which would be the end of all worlds
+        last = (
+            threading.Event()
+        )  # wait for the current job, because stopping it halfway would break all worlds
         _jobs.put(last.set)
         last.wait()
         raise
 
 
 def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
-    """Lay out fields that somebody else made, which Taichi does where a kernel is called first."""
+    """Lay out fields of other code, which Taichi does at the next kernel call."""
     if _device is not None and has_pending_fields() and threading.get_ident() != _home:
         _at_home(functools.partial(lay_out, is_first_call), _device.arch)
     else:
@@ -358,20 +357,20 @@ if ti.__version__[:2] == (1, 7):
 
 def _serve() -> None:
     global _home
-    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+    if _is_served.acquire(blocking=False):  # another thread serves if Ctrl-C interrupted its start
         _home = threading.get_ident()
         while True:
             _jobs.get()()
 
 
 def _after_fork() -> None:
-    """Of the process that was forked: it has Taichi's memory and none of its threads."""
+    """Mark a forked process, which has Taichi's memory but none of its threads."""
     global _is_served
     if _device is None:
         _is_served = threading.Lock()
         return
     leave_behind(_process)
-    # The end of this process would wait for these threads, if the program were taken down.
+    # Otherwise the end of this process would wait for these threads.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
 
 

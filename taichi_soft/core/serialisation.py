@@ -1,6 +1,6 @@
-"""What worlds are made of as plain data and back: numbers, texts, lists and dictionaries, for files.
+"""Convert the parts of worlds to plain data (numbers, texts, lists and dictionaries) for files, and back.
 
-Reading makes objects of classes that are `serialised` only, by their own checks. Nothing in a file is run.
+Reading makes only objects of `serialised` classes, with their checks. No code from a file is run.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _ARRAYS = ("<f4", "<f8", "<i4", "<i8", "|b1")
 
 
 def serialised(*fields: str, make: Callable[..., Any] | None = None) -> Callable[[type[Kind]], type[Kind]]:
-    """Lets objects of a class be written, and made again.
+    """Decorate a class whose objects can be written and read.
 
     Args:
-        fields: names of attributes that say what an object is made of.
-        make: called with them by name; None for the class itself.
+        fields: names of the attributes to store.
+        make: function that makes an object from them, called by keyword; None for the class itself.
     """
 
     def register(kind: type[Kind]) -> type[Kind]:
@@ -42,7 +42,7 @@ def serialised(*fields: str, make: Callable[..., Any] | None = None) -> Callable
 
 
 def as_plain(value: Any) -> Any:
-    """A value as data that JSON takes. Raises: SnapshotError for what has no such form."""
+    """Convert a value to JSON data. Raises: SnapshotError for an unsupported type."""
     if isinstance(value, float) and not math.isfinite(value):
         return {"number": str(float(value))}
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -62,11 +62,11 @@ def as_plain(value: Any) -> Any:
     elif type(value) in _FIELDS:
         parts = {name: as_plain(getattr(value, name)) for name in _FIELDS[type(value)]}
         return {"kind": type(value).__name__, **parts}
-    raise SnapshotError(f"a {type(value).__name__} cannot be kept in a file: {value!r}")
+    raise SnapshotError(f"a {type(value).__name__} cannot be stored in a file: {value!r}")
 
 
 def from_plain(data: Any) -> Any:
-    """The value again. Raises: SnapshotError for data of no known form; what the kind's own checks raise."""
+    """Convert JSON data to a value. Raises: SnapshotError for unknown data; errors of the class's checks."""
     if isinstance(data, list):
         return [from_plain(each) for each in data]
     if not isinstance(data, dict):
@@ -87,23 +87,22 @@ def _array(data: dict[str, Any]) -> Any:
             raise ValueError
         return np.frombuffer(b64decode(data["rows"]), data["array"]).reshape(data["shape"]).copy()
     except (KeyError, TypeError, ValueError):
-        raise SnapshotError("an array is broken off or of a kind that is not kept in files") from None
+        raise SnapshotError("an array is cut off or has an unsupported type") from None
 
 
 def to_json(data: Any) -> bytes:
-    """The same bytes for the same plain data."""
+    """Encode plain data as canonical JSON."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
 def from_json(content: bytes | memoryview) -> Any:
-    """Plain data again. Raises: SnapshotError, also for a number that is not finite, which `to_json` writes
-    nowhere."""
+    """Decode JSON. Raises: SnapshotError, also for non-finite numbers, which `to_json` never writes."""
     try:
         return json.loads(bytes(content), parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         if isinstance(error, SnapshotError):
             raise
-        raise SnapshotError("what should be JSON is none") from None
+        raise SnapshotError("the data is not valid JSON") from None
 
 
 def _finite(text: str) -> float:
@@ -115,49 +114,49 @@ def _finite(text: str) -> float:
 
 @lru_cache(maxsize=256)
 def plain_of(value: Any) -> Any:
-    """`as_plain` of an immutable object, made once."""
+    """Cached `as_plain` of an immutable object."""
     return as_plain(value)
 
 
 @lru_cache(maxsize=256)
 def digest_of(value: Any) -> str:
-    """A name of an immutable object that another object has only if it is made of the same numbers."""
+    """Digest of an immutable object, equal only for objects with the same content."""
     return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()
 
 
-# Parts of data that somebody may have damaged.
+# Checks of possibly damaged data.
 
 
 def below(number: Any, limit: int) -> int:
-    """A whole number from 0 to below `limit`. Raises: ValueError, TypeError."""
+    """Check an integer from 0 to below `limit`. Raises: ValueError, TypeError."""
     if not 0 <= int(number) < limit:
-        raise ValueError(f"it names number {number} of {limit}")
+        raise ValueError(f"it has the index {number} of {limit}")
     return int(number)
 
 
 def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float64]:
-    """So many finite numbers, all under `most`. Raises: ValueError."""
+    """Check `count` finite numbers, all below `most`. Raises: ValueError."""
     vector = np.array(numbers, dtype=np.float64)
     if vector.shape != (count,) or not (np.abs(vector) < most).all():
-        raise ValueError("a vector is none")
+        raise ValueError("a vector is invalid")
     return vector
 
 
 def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
-    """One whole number or more, from 0 to below `limit`. Raises: ValueError."""
+    """Check at least one integer from 0 to below `limit`. Raises: ValueError."""
     found = np.array(numbers, dtype=np.int32)
     if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
-        raise ValueError("it names vertices that there are not")
+        raise ValueError("it has invalid vertices")
     return found
 
 
 def require_below(rows: NDArray[Any], limit: int) -> None:
-    """Raises: ValueError where whole numbers are not from 0 to below `limit`."""
+    """Raise a ValueError unless all integers are from 0 to below `limit`."""
     if rows.size and not (rows.min() >= 0 and rows.max() < limit):
-        raise ValueError("it names particles or bodies that there are not")
+        raise ValueError("it has invalid particles or bodies")
 
 
 def require_finite(rows: NDArray[Any]) -> None:
-    """Raises: ValueError where numbers are not."""
+    """Raise a ValueError unless all numbers are finite."""
     if not np.isfinite(rows).all():
-        raise ValueError("what moves its bodies is not finite")
+        raise ValueError("values that move its bodies are not finite")

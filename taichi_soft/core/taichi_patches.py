@@ -1,4 +1,4 @@
-"""Taichi with its environment, and with what Taichi 1.7 does not do as we need it."""
+"""Import Taichi with its environment, and patch Taichi 1.7."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore", SyntaxWarning)  # Python 3.12 and later, of a docstring of Taichi's
+    warnings.simplefilter("ignore", SyntaxWarning)  # a docstring of Taichi, in Python 3.12 and later
     import taichi as ti
 
 from taichi_soft.core.float_environment import with_usual_floats
@@ -43,20 +43,20 @@ __all__ = [
 ]
 
 _MOST_THREADS = 1 << 20
-"""Of which kernels may make use: no machine has as many."""
+"""Number of threads that kernels can use; more than any machine has."""
 
-# A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
-# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
-# they go into what is being compiled.
+# A `ti.real_func` is compiled once, separately, while a `ti.func` is inlined at each call. But Taichi 1.7
+# puts branches and loops of a `ti.func` called in a real function into the kernel, and crashes. With this
+# patch they go into the function being compiled.
 ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
 
 
 def _is_in_class(level_of_class_stackframe: int) -> bool:
-    """Whether a function is defined in a class. Taichi 1.7 reads the source around each for that: 0.4 s of
-    0.7 s of our import."""
+    """True if a function is defined in a class. Taichi 1.7 reads the surrounding source of each function for
+    that, which takes most of the import time."""
     try:
         return "__qualname__" in sys._getframe(level_of_class_stackframe).f_locals
-    except ValueError:  # there is nothing around a script
+    except ValueError:  # a script has no outer frame
         return False
 
 
@@ -64,7 +64,7 @@ ti.lang.kernel_impl._inside_class = _is_in_class
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """`look_up`, which asks once about each object, for as long as the object lives."""
+    """Cache the results of `look_up` per object, while the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:
@@ -76,9 +76,9 @@ def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def remember_sources() -> None:
-    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again. For messages of errors it writes
-    down where each name and operator in it stands, and wraps the lines. Here sources are read once, and
-    messages have the first line as it is."""
+    """Cache sources of functions. Taichi 1.7 reads the source of a `ti.func` at each call, and formats the
+    position of each name and operator for error messages. Here sources are read once, and messages show the
+    plain line."""
     kernels = ti.lang.kernel_impl
     kernels.getsourcefile = _remember(kernels.getsourcefile)
     kernels.getsourcelines = _remember(kernels.getsourcelines)
@@ -89,7 +89,7 @@ def remember_sources() -> None:
 
 
 def _place_of(context: Any, node: Any) -> str:
-    """Where something stands in a source: file, function, its first line, and a mark below that."""
+    """Describe a source position: file, function, line, and a marker below it."""
     number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
     start = context.indent + node.col_offset
     end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)
@@ -98,12 +98,11 @@ def _place_of(context: Any, node: Any) -> str:
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
-    """Taichi 1.7 takes what one thread compiles for what all do, and two that compile at once for one. Here
-    each kernel and each number in a field is a turn of one thread, for which others wait, and what is being
-    compiled is known to the thread that does it.
+    """Make Taichi 1.7 usable from several threads. Its compiler state is global and not thread-safe. Here
+    kernel calls and accesses to single field values are serialised, and the compiler state is per thread.
 
     Args:
-        lay_out_now: calls Taichi's own function, which lays out fields, with its argument.
+        lay_out_now: calls Taichi's function that lays out fields, with its argument.
     """
     compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
     ti.lang.impl.PyTaichi.inside_kernel = property(
@@ -122,19 +121,19 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
 
 
 def let_any_number_of_threads_run() -> None:
-    """Taichi 1.7 compiles into each parallel loop how many threads may run it: as many as the machine has.
-    Another machine would not find that kernel, or run it on too few. Here it is `_MOST_THREADS`, of which
-    Taichi takes those that it has started."""
+    """Remove the number of threads from compiled code. Taichi 1.7 compiles the machine's number of threads
+    into each parallel loop, so another machine would not find the kernel in the cache, or run it on too few
+    threads. Here it is `_MOST_THREADS`, and Taichi uses the threads that it has started."""
     builder, given = ti._lib.core.ASTBuilder, threading.local()
     parallelize = builder.parallelize
 
-    def give(self: Any, threads: int) -> None:  # 1 where the next loop is to be serial
+    def give(self: Any, threads: int) -> None:  # 1 if the next loop is serial
         given.within = ti.lang.impl.get_runtime().compiling_callable
         parallelize(self, threads)
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # To find how far a loop goes, a real function may be compiled, with loops of its own.
+            # Evaluating a loop's range can compile a real function with its own loops.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:
@@ -150,10 +149,10 @@ def let_any_number_of_threads_run() -> None:
 
 
 def keep_kernels_apart(version: str) -> None:
-    """Have Taichi, which runs already, look for kernels under another key in each version of the package.
+    """Give each version of the package separate cache keys in the running Taichi.
 
-    A key has in it on how many threads a kernel may run. That is from now on a number that no machine
-    reaches, made of the version.
+    A key contains the number of threads of a kernel, which is replaced by a number that no machine reaches,
+    derived from the version.
     """
     ti.lang.impl.current_cfg().cpu_max_num_threads = (
         _MOST_THREADS + zlib.crc32(version.encode()) % _MOST_THREADS
@@ -161,7 +160,7 @@ def keep_kernels_apart(version: str) -> None:
 
 
 def code_options() -> str:
-    """All options with which Taichi runs that code depends on."""
+    """All current options of Taichi that affect code."""
     config = ti.lang.impl.current_cfg()
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
@@ -169,7 +168,7 @@ def code_options() -> str:
 
 
 def calling(function: int) -> Callable[[Any], None]:
-    """For kernels: what calls the C function at an address, with one argument."""
+    """Make a function for kernels that calls the C function at an address with one argument."""
 
     def call(argument: Any) -> None:
         runtime = ti.lang.impl.get_runtime()
@@ -178,13 +177,13 @@ def calling(function: int) -> Callable[[Any], None]:
         builder = runtime.compiling_callable.ast_builder()
         builder.insert_external_func_call(function, "", "", "", given, nothing, place)
 
-    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # or Taichi warns of it
+    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # avoids a warning of Taichi
     return call
 
 
 @contextmanager
 def not_kept() -> Iterator[None]:
-    """Kernels that are compiled within do not get into Taichi's cache."""
+    """Context in which compiled kernels are not stored in Taichi's cache."""
     config = ti.lang.impl.current_cfg()
     usual, config.offline_cache = config.offline_cache, False
     try:
@@ -194,20 +193,20 @@ def not_kept() -> Iterator[None]:
 
 
 def choose_by_comparison() -> None:
-    """Taichi 1.7 leaves the lesser of two numbers to the processor. Which of -0 and 0 that is, and of a
-    number and NaN, differs from one kind to the next, and WebAssembly has no instruction for it. Here
-    `ti.min` and `ti.max` compare and select, which is one instruction as well. Of equal numbers, or if one is
-    NaN, they take the second, or the constant where one is constant."""
+    """Make `ti.min` and `ti.max` deterministic. Taichi 1.7 uses a CPU instruction whose result for -0 and 0,
+    or for NaN, depends on the CPU, and which WebAssembly lacks. Here they compare and select, which is one
+    instruction too. For equal numbers or NaN, they return the second argument, or the constant if one is
+    constant."""
     ops = ti.lang.ops
 
     def choosing(plain: Callable[..., Any], comes_first: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(plain)  # or Taichi would warn of a function that is not its own
+        @functools.wraps(plain)  # avoids a warning of Taichi
         def choose(a: Any, b: Any) -> Any:
             expressions = [each for each in (a, b) if ops.is_taichi_expr(each)]
             if not any(_is_real(each) for each in expressions):
                 return plain(a, b)
             first, second = (a, b) if ops.is_taichi_expr(a) else (b, a)
-            # Kept under a name, as Taichi computes an expression wherever it stands.
+            # Assigned to a variable, because Taichi evaluates an expression at each use.
             first, second = ti.lang.impl.expr_init(first), ti.lang.impl.expr_init(second)
             return ops.select(comes_first(first, second), first, second)
 
@@ -223,7 +222,7 @@ def _is_real(expression: Any) -> bool:
 
 
 def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:
-    """Syntax tree of a kernel's source, and what Taichi walks through it with."""
+    """Syntax tree of a kernel's source, and Taichi's context for transforming it."""
     slots = kernel.template_slot_locations
     tree, context = ti.lang.kernel_impl._get_tree_and_ctx(
         kernel, args=arguments, excluded_parameters=slots, arg_features=features
@@ -232,20 +231,20 @@ def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:
 
 
 def has_pending_fields() -> bool:
-    """Whether there are fields that Taichi has not laid out yet."""
+    """True if Taichi has fields without a layout."""
     return not (ti.lang.impl._root_fb.finalized or ti.lang.impl._root_fb.empty)
 
 
 def check_real_functions() -> None:
-    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
-    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
+    """Check indices in real functions, which Taichi 1.7's bounds check omits. An assertion checks each
+    index, and an invalid index becomes 0, so that the process can report it."""
     impl = ti.lang.impl
     plain = impl.subscript
 
     def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
         is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
         if is_real and isinstance(value, ti.Field) and value.shape:
-            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            (index,), (size,) = indices, value.shape  # fields of a world have one dimension
             is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
             place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
             message = f"Accessing a field of size ({size}) in a real function with index (%d)"
@@ -257,15 +256,15 @@ def check_real_functions() -> None:
 
 
 def let_whole_numbers_overflow() -> None:
-    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
+    """Turn off overflow messages of Taichi 1.7's bounds checks, because hashes overflow on purpose."""
     program = ti._lib.core.Program
     plain = program.compile_kernel
 
     def compiled(self: Any, config: Any, *arguments: Any) -> Any:
-        config.debug = False  # the bounds check has a switch of its own; the rest looks here
+        config.debug = False  # the bounds check has a separate switch
         try:
             return plain(self, config, *arguments)
         finally:
-            config.debug = True  # looked at by the launch, which raises what was found
+            config.debug = True  # the launch checks it, to raise assertions
 
     program.compile_kernel = compiled

@@ -1,4 +1,4 @@
-"""One thread at a time: in a world, where a second one is refused, and in Taichi, where it waits."""
+"""Mutual exclusion: concurrent calls of a world are refused, concurrent uses of Taichi wait."""
 
 from __future__ import annotations
 
@@ -14,41 +14,43 @@ from taichi_soft.core.errors import StateError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _taichi = threading.RLock()
-_left_in: int | None = None  # the process in which Taichi runs, where this one was forked from it
+_left_in: int | None = None  # parent process in which Taichi runs, if this one was forked from it
 
 
 def thread_name(ident: int) -> str:
-    """A thread, as messages call it."""
+    """Name of a thread for messages."""
     names = [each.name for each in threading.enumerate() if each.ident == ident]
-    return f"thread {names[0]!r}" if names else "a thread that is over"
+    return f"thread {names[0]!r}" if names else "a thread that has ended"
 
 
 class Turn:
-    """Of one thread, to call a world and its handles."""
+    """Exclusive access of one thread to a world and its handles."""
 
     __slots__ = ("holder", "lock")
 
     def __init__(self) -> None:
-        """Raises: StateError as `require_here`."""
+        """Start without a holder. Raises: StateError as `require_here`."""
         require_here()
         self.lock = threading.Lock()
-        self.holder = 0  # ident of the thread whose turn it is, 0 for nobody's
+        self.holder = 0  # id of the thread with access, 0 for none
 
     def refuse(self) -> NoReturn:
-        """Raises: StateError that names this thread and the one whose turn it is; or as `require_here`."""
+        """Raise a StateError that names this thread and the one with access; or as `require_here`."""
         require_here()
         here, there = thread_name(get_ident()), thread_name(self.holder)
         raise StateError(
-            f"{here} called this world while {there} was in a call of it: let one thread at a time call a "
-            "world, by a threading.Lock round the calls of each"
+            f"{here} called this world while {there} was in a call of it: use a threading.Lock, so that "
+            "only one thread at a time calls a world"
         )
 
 
 def one_thread(method: Function) -> Function:
-    """Lets a method of a handle begin only while no other thread is in one; it may call others."""
+    """Decorate a method of a handle to refuse calls while another thread is in one. Calls can be nested."""
 
     @wraps(method)
-    def call(self: Any, *arguments: Any, **options: Any) -> Any:  # in line, as games call it by the hundred
+    def call(
+        self: Any, *arguments: Any, **options: Any
+    ) -> Any:  # inlined for speed, because games make hundreds of calls per frame
         turn, here = self._handles.turn, get_ident()
         if turn.holder == here:
             return method(self, *arguments, **options)
@@ -65,9 +67,9 @@ def one_thread(method: Function) -> Function:
 
 
 def in_turn(function: Function) -> Function:
-    """Lets a function that uses Taichi wait until no other thread is in one.
+    """Decorate a function that uses Taichi to wait until no other thread is in one.
 
-    Such a function calls nothing of the user's, so that nobody waits for ever.
+    Such a function must not call user code, to avoid deadlocks.
     """
 
     @wraps(function)
@@ -81,16 +83,16 @@ def in_turn(function: Function) -> Function:
 
 
 def require_here() -> None:
-    """Raises: StateError in a process that was forked from one where Taichi runs."""
+    """Raise a StateError in a process that was forked from one where Taichi runs."""
     if _left_in is not None:
         raise StateError(
             f"process {os.getpid()} was forked from process {_left_in} after Taichi had started there, and "
-            "has none of its threads: start processes by multiprocessing.get_context('spawn'), or fork "
+            "has none of its threads: start processes with multiprocessing.get_context('spawn'), or fork "
             "before taichi_soft.init()"
         )
 
 
 def leave_behind(process: int) -> None:
-    """Note that Taichi runs in another process, which this one was forked from."""
+    """Record the parent process in which Taichi runs."""
     global _left_in
     _left_in = process

@@ -1,6 +1,6 @@
-"""Choices that the public face takes by name. Each enum also accepts its string.
+"""Enums of the public interface. Each also accepts its string.
 
-The `...Name` types let an editor complete the strings and mypy refuse a misspelt one.
+The `...Name` types let editors complete the strings and mypy reject misspelt ones.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from taichi_soft.core.errors import OptionError
 
 
 class Choice(str, Enum):
-    """A named option; `parse` turns a user's string into a member or refuses it with the list."""
+    """A named option. `parse` converts a user's string to a member, or refuses it with a list of names."""
 
     @classmethod
     def parse(cls: type[ChoiceT], value: str | ChoiceT) -> ChoiceT:
-        """Return the member that `value` names. Raises: OptionError with the names there are."""
+        """Return the member that `value` names. Raises: OptionError with the valid names."""
         try:
             return cls(value)
         except ValueError:
@@ -38,7 +38,7 @@ class Strain(Choice):
 
 
 class Flips(Choice):
-    """What a tetrahedron does that is turned inside out."""
+    """Treatment of inverted tetrahedra."""
 
     TOLERANT = "tolerant"  # the mirrored shape is at rest too (thesis)
     RECOVER = "recover"  # driven back to its own orientation
@@ -46,14 +46,14 @@ class Flips(Choice):
 
 
 class DampingModel(Choice):
-    """What the damping constant brakes."""
+    """Velocity that the damping constant acts on."""
 
     EDGE = "edge"  # relative velocity along each edge, thesis eq. 3.9
     TET_MEAN = "tet_mean"  # velocity against the tetrahedron's mean, rejected in thesis section 6.4
 
 
 class Integrator(Choice):
-    """How forces become motion (thesis section 3.5)."""
+    """Time integrator (thesis section 3.5)."""
 
     EXPLICIT_EULER = "explicit_euler"
     LEAPFROG = "leapfrog"
@@ -62,18 +62,18 @@ class Integrator(Choice):
 
 
 class Schedule(Choice):
-    """In which loops the substeps of a world run."""
+    """Loop structure of a world's substeps."""
 
     AUTO = "auto"
-    PER_BODY = "per_body"  # one thread per body, all substeps of a body in a row
+    PER_BODY = "per_body"  # one thread per body, which makes all its substeps
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
 
 
 class Overlap(Choice):
-    """What becomes of a body that is placed inside others."""
+    """Treatment of a body that is placed inside others."""
 
-    PART = "part"  # they are moved apart over the next steps
-    REFUSE = "refuse"  # it is not placed
+    PART = "part"  # move them apart over the next steps
+    REFUSE = "refuse"  # refuse to place it
 
 
 StrainName: TypeAlias = Strain | Literal["linear", "exact"]

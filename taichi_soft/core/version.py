@@ -1,3 +1,3 @@
-"""Which version this is."""
+"""Version of the package."""
 
 VERSION = "0.2.0.dev0"

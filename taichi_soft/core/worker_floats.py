@@ -1,4 +1,4 @@
-"""Taichi's workers, made to compute as IEEE 754 says."""
+"""Restore IEEE 754 floats in Taichi's workers."""
 
 import numpy as np
 
@@ -7,10 +7,10 @@ from taichi_soft.core.taichi_patches import calling, not_kept, ti
 
 
 def give_workers_usual_floats(count: int) -> None:
-    """Undo in all `count` workers what Taichi told them as it started: to take subnormal numbers for zero.
+    """Turn off flush-to-zero, which Taichi turns on at its start, in all `count` workers.
 
-    Each of as many pieces of a loop as there are workers calls a function of C's, and waits for the others,
-    so that no worker takes two.
+    A loop with one part per worker calls a C function in each part. Each part waits for all others, so that
+    every worker runs exactly one.
     """
     function, environment = usual_environment_call()
     if not function:
@@ -27,5 +27,5 @@ def give_workers_usual_floats(count: int) -> None:
             while ti.atomic_max(arrived[0], -1) < count:
                 pass
 
-    with not_kept():  # with the function's address
+    with not_kept():  # the kernel contains the function's address
         set_everywhere(environment, np.zeros(1, np.int32))

@@ -1,4 +1,4 @@
-"""What is right and wrong with a mesh before it becomes a body, in plain words."""
+"""Check a mesh before it becomes a body, and give advice."""
 
 from taichi_soft.doctor.diagnosis import Grade, diagnose
 

@@ -1,4 +1,4 @@
-"""Findings and figures of one mesh file, as advice."""
+"""Diagnose a mesh file: findings, figures and advice."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 from taichi_soft.world.world import World
 
 FRAME = 1 / 60
-"""Of a game [s]."""
+"""Length of a frame [s]."""
 
 MOST_SUBSTEPS = 500
-"""Of a frame: from there on `World` warns that a body is too stiff or too fine for a game."""
+"""Largest acceptable number of substeps per frame; above it, `World` warns."""
 
 SMALLEST, LARGEST = 0.02, 50.0
-"""Of a thing in a game [m]: what is outside is likely in another unit."""
+"""Usual sizes of objects in a game [m]; other sizes suggest another unit."""
 
 THIN = 0.5
-"""Part of a tetrahedron that is solid, below which the solid is thin there."""
+"""Solid fraction of a tetrahedron below which it counts as thin."""
 
 MOST_THIN = 0.3
-"""Of the solid that may lie in such tetrahedra: every surface has some."""
+"""Largest acceptable fraction of the solid in thin tetrahedra; every surface has some."""
 
 TRIALS = 30
-"""Frames that are timed."""
+"""Number of timed frames."""
 
 
 class Grade(str, Enum):
-    """How grave a finding is."""
+    """Severity of a finding."""
 
     GOOD = "good"
     NOTE = "note"
-    BAD = "bad"  # it would not simulate
+    BAD = "bad"  # cannot be simulated
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at, in words."""
+    """Text and severity of one finding."""
 
     grade: Grade
     text: str
@@ -61,7 +61,7 @@ class Finding:
 
 @dataclass
 class Diagnosis:
-    """All that was found."""
+    """All findings and figures of a mesh."""
 
     name: str
     findings: list[Finding] = field(default_factory=list)
@@ -70,11 +70,11 @@ class Diagnosis:
 
     @property
     def is_fit(self) -> bool:
-        """Whether it would simulate."""
+        """True if the mesh can be simulated."""
         return all(finding.grade is not Grade.BAD for finding in self.findings)
 
     def as_plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Convert to plain types for JSON."""
         return {
             "file": self.name,
             "would_simulate": self.is_fit,
@@ -84,7 +84,7 @@ class Diagnosis:
         }
 
     def say(self, grade: Grade, text: str) -> None:
-        """Note a finding."""
+        """Add a finding."""
         self.findings.append(Finding(grade, text))
 
 
@@ -96,13 +96,13 @@ def diagnose(
     method: CageMethodName = "lattice",
     up: Up | None = None,
 ) -> Diagnosis:
-    """Look at a file, make a body of it, and time its frames.
+    """Check a file, make a body from it, and time its frames.
 
     Args:
-        path: of a surface that `read_surfaces` takes, or of tetrahedra that `load_mesh` takes.
-        material: of the body.
-        cells, method, up: as of `SoftBodyAsset.from_surface`.
-    Raises: MeshError or OptionError for what cannot be read.
+        path: surface for `read_surfaces`, or tetrahedra for `load_mesh`.
+        material: material of the body.
+        cells, method, up: see `SoftBodyAsset.from_surface`.
+    Raises: MeshError or OptionError for a file that cannot be read.
     """
     found = Diagnosis(path.name)
     if path.suffix.lower() in SURFACES:
@@ -133,10 +133,10 @@ def diagnose(
 
 def _judge_size(found: Diagnosis, size: float) -> None:
     if not SMALLEST <= size <= LARGEST:
-        unit, factor = ("millimetres", 0.001) if size > LARGEST else ("metres that were divided", 1000.0)
+        unit, factor = ("millimetres", 0.001) if size > LARGEST else ("kilometres", 1000.0)
         found.say(
             Grade.NOTE,
-            f"it is {size:.4g} m long: likely another unit, such as {unit}. Scale it by {factor:g} if so",
+            f"it is {size:.4g} m long, probably in another unit such as {unit}: then scale it by {factor:g}",
         )
 
 
@@ -149,26 +149,26 @@ def _judge_surface(found: Diagnosis, facts: SurfaceFacts) -> None:
     )
     _judge_size(found, facts.size)
     if facts.open_edges == facts.crowded_edges == facts.turned_edges == 0:
-        found.say(Grade.GOOD, "it is closed, and all triangles face the same way")
+        found.say(Grade.GOOD, "it is closed, and all triangles are oriented consistently")
     for count, text in (
-        (facts.open_edges, "open edges: holes are closed by straight lines where the body is made"),
-        (facts.turned_edges, "edges at which triangles face opposite ways: that does no harm here"),
-        (facts.crowded_edges, "edges of more than two triangles: walls within count for nothing"),
-        (facts.flat_triangles, "triangles without area: they count for nothing"),
-        (facts.repeated_triangles, "triangles that are there twice: they count once"),
+        (facts.open_edges, "open edges: holes are closed with flat patches when the body is made"),
+        (facts.turned_edges, "edges between triangles of opposite orientation: harmless here"),
+        (facts.crowded_edges, "edges of more than two triangles: interior walls are ignored"),
+        (facts.flat_triangles, "triangles without area: they are ignored"),
+        (facts.repeated_triangles, "duplicate triangles: they are ignored"),
     ):
         if count:
             found.say(Grade.NOTE, f"{count:,} {text}")
 
 
 def _judge_refinement(found: Diagnosis, asset: SoftBodyAsset, plain: SoftBodyAsset) -> None:
-    """Say what limbs and sheets cost that are too thin for the cells."""
+    """Report the cost of limbs and sheets that are thinner than the cells."""
     counts = [len(each.mesh.tets) for each in (plain, asset) if isinstance(each.mesh, TetMesh)]
     shorter = plain.stable_step.recommended / asset.stable_step.recommended
     found.say(
         Grade.NOTE,
-        f"to keep them takes {counts[1]:,} tetrahedra instead of {counts[0]:,}, and substeps that are "
-        f"{shorter:.1f} times as short",
+        f"keeping them takes {counts[1]:,} tetrahedra instead of {counts[0]:,}, and "
+        f"{shorter:.1f} times as many substeps",
     )
 
 
@@ -191,8 +191,8 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
     if thin > MOST_THIN:
         found.say(
             Grade.NOTE,
-            f"{100 * thin:.0f} % of it is thinner than a cell, and moves more stiffly than it should: take "
-            "twice the cells if that matters",
+            f"{100 * thin:.0f} % of it is thinner than a cell and too stiff: use twice as many cells if "
+            "that matters",
         )
     squash = sag(asset, GRAVITY_EARTH)
     found.figures["sag under its own weight [%]"] = 50.0 * squash
@@ -200,10 +200,10 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
         young = squash / MAX_SAG * float(np.mean(np.asarray(asset.description.per_tet("young") / mesh.fill)))
         found.say(
             Grade.BAD,
-            f"it cannot bear its own weight: take a Young's modulus of {young:.2g} Pa or a smaller body",
+            f"it collapses under its own weight: use a Young's modulus of {young:.2g} Pa or a smaller body",
         )
     if substeps > MOST_SUBSTEPS:
-        found.say(Grade.BAD, f"{substeps:,} substeps for a frame of a game: {step.reason}")
+        found.say(Grade.BAD, f"{substeps:,} substeps per frame are too many for a game: {step.reason}")
         return
     try:
         found.figures["milliseconds of a 60 Hz frame here"] = 1e3 * _frame_time(asset, substeps)
@@ -211,11 +211,11 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
         found.say(Grade.BAD, str(error))
         return
     if found.is_fit:
-        found.say(Grade.GOOD, "it would simulate")
+        found.say(Grade.GOOD, "it can be simulated")
 
 
 def _frame_time(asset: SoftBodyAsset, substeps: int) -> float:
-    """Median of what a frame takes while the body falls and lands [s]."""
+    """Median time of a frame while the body falls and lands [s]."""
     world = World()
     low = float(asset.mesh.vertices[:, 2].min())
     world.add_body(asset, position=(0.0, 0.0, 0.01 - low))

@@ -1,4 +1,4 @@
-"""Triangles put right: those that count for nothing left out, the others facing outwards."""
+"""Repair a surface: remove degenerate and duplicate triangles, and orient the others outwards."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from taichi_soft.meshing.surface import Surface, joined
 from taichi_soft.meshing.surfaces import UP
 
 VOXELS = 96
-"""Along the longest side, by which inside and outside are told apart."""
+"""Voxels along the longest side of the grid that separates inside and outside."""
 
 ROUNDS = 3
 
 PROBES = (1.0, 2.0, 4.0, 8.0)
-"""How far before and behind a triangle these are asked, in voxels."""
+"""Distances of the probes in front of and behind a triangle [voxels]."""
 
 
 def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
-    """Write surfaces without triangles of no area and copies of triangles, all facing outwards.
+    """Write surfaces without degenerate and duplicate triangles, all facing outwards.
 
-    Vertices stay as they are, and so do holes. That axis points up which does in most files of the format.
-    Returns: how many triangles were left out, and how many turned.
+    Vertices and holes are unchanged. The default axis of the format points up.
+    Returns: the numbers of removed and of flipped triangles.
     Raises: MeshError for a path that trimesh cannot write to.
     """
-    import trimesh  # half a second that a game need not wait for
+    import trimesh  # imported here because it is slow
 
     if path.suffix.lower() not in SURFACES:
         raise MeshError(f"{path.name}: unknown surface format {path.suffix!r}: use {', '.join(SURFACES)}")
@@ -41,7 +41,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     kept = _kept(vertices[triangles], triangles, size)
     faces, turned = triangles[kept], np.zeros(int(kept.sum()), dtype=np.bool_)
-    for _ in range(ROUNDS):  # what is inside is told the better the fewer face the wrong way
+    for _ in range(ROUNDS):  # each round sharpens the inside test for the next
         inward = _faces_inward(vertices[faces], solid_of(vertices, faces, size / VOXELS))
         faces[inward], turned = faces[inward][:, ::-1], turned ^ inward
     up = UP[path.suffix.lower()]
@@ -64,7 +64,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
 
 
 def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDArray[np.bool_]:
-    """Which triangles have an area and are not there already, (m,)."""
+    """Mask of triangles with an area that are not duplicates, (m,)."""
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     first = np.zeros(len(triangles), dtype=np.bool_)
     first[np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]] = True
@@ -72,7 +72,7 @@ def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDA
 
 
 def _faces_inward(corners: FloatArray, solid: Solid) -> NDArray[np.bool_]:
-    """Which triangles have more of the solid before them than behind, (m,)."""
+    """Mask of triangles with more solid in front than behind, (m,)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals *= solid.spacing / np.linalg.norm(normals, axis=1, keepdims=True)
     middles = corners.mean(axis=1)

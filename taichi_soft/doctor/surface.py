@@ -1,4 +1,4 @@
-"""What can be said of the triangles of a surface."""
+"""Facts about the triangles of a surface."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surface import Surface, joined
 
 NO_AREA = 1e-12
-"""Twice the area over the square of the longest side."""
+"""Twice the area over the square of the longest side, at and below which a triangle has no area."""
 
 
 @dataclass(frozen=True)
 class SurfaceFacts:
-    """Counts of what is in the triangles of all meshes of a file, vertices at the same place being one."""
+    """Counts over all meshes of a file, after merging vertices at the same position."""
 
     meshes: int
     vertices: int
     triangles: int
-    parts: int  # that hang together by vertices
-    size: float  # longest side of the box round it [m]
-    open_edges: int  # of one triangle only
-    crowded_edges: int  # of more than two
-    turned_edges: int  # through which both triangles run the same way
-    flat_triangles: int  # without area
+    parts: int  # connected components by shared vertices
+    size: float  # longest side of the bounding box [m]
+    open_edges: int  # edges of one triangle
+    crowded_edges: int  # edges of more than two triangles
+    turned_edges: int  # edges that both triangles traverse in the same direction
+    flat_triangles: int  # triangles without area
     repeated_triangles: int
 
 
 def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
-    """Look at surfaces as one."""
+    """Collect the facts of several surfaces as one."""
     vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     welded = places_of(vertices, size)[triangles]

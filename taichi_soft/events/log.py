@@ -66,7 +66,7 @@ class EventLog:
             )
         if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
             raise StateError(
-                f"{kind.__name__} is not recorded by schedule 'flat', which sees no contact: make the "
+                f"{kind.__name__} needs contact, which schedule 'flat' does not support: make the "
                 "world with schedule='per_body'"
             )
         return kinds

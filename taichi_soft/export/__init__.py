@@ -1,4 +1,4 @@
-"""A built world as a folder that the native library runs without Python: see `engine_adapter/native`."""
+"""Export a built world as a folder that the native library runs, see `engine_adapter/native`."""
 
 from taichi_soft.export.axes import AXES
 from taichi_soft.export.exporting import ExportReport, export_world

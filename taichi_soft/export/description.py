@@ -1,4 +1,4 @@
-"""All that a world file says of a world beside its kernels: named arrays."""
+"""Describe a world for its world file: all named arrays except kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
-from taichi_soft.control.drives import LARGEST_PUSH
+from taichi_soft.control.drives import MAX_ACCELERATION
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of, wave_speed
 from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
@@ -39,13 +39,13 @@ from taichi_soft.solver.context import WorldContext
 Arrays = dict[str, NDArray[Any]]
 
 _ALWAYS, _OF_JOINTS, _OF_MOTORS = range(3)
-"""Whose rows a carried field has: all of them, or those that joints or motors hold. As `scene.hpp` has it."""
+"""Rows of a snapshot's field: all, or those of joints or of motors. `scene.hpp` has the same codes."""
 
 
 def description_of(
     context: WorldContext, meshes: Sequence[ExportedMesh], names: Mapping[str, Sequence[str]], axes: Any
 ) -> Arrays:
-    """Arrays by name: see `engine_adapter/native/src/scene.cpp`, which reads them."""
+    """Return arrays by name; `engine_adapter/native/src/scene.cpp` reads them."""
     arrays: Arrays = {
         "host_axes": np.asarray(axes, dtype=np.float64),
         **{f"names/{kind}": words(each) for kind, each in names.items()},
@@ -87,7 +87,7 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
             [
-                *(POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, LARGEST_PUSH),
+                *(POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, MAX_ACCELERATION),
                 *(SHORTEST_STEP, LONGEST_STEP),
             ]
         ),
@@ -118,10 +118,11 @@ def _of_fields(context: WorldContext) -> Arrays:
     rows = carried_rows(context)
     slices = [name for name, groups in state.carried.items() for _ in groups]
     grabs, motors = state.grabs, state.motors
-    # What moves bodies must be finite.
+    # Fields that move bodies must be finite.
     moving = [state.particle_position, state.particle_velocity, *(field for _, field in finite_fields(state))]
     moving += [grabs.weights, grabs.target, grabs.spring, grabs.limits, grabs.share]
-    # Of grabs and motors all rows: the game makes more. Of joints and motors so many particles as they hold.
+    # Grabs and motors have all rows, because the game adds more. Joints and motors have the particles they
+    # use.
     whose = [_ALWAYS] * len(rows)
     for owner, name in enumerate(slices, start=len(OWNERS)):
         if name in (Grabs.name, Motors.name):
@@ -176,7 +177,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
 
 
 def _held(context: WorldContext) -> Arrays:
-    """What pins of bodies stand for in the finest level, slot after slot: see `BodyRecord.held`."""
+    """Pins of bodies in terms of the finest level, slot by slot: see `BodyRecord.held`."""
     bodies = context.slots.slots
     held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
     rows = [np.zeros(0) if each is None else each for each in held]
@@ -215,7 +216,7 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
 
 
 def _target_of(row: ColliderRow) -> list[float]:
-    """Whether it has one, and its pose."""
+    """1 if the collider has a target, else 0; then the pose of the target."""
     return [0.0] * 8 if row.target is None else [1.0, *np.concatenate(row.target).tolist()]
 
 
@@ -229,8 +230,7 @@ def _of_frames(context: WorldContext) -> Arrays:
 
 
 def _attached(context: WorldContext) -> Arrays:
-    """Of each particle: 1 where its frame feels its load; which attachment of its body it belongs to, counted
-    from 1, or 0."""
+    """By particle: 1 if its frame reports its load, and the number of its attachment from 1, or 0."""
     count = context.layout.particle_count
     feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)
     for body, held in context.of(Frames).attachments.items():

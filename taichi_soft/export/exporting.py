@@ -1,4 +1,4 @@
-"""A built world written as a folder for the native library, whole or not at all."""
+"""Write a built world as a folder for the native library, completely or not at all."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.world import World, context_of_world, force_field_of
 
 WORLD, KERNELS = "world.tsw", "kernels"
-"""Names in the folder."""
+"""Names of files in the folder."""
 
 
 @dataclass(frozen=True)
 class ExportReport:
-    """What was written."""
+    """Result of an export."""
 
-    path: Path  # of the folder
-    size: int  # of all files [bytes]
-    kernels: int  # number of them
+    path: Path  # path of the folder
+    size: int  # total size of the files [bytes]
+    kernels: int  # number of kernels
     names: dict[str, list[str]]  # of bodies, assets, colliders, frames, joints, motors, meshes
 
 
@@ -52,31 +52,31 @@ def export_world(
     platforms: Sequence[str] | None = None,
     static: bool = False,
 ) -> ExportReport:
-    """Write a built world, as it is now, as a folder that the native library loads.
+    """Write the current state of a built world as a folder that the native library loads.
 
-    It ends what this process can do with Taichi: worlds can be asked nothing any more.
+    After an export, this process cannot use Taichi or its worlds any more. Start a new process.
     Args:
-        path: of the folder, which must not be there yet, or be an earlier one.
+        path: path of the folder; an earlier export there is replaced.
         axes: of the engine, see `AXES`.
-        names: of bodies, assets, colliders, frames, joints and motors, by which the game finds them; others
-            get one with their number, such as body3.
-        platforms: some of `PLATFORMS`, that the world is to run on; by default the one of this machine.
-        static: write objects that the game is linked with, where it may open no code: see
+        names: names of bodies, assets, colliders, frames, joints and motors for the game; others get names
+            with their index, such as body3.
+        platforms: platforms from `PLATFORMS`; by default this machine's.
+        static: write objects to link into the game, for systems that forbid loading code: see
             `ts_scene_load_linked`.
-        world: built, at the state in which the game starts.
-    Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
-        written, for an unknown platform, for the web where it is static, and for what the native library does
-        not run, by name; MissingExtraError without llvmlite or zig.
+        world: a built world in the initial state of the game.
+    Raises: StateError for a world that is not built; OptionError for a path that is in use or cannot be
+        written, for an unknown platform, for static with the web, and for features that the native library
+        does not support, by name; MissingExtraError without llvmlite or zig.
     """
     path, matrix, platforms = Path(path), axes_of(axes), platforms_of(platforms)
     if static and "web" in platforms:
-        raise OptionError("a world for the web has the library in it already: leave static out for it")
+        raise OptionError("a world for the web already contains the library: leave out static")
     if not world.is_built:
-        raise StateError("the world is not built: call world.build() before it is exported")
+        raise StateError("the world is not built: call world.build() before export_world(world)")
     context = context_of_world(world)
     require_native(context, has_force_field=force_field_of(world) is not None)
     if path.exists() and not (path / WORLD).is_file():
-        raise OptionError(f"{path} is there and no world file: give another --out")
+        raise OptionError(f"{path} exists and is not a world file: choose another --out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)
@@ -89,8 +89,8 @@ def export_world(
         part.remove()
 
 
-def _told_apart(names: list[str]) -> list[str]:
-    """Names of which none is there twice: later ones get their number behind them."""
+def _made_unique(names: list[str]) -> list[str]:
+    """Make names unique: append a number to repeated names."""
     found: list[str] = []
     for i, name in enumerate(names):
         found.append(f"{name}#{i}" if name in found else name)
@@ -124,7 +124,7 @@ def _written(
         names[kind] = [given.get(handles.get(i), f"{kind}{i}") for i in numbers]
     meshes = [mesh for i, asset in enumerate(assets) for mesh in meshes_of(i, asset, names["asset"][i])]
     names["mesh"] = [mesh.name for mesh in meshes]
-    names = {kind: _told_apart(each) for kind, each in names.items()}
+    names = {kind: _made_unique(each) for kind, each in names.items()}
     arrays = description_of(context, meshes, names, matrix)
     kernels = kernels_of(context, meshes)
     new = part.path / path.name

@@ -1,4 +1,4 @@
-"""Where each number of a world's fields lies in memory."""
+"""Memory layout of a world's fields."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from taichi_soft.export.kernels.root import read_root
 from taichi_soft.solver.state import State
 
 FLOAT, WHOLE = 0, 1
-"""Kinds of numbers, all of 4 bytes."""
+"""Types of numbers, all of 4 bytes."""
 
 
 @dataclass(frozen=True)
 class FieldPlace:
-    """Of a field: element i begins `stride` i bytes behind `offset`, and has `width` numbers."""
+    """Layout of a field: element i starts at `offset + stride * i` and has `width` numbers."""
 
-    offset: int  # from where the layout begins
+    offset: int  # from the start of the layout [bytes]
     stride: int
     count: int
     width: int
@@ -30,7 +30,7 @@ class FieldPlace:
 
 
 def places_of(state: State) -> dict[str, FieldPlace]:
-    """Of all fields whose elements lie in one piece, by name, with a dot before those of a slice."""
+    """Layouts of all fields with contiguous elements, by name; names of a slice's fields have a dot."""
     found = {}
     for name, field in _fields(state, ""):
         place = place_of(field)
@@ -52,7 +52,7 @@ def _fields(holder: Any, prefix: str) -> list[tuple[str, Any]]:
 
 
 def place_of(field: Any) -> FieldPlace | None:
-    """None where its components lie apart."""
+    """Layout of a field, or None if its elements are not contiguous."""
     components = [each.ptr.snode() for each in field.vars]
     first = components[0]
     dense = first.parent
@@ -72,12 +72,12 @@ def place_of(field: Any) -> FieldPlace | None:
 
 
 def image_of(state: State) -> NDArray[np.uint8]:
-    """All numbers of all fields, as they lie in memory."""
+    """Copy the memory of all fields."""
     found = np.zeros(1, dtype=np.uint64)
     read_root(state, found)
     place = place_of(state.particle_position)
     if place is None:
-        raise OptionError("this version of Taichi lays out fields in another way: take taichi 1.7.4")
+        raise OptionError("this version of Taichi has another memory layout: install taichi 1.7.4")
     root = state.particle_position.vars[0].ptr.snode().parent.parent
     begin = int(found[0]) - place.offset
     return np.frombuffer(ctypes.string_at(begin, root.cell_size_bytes), dtype=np.uint8)

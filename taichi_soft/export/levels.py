@@ -1,4 +1,4 @@
-"""What a world file says of an asset with levels of detail, so that bodies of it can pass between them."""
+"""Describe an asset's levels of detail for a world file, so that bodies can change their level."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from taichi_soft.solver.context import WorldContext
 Arrays = dict[str, NDArray[Any]]
 
 _ROWS = list(signature(write_body).parameters)[5:]
-"""Names of what `body_rows` returns."""
+"""Names of the arrays that `body_rows` returns."""
 
 
 def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arrays:
-    """What kernels write into a slot of the asset with a number, where this level of it comes there."""
+    """Arrays that kernels write into a slot when a body takes this level of an asset."""
     state, arrays = context.built.state, asset.arrays
     found: Arrays = {f"slot/{name}": rows for name, rows in zip(_ROWS, body_rows(arrays), strict=True)}
     found["slot/kind"] = kind_numbers(state, asset)
@@ -39,14 +39,14 @@ def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arr
 
 
 def constant_names(context: WorldContext) -> list[str]:
-    """Names of the fields that have constants of tetrahedra."""
+    """Names of the fields with constants of tetrahedra."""
     state = context.built.state
     fields = [field for field, _ in state.tet_constants(context.layout.bodies[0])]
     return [name for name, each in vars(state).items() if any(each is field for field in fields)]
 
 
 def passage_arrays(asset: SoftBodyAsset) -> Arrays:
-    """How bodies pass from each level of an asset to each other one."""
+    """Arrays for the transition between each pair of an asset's levels."""
     found: Arrays = {}
     levels = range(len(asset.levels))
     for source, target in ((i, j) for i in levels for j in levels if i != j):

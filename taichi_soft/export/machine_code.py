@@ -1,6 +1,8 @@
-"""Kernels as machine code: what Taichi writes as text for LLVM, compiled and linked for other platforms.
+"""Compile kernels to machine code: Taichi writes LLVM assembly, which is compiled and linked for each
+platform.
 
-llvmlite 0.44 has the LLVM of Taichi 1.7.4, which alone reads these texts. `ziglang` links for all platforms.
+Only the LLVM of Taichi 1.7.4 reads this assembly; llvmlite 0.44 has the same one. `ziglang` links for all
+platforms.
 """
 
 from __future__ import annotations
@@ -22,27 +24,27 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.export.web import for_web, web_sources
 
 TABLE = "taichi_soft_kernels"
-"""Symbol of the table in a file: rows of a name and a function, `ts_linked_kernel` of the C library."""
+"""Symbol of a file's kernel table: rows of a name and a function, `ts_linked_kernel` of the C library."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A processor and a system, for which LLVM compiles and zig links."""
+    """A target of LLVM and zig."""
 
-    triple: str  # of LLVM
-    target: str  # of zig
+    triple: str  # LLVM's target triple
+    target: str  # zig's target
     processor: str
-    file: str  # without its end
-    features: str = ""  # beyond those of the processor
+    file: str  # file name without suffix
+    features: str = ""  # additional CPU features
 
     @property
     def end(self) -> str:
-        """The end of a library's name."""
+        """Suffix of a library's file name."""
         return {"windows": ".dll", "macos": ".dylib", "web": ".wasm"}.get(self.file.split("-")[0], ".so")
 
     @property
     def is_web(self) -> bool:
-        """Whether the whole library is linked with the kernels."""
+        """True if the native library is linked with the kernels."""
         return self.file == "web"
 
 
@@ -61,40 +63,40 @@ PLATFORMS = {
         Platform("wasm32-unknown-unknown", "wasm32-wasi", "generic", "web", "+simd128,+nontrapping-fptoint"),
     ),
 }
-"""By the name that `taichi-soft export --for` takes."""
+"""Platforms by their name in `taichi-soft export --for`."""
 
 _TARGET_LINES = re.compile(r"^target (?:datalayout|triple).*\n", re.MULTILINE)
 _PROCESSOR = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _PART = re.compile(r"^define void @(\w+_kernel_(\d+)_\w+)\((%struct\.RuntimeContext[.\d]*\*)", re.MULTILINE)
 
 _FUNCTION = "taichi_soft_kernel_"
-"""How functions begin that run all parts of a kernel."""
+"""Prefix of functions that run all parts of a kernel."""
 
 _WINDOWS = """
 int _fltused = 0;
 int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1; }
 """
-"""Windows looks for these two in every library."""
+"""Symbols that Windows requires in every library."""
 
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
-    """Platforms by name, each once; that of this machine for None. Raises: OptionError for others."""
+    """Check names of platforms and remove repeats; None is this machine's. Raises: OptionError."""
     if names is None:
         known = {"amd64": "x64", "x86_64": "x64", "aarch64": "arm64", "win32": "windows", "darwin": "macos"}
         system, machine = (known.get(each, each) for each in (sys.platform, platform.machine().lower()))
         names = [f"{system}-{machine}"]
     for name in names:
         if name not in PLATFORMS:
-            raise OptionError(f"no platform is called {name}: choose among {', '.join(PLATFORMS)}")
+            raise OptionError(f"unknown platform {name}: choose among {', '.join(PLATFORMS)}")
     return list(dict.fromkeys(names))
 
 
 @dataclass(frozen=True)
 class CompiledKernels:
-    """Files of machine code, and what says that they belong to a world file."""
+    """Files of machine code, and the stamp that ties them to a world file."""
 
-    stamp: str  # the library compares it with the one in the world file
-    files: list[Path]  # one or more for each platform
+    stamp: str  # the library compares it with the stamp in the world file
+    files: list[Path]  # one or more per platform
 
 
 def compile_kernels(
@@ -103,11 +105,11 @@ def compile_kernels(
     """Compile kernels for platforms.
 
     Args:
-        texts: folder of a file NAME.ll for each kernel.
-        platforms: some of `PLATFORMS`.
-        folder: for the files.
-        world: None for libraries that are opened; a name for objects that a game is linked with, whose table
-            is called after it.
+        texts: folder with a file NAME.ll per kernel.
+        platforms: names from `PLATFORMS`.
+        folder: folder for the output.
+        world: None for shared libraries; a name for objects to link into a game, which becomes part of the
+            table's symbol.
     """
     llvm = _llvm()
     sources = {name: _source_of(name, (texts / f"{name}.ll").read_text()) for name in names}
@@ -135,7 +137,7 @@ def _llvm() -> Any:
 
 
 def _source_of(name: str, text: str) -> str:
-    """A kernel's text for any target, with a function that runs its parts in their order."""
+    """Make a kernel's assembly portable, and add a function that runs its parts in order."""
     text = _PROCESSOR.sub("", _TARGET_LINES.sub("", text))
     parts = sorted((int(number), part, context) for part, number, context in _PART.findall(text))
     for number, part, _ in parts:
@@ -149,7 +151,7 @@ def _source_of(name: str, text: str) -> str:
 
 
 def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
-    """Rows of a name and a function, with the stamp in front and nothing at the end, as text for LLVM."""
+    """Write the kernel table as LLVM assembly: the stamp, rows of a name and a function, and a null row."""
     lines, rows = [], []
     for i, text in enumerate([stamp, *names]):
         kind = f"[{len(text) + 1} x i8]"
@@ -177,17 +179,17 @@ def _object_of(llvm: Any, sources: Mapping[str, str], table: str, target: Platfo
         module = llvm.parse_assembly(for_web(source) if target.is_web else source)
         module.triple, module.data_layout = whole.triple, whole.data_layout
         whole.link_in(module)
-    for name in sources:  # so that a game may have several worlds
+    for name in sources:  # allows several worlds in one game
         whole.get_function(_FUNCTION + name).linkage = "internal"
     return bytes(machine.emit_object(whole))
 
 
 def _linked(target: Platform, code: Path) -> Path:
-    """A library made of an object file, beside it."""
+    """Link an object file to a library next to it."""
     linked = code.with_name(target.file + target.end)
     if target.is_web:
         return _zig(linked, "c++", "-target", target.target, *web_sources(), code)
-    # What compilers call, to set memory and the like, comes with zig: nothing of a system is linked.
+    # zig provides compiler runtime functions such as memset: no system library is linked.
     given: list[str | Path] = ["cc", "-target", target.target, "-shared", "-nostdlib", "-lcompiler_rt", code]
     given.append("-Wl,-dead_strip" if target.end == ".dylib" else "-Wl,--gc-sections")
     if target.end == ".dll":
@@ -199,9 +201,9 @@ def _linked(target: Platform, code: Path) -> Path:
 
 
 def _zig(linked: Path, *given: str | Path) -> Path:
-    """What zig's compilers make of what they are given."""
+    """Run zig's compiler."""
     command = [sys.executable, "-m", "ziglang", *map(str, given), "-s", "-o", str(linked)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise OptionError(f"cannot link {linked.name}: {done.stderr.strip() or 'zig has failed'}")
+        raise OptionError(f"cannot link {linked.name}: {done.stderr.strip() or 'zig failed'}")
     return linked

@@ -1,4 +1,4 @@
-"""What is drawn of the bodies of an asset: its skins, or its surface."""
+"""Render meshes of an asset: its skins, or its surface."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from taichi_soft.bodies.skin_mesh import MIN_PARALLEL_VERTICES as FEWEST_OF_SKIN
 from taichi_soft.meshing.creases import split_at_creases
 
 CREASE = 40.0
-"""Angle [degrees] from which on an edge of a surface is drawn sharp."""
+"""Smallest angle of a sharp edge [degrees]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What the kernel reads that draws a mesh."""
+    """Input of the kernel that writes a mesh."""
 
     is_skin: bool
     is_serial: bool
@@ -31,7 +31,7 @@ class Table:
 
     @property
     def kernel(self) -> tuple[str, Any]:
-        """Its name in the world file, and the kernel."""
+        """Name in the world file, and the kernel."""
         name, kernel = (
             ("write_skin", write_skin) if self.is_skin else ("write_render_mesh", write_render_mesh)
         )
@@ -40,25 +40,24 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class ExportedMesh:
-    """One of the meshes of an asset."""
+    """A render mesh of an asset."""
 
     name: str
     asset: int
-    level: int  # of detail that it draws; -1 for all
+    level: int  # level of detail that it shows; -1 for all
     vertex_count: int
     triangles: NDArray[np.int32]  # (m, 3)
-    tables: list[Table]  # one, or one for each level
-    uv: NDArray[np.float32]  # (k, 2), or none
+    tables: list[Table]  # one, or one per level
+    uv: NDArray[np.float32]  # (k, 2), or empty
 
     @property
     def is_skin(self) -> bool:
-        """Whether it is a skin, which is drawn at every level."""
+        """True for a skin, which is shown at every level."""
         return self.tables[0].is_skin
 
 
 def meshes_of(number: int, asset: SoftBodyAsset, name: str) -> list[ExportedMesh]:
-    """Of the asset that has this number: its skins, or else the surfaces of its levels, if they have
-    triangles."""
+    """Render meshes of an asset: its skins, or else the surfaces of its levels that have triangles."""
     found = []
     for i, skin in enumerate(asset.skins):
         surface = skin.surface

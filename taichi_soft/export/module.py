@@ -1,4 +1,4 @@
-"""The kernels of a world file, each with what it is compiled for."""
+"""Kernels of a world file, with the arguments that they are compiled for."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _SERIAL = {
     "read_touches": read_touches,
     "read_root": read_root,
 }
-"""Those that every world has, by name."""
+"""Kernels of every world, by name."""
 
 _OF_CONTACT = {
     "write_joint": write_joint,
@@ -56,14 +56,14 @@ _OF_CONTACT = {
     "forget_held": forget_held,
     "read_speed": read_speed,
 }
-"""Those of joints and motors, which take a world that is made for contact."""
+"""Kernels of joints and motors, which need a world with contact."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
-"""Those that change the level of detail of a body."""
+"""Kernels that change the level of detail of a body."""
 
 
 def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels:
-    """All that the native library calls in this world, by name."""
+    """All kernels that the native library calls in this world, by name."""
     state, program = context.built.state, context.built.program
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)
@@ -89,7 +89,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
 
 
 def _example(kernel: Any, **templates: Any) -> tuple[Any, dict[str, Any]]:
-    """A kernel with its template arguments, and an array like each of those that it takes."""
+    """Return a kernel with its template arguments, and an example of each array argument."""
     arguments = dict(templates)
     for name, parameter in signature(kernel).parameters.items():
         kind = parameter.annotation

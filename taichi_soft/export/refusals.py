@@ -1,4 +1,4 @@
-"""What a world may have that the native library does not run: why, and what to do instead."""
+"""Features that the native library does not support: why, and what to do instead."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from taichi_soft.core.types import Schedule
 from taichi_soft.solver.context import WorldContext
 
 FLAT = (
-    "it has schedule 'flat', whose loops over the particles of the whole world have no place for contact, "
-    "forces, grabs, joints and motors, which the library's calls take: make it with schedule='per_body'"
+    "it has schedule 'flat', which does not support the contact, forces, grabs, joints and motors of the "
+    "library: make it with schedule='per_body'"
 )
 RECORDS = (
-    "it records events, and Python would go on to collect them; stress is watched by Python too, which reads "
-    "it of each tetrahedron after each step: leave record_events, on and watches out, and let the game call "
+    "it records events or watches stress, which runs in Python: leave out record_events, on and watches, and "
+    "let the game call "
     "ts_world_record_events"
 )
 FORCE_FIELD = (
-    "it has a force field, a function in Python that the library cannot call: take it out with "
-    "set_force_field(None), and let the game push in the function of ts_world_on_step, by "
+    "it has a force field, a Python function that the library cannot call: remove it with "
+    "set_force_field(None), and apply forces in the callback of ts_world_on_step with "
     "ts_body_apply_force, ts_world_set_wind or ts_world_radial_impulse"
 )
 CUT = (
-    "is cut or tears, and Python makes the new mesh of a body that is cut: leave spare_vertices out, and let "
-    "the game put bodies of the parts in its place, by ts_world_despawn and ts_world_spawn"
+    "can be cut or torn, which needs Python: leave out spare_vertices, and let the game replace the body by "
+    "its parts, with ts_world_despawn and ts_world_spawn"
 )
 MATERIAL = (
-    "was given another material, and the library takes the constants of a body from its asset: make its "
-    "asset of that material"
+    "was given another material, and the library uses the material of its asset: make the asset with that "
+    "material"
 )
 SKIPS = (
-    "skips the coming step, and Python alone chooses who skips steps: make a step with World.step before the "
-    "export, and let the game despawn what is far away"
+    "skips the next step, and only Python can skip steps: call World.step before the export, and let the "
+    "game despawn distant bodies"
 )
 
 
 def require_native(context: WorldContext, *, has_force_field: bool) -> None:
-    """Raises: OptionError with all that the native library has no place for: why, and the way out."""
+    """Raise an OptionError that lists all unsupported features, with reasons and alternatives."""
     found = _of_world(context, has_force_field) + _of_assets(context) + _of_bodies(context)
     if found:
         raise OptionError(f"the native library does not run this world: {'; '.join(found)}")
@@ -47,9 +47,7 @@ def require_native(context: WorldContext, *, has_force_field: bool) -> None:
 def _of_world(context: WorldContext, has_force_field: bool) -> list[str]:
     found = []
     if device().is_gpu:
-        found.append(
-            f"it runs on {device().arch}, and its kernels become code for processors: call init('cpu')"
-        )
+        found.append(f"it runs on {device().arch}, and only CPU kernels can be exported: call init('cpu')")
     if context.settings.schedule is Schedule.FLAT:
         found.append(FLAT)
     if context.built.events.is_recording:

@@ -1,4 +1,4 @@
-"""Kernels and the native library as one WebAssembly module, and what a page takes with it."""
+"""Build a WebAssembly module of kernels and the native library, and the package for a page."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ leave:
   ret void
 }}
 """
-"""One part of a loop forwards, as Taichi's runtime has it, but with the places that LLVM chooses."""
+"""One part of a loop, the same as in Taichi's runtime, but with the struct offsets of the target."""
 
 
 def for_web(source: str) -> str:
-    """A kernel's text for pointers of 32 bits: Taichi has places of 64 in what runs the parts of a loop."""
+    """Convert a kernel's assembly to 32-bit pointers: Taichi's loop runner has struct offsets for 64 bits."""
     if not _LOOP.search(source):
         return source
     (closure,), (context,) = set(_CLOSURE.findall(source)), set(_CONTEXT.findall(source))
@@ -77,10 +77,10 @@ def for_web(source: str) -> str:
 
 
 def web_sources() -> list[str | Path]:
-    """What the compiler is given for the native library, which is linked with a world's kernels."""
+    """Compiler arguments of the native library, which is linked with a world's kernels."""
     native = _HERE / "native"
     return [
-        # Small code for our own, and fast code for what the kernels call of the standard library.
+        # Optimise the library for size, and the standard library's functions that kernels call for speed.
         *("-mexec-model=reactor", "-std=c++17", "-O2", "-Xclang", "-Os", "-msimd128", "-ffp-contract=off"),
         *(
             "-fno-exceptions",
@@ -95,6 +95,6 @@ def web_sources() -> list[str | Path]:
 
 
 def write_package(folder: Path) -> None:
-    """Put beside a world what a page imports: the package for JavaScript, and its types."""
+    """Copy the JavaScript package and its types next to a world."""
     for file in sorted((_HERE / "web").glob("*.[jt]s")):
         shutil.copyfile(file, folder / file.name)

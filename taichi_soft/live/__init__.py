@@ -1,4 +1,4 @@
-"""A world live in a browser: seen, touched and tuned."""
+"""Show a live world in a browser, where visitors can grab bodies and change parameters."""
 
 from taichi_soft.live.choices import choices
 from taichi_soft.live.stress_table import StressRow, StressTable, stress_table

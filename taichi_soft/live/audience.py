@@ -1,4 +1,4 @@
-"""The visitors of a live world, and what each is sent: the frames that it keeps up with, and messages."""
+"""Visitors of a live world. Each receives messages, and frames at the rate that it can display."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.meshing.surfaces import Up
 
 UNSEEN = 2
-"""Frames on their way to a visitor. Further ones are left out until it has shown one of these."""
+"""Largest number of frames in flight to a visitor. Further frames are skipped until it has shown one."""
 
 MOST_MESSAGES = 20
-"""Messages that wait for a visitor; older ones are dropped."""
+"""Largest number of messages that wait for a visitor; older messages are dropped."""
 
 _log = logging.getLogger("taichi_soft")
 
 
 class Shown(Protocol):
-    """The worlds, as far as visitors are sent what is in them."""
+    """The worlds, as far as visitors need them."""
 
     panes: dict[int, Runner]
     coming: dict[int, Runner]
@@ -47,12 +47,12 @@ class Visitor:
     sent: int = 0  # frames
     seen: int = 0  # number of the last frame that it has shown
     last: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # by pane: runner, version, number
-    messages: list[str] = field(default_factory=list)  # that wait to be sent
-    upload: tuple[str, Up | None] | None = None  # name and upward axis of the file that comes next
+    messages: list[str] = field(default_factory=list)  # waiting to be sent
+    upload: tuple[str, Up | None] | None = None  # name and upward axis of the next file
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
     def put(self, **message: str) -> None:
-        """Send a message soon."""
+        """Queue a message."""
         self.messages.append(json.dumps(message))
         del self.messages[:-MOST_MESSAGES]
         self.wake.set()
@@ -60,7 +60,7 @@ class Visitor:
 
 @dataclass
 class _Activity:
-    """Something that takes a while."""
+    """A long task, such as compiling."""
 
     title: str
     step: str
@@ -74,33 +74,33 @@ class Audience:
 
     def __init__(self) -> None:
         self.visitors: dict[int, Visitor] = {}
-        self.trouble: str | None = None  # why there is no world
+        self.trouble: str | None = None  # reason why there is no world
         self._activities: dict[str, _Activity] = {}
         self._status_version = 0
 
     def say(self, words: str) -> None:
-        """Send a message to everybody."""
+        """Send a message to all visitors."""
         _log.info("live: %s", words)
         for visitor in self.visitors.values():
             visitor.put(said=words)
 
     def refuse(self, number: int, words: str) -> None:
-        """Tell a visitor that its request was refused."""
+        """Report a refused request to its visitor."""
         if number in self.visitors:
             self.visitors[number].put(refused=words)
 
     def wake(self) -> None:
-        """Look for what is new to send."""
+        """Wake the senders, because there is something new to send."""
         for visitor in self.visitors.values():
             visitor.wake.set()
 
     def show_activity(self, key: str, title: str, step: str, done: int = 0, about: int = 0) -> None:
-        """Show what goes on until `end_activity`.
+        """Show a task until `end_activity`.
 
         Args:
-            title: what is prepared.
-            step: what is done at the moment.
-            done, about: parts that are done, and about how many there are; 0 if that is not known.
+            title: name of the task.
+            step: current step of the task.
+            done, about: number of finished parts, and their approximate total; 0 if unknown.
         """
         before = self._activities.get(key)
         since = time.monotonic() if before is None or before.title != title else before.since
@@ -108,12 +108,12 @@ class Audience:
         self._change_status()
 
     def end_activity(self, key: str) -> None:
-        """End an activity, if there is one."""
+        """End a task, if it exists."""
         if self._activities.pop(key, None) is not None:
             self._change_status()
 
     def set_trouble(self, words: str | None) -> None:
-        """Show why there is no world; None: there is one, or one is prepared."""
+        """Show the reason why there is no world; None if there is a world, or one is being prepared."""
         if words != self.trouble:
             self.trouble = words
             self._change_status()
@@ -123,7 +123,7 @@ class Audience:
         self.wake()
 
     def status(self) -> dict[str, Any]:
-        """Return what goes on, and why there is no world."""
+        """Return the running tasks, and the reason why there is no world."""
         now = time.monotonic()
         rows = [
             {
@@ -138,7 +138,7 @@ class Audience:
         return {"activities": rows, "trouble": self.trouble}
 
     async def speak(self, visitor: Visitor, worlds: Shown) -> None:
-        """Send a visitor what is new, as long as it is there. No other visitor waits for it."""
+        """Send updates to a visitor until it leaves. Visitors do not wait for each other."""
         states: dict[int, Any] = {}
         panes: list[int] = []
         version = -1
@@ -170,7 +170,7 @@ class Audience:
                     await self._send_frame(visitor, pane, runner, len(worlds.panes))
 
     async def _send_frame(self, visitor: Visitor, pane: int, runner: Runner, panes: int) -> None:
-        """Send the newest frame, unless earlier ones are not seen yet."""
+        """Send the newest frame, unless too many earlier frames are still in flight."""
         if runner.drawn is None or visitor.sent - visitor.seen >= UNSEEN * panes:
             return
         version, number, packet = runner.newest_packet(pane)
@@ -181,7 +181,7 @@ class Audience:
         if visitor.last.get(pane, (0, 0, 0))[:2] != identity:
             await visitor.connection.send(drawn_packet(pane, header, arrays))
         pull = runner.pulls.pop(visitor.number, None)
-        if pull is not None:  # so the page can measure its latency
+        if pull is not None:  # the page measures its latency with it
             await visitor.connection.send(json.dumps({"pull": pull}))
         visitor.last[pane] = *identity, number
         visitor.sent += 1

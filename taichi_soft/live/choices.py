@@ -1,4 +1,4 @@
-"""A scene with another law, and with room for what visitors add, without a change of its script."""
+"""Run a scene's script with another law, and with capacity for bodies that visitors add."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from taichi_soft import Material, SoftBodyAsset, World, box, cylinder, sphere, t
 from taichi_soft.core.types import FlipsName, LawName, StrainName
 
 VISITOR = Material(young=1.5e5, poisson=0.4, density=500.0, damping_ratio=0.15)
-"""Of what visitors add, until a slider says otherwise."""
+"""Material of bodies that visitors add, until a slider changes it."""
 
 SHAPES = ("ball", "block", "drum", "ring")
-"""Names of those that every world has room for."""
+"""Shapes that visitors can add to every world."""
 
 ROOM = 6
-"""Bodies of each kind that visitors may add."""
+"""Number of bodies of each shape that visitors can add."""
 
 PALETTES: WeakKeyDictionary[World, dict[str, SoftBodyAsset]] = WeakKeyDictionary()
-"""What visitors may add to a world, by name."""
+"""Assets that visitors can add to a world, by name."""
 
 
 @contextmanager
@@ -35,14 +35,14 @@ def choices(
     has_palette: bool = False,
     meshes: Sequence[str | Path] = (),
 ) -> Iterator[None]:
-    """Worlds that are made within it have bodies of this law; None leaves each choice as the scene has it.
+    """Give the bodies of all worlds that are made in this context another law; None keeps the scene's.
 
-    A saved scene of `taichi-soft live` begins with it.
+    A script saved by `taichi-soft live` begins with this context.
     Args:
-        law, strain, flips: of all bodies, as `SoftBodyAsset` takes them. With a law the scene's own strain
-            and flips are dropped, which another law may not take.
-        has_palette: whether `World.build` makes room for shapes that visitors add: see `PALETTES`.
-        meshes: files of surfaces that they may add as well.
+        law, strain, flips: of all bodies, see `SoftBodyAsset`. A new law replaces the scene's strain and
+            flips too, because it may not support them.
+        has_palette: True if `World.build` reserves capacity for bodies that visitors add, see `PALETTES`.
+        meshes: surface files that visitors can add too.
     """
     kept = {name: getattr(World, name) for name in ("add_body", "reserve", "spawn", "build")}
     changed: dict[int, tuple[SoftBodyAsset, SoftBodyAsset]] = {}
@@ -92,12 +92,12 @@ def choices(
 
 
 def palette_of(world: World) -> dict[str, SoftBodyAsset]:
-    """What visitors may add, by name."""
+    """Assets that visitors can add, by name."""
     return dict(PALETTES.get(world, {}))
 
 
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
-    """Shapes of about half a metre, and the surfaces of files, by name."""
+    """Make the shapes, about 0.5 m wide, and the bodies of mesh files, by name."""
     shapes = (
         sphere(0.3, 3),
         box((0.5, 0.5, 0.5), (3, 3, 3)),

@@ -1,4 +1,4 @@
-"""What a visitor may change while a world runs: names, ranges, and what to do with a value."""
+"""Parameters that visitors can change while a world runs: names, ranges and effects."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from taichi_soft.world.world import context_of_world
 
 @dataclass(frozen=True)
 class Slider:
-    """A number.
+    """A numeric parameter.
 
     Args:
-        name: by which page and world call it.
-        label, unit: what a visitor reads.
+        name: key of the parameter.
+        label, unit: text for visitors.
         low, high: the range.
-        is_log: whether equal ways of the hand are equal ratios.
-        is_whole: whether only whole numbers count.
-        told: what a change costs, or where it gets unstable.
+        is_log: True for a logarithmic scale.
+        is_whole: True for integers.
+        told: cost of a change, or its limit of stability.
     """
 
     name: str
@@ -44,17 +44,17 @@ SLIDERS = {
     for each in (
         Slider("young", "Young's modulus", "Pa", 1e3, 1e8, "stiffer takes more substeps", is_log=True),
         Slider("poisson", "Poisson's ratio", "", -0.9, 0.49, "near 0.5 takes many more substeps"),
-        Slider("damping", "Damping ratio", "", 0.0, 1.0, "of the slowest vibration; costs nothing"),
-        Slider("gravity", "Gravity", "m/s²", 0.0, 30.0, "costs nothing"),
-        Slider("friction", "Friction", "", 0.0, 2.0, "of floor, colliders and bodies; costs nothing"),
+        Slider("damping", "Damping ratio", "", 0.0, 1.0, "of the slowest vibration; no extra cost"),
+        Slider("gravity", "Gravity", "m/s²", 0.0, 30.0, "no extra cost"),
+        Slider("friction", "Friction", "", 0.0, 2.0, "of floor, colliders and bodies; no extra cost"),
         Slider("substeps", "Substeps", "", 1, 400, "too few are unstable", is_log=True, is_whole=True),
-        Slider("speed", "Slow motion", "x", 0.02, 1.0, "of real time; costs nothing", is_log=True),
+        Slider("speed", "Slow motion", "x", 0.02, 1.0, "of real time; no extra cost", is_log=True),
     )
 }
-"""By name."""
+"""Sliders by name."""
 
 MATERIAL = ("young", "poisson", "damping")
-"""Sliders that change the materials of bodies."""
+"""Names of the sliders that change materials."""
 
 PRESET_SLIDERS: dict[str, dict[str, float]] = {
     name: {"young": each.young, "poisson": each.poisson, "damping": each.damping_ratio}
@@ -63,39 +63,39 @@ PRESET_SLIDERS: dict[str, dict[str, float]] = {
     and isinstance(each.poisson, float)
     and SLIDERS["poisson"].low <= each.poisson <= SLIDERS["poisson"].high
 }
-"""Values of the sliders of the material for each preset that they can show."""
+"""Values of the material sliders for each preset within their ranges."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """Values that visitors gave to sliders, and the preset that they chose."""
+    """Slider values and preset that visitors chose."""
 
     values: dict[str, float] = field(default_factory=dict)
     preset: str | None = None
 
     def with_preset(self, name: str | None) -> Given:
-        """Return these values with those of a preset; None: the materials of the scene."""
+        """Return these values with the material of a preset; None for the scene's materials."""
         others = {name: value for name, value in self.values.items() if name not in MATERIAL}
         return Given({**others, **PRESET_SLIDERS.get(name or "", {})}, name)
 
     def at_reset(self) -> Given:
-        """Return the values that a reset goes back to: those of the preset, or none."""
+        """Return the values after a reset: those of the preset, or none."""
         return Given().with_preset(self.preset)
 
 
 def checked_value(name: Any, value: Any) -> float:
-    """The value of a slider. Raises: OptionError for a slider that is none, and a value out of its range."""
+    """Check the value of a slider. Raises: OptionError for an unknown slider or a value out of range."""
     if not isinstance(name, str) or name not in SLIDERS:
-        raise OptionError(f"there is no slider {name!r}")
+        raise OptionError(f"unknown slider {name!r}")
     slider = SLIDERS[name]
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not slider.low <= value <= slider.high:  # as a NaN is
-        raise OptionError(f"{slider.label} goes from {slider.low:g} to {slider.high:g}, got {value!r}")
+    if not is_number or not slider.low <= value <= slider.high:  # also refuses NaN
+        raise OptionError(f"{slider.label} must be from {slider.low:g} to {slider.high:g}, got {value!r}")
     return float(round(value)) if slider.is_whole else float(value)
 
 
 class Controls:
-    """The values that a world has, and those that a visitor gave it."""
+    """Parameter values of a world, and those that visitors chose."""
 
     def __init__(self, world: World, dt: float, substeps: int | None) -> None:
         self.world, self.dt = world, dt
@@ -115,9 +115,9 @@ class Controls:
 
     @property
     def stable_substeps(self) -> int:
-        """How many a step needs with these materials, predicted from the speed of waves in each asset.
+        """Number of substeps that these materials need, predicted from the wave speed in each asset.
 
-        An estimate of every body anew would stop the world for a moment at each move of a slider.
+        A new estimate for each body would pause the world at each move of a slider.
         """
         has_stable_step = context_of_world(self.world).substeps.has_stable_step
         if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):
@@ -127,7 +127,7 @@ class Controls:
         return math.ceil(max(*counts, 1.0, self.dt / SOFT_CONTACT_STEP if soft else 1.0) - 1e-9)
 
     def _factor(self, asset: SoftBodyAsset) -> float:
-        """By how much faster waves are in it than they were."""
+        """Ratio of the asset's wave speed to its initial wave speed."""
         material = asset.material
         if not isinstance(material, Material):
             return 1.0
@@ -137,7 +137,7 @@ class Controls:
 
     @property
     def substeps(self) -> int:
-        """Of a step: as a visitor said, or the scene, or as many as are stable."""
+        """Substeps of a step: the visitor's value, the scene's value, or the stable number."""
         if "substeps" in self.given:
             return int(self.given["substeps"])
         if self._own_substeps is not None:
@@ -145,7 +145,7 @@ class Controls:
         return self.stable_substeps
 
     def values(self) -> dict[str, float | None]:
-        """What each slider shows; None where bodies differ, or have no such thing."""
+        """Value of each slider; None if bodies differ or lack the property."""
         settings, first = self.world.settings, self._first
         own: dict[str, float | None] = {
             "young": None if first is None else _number(first.young),
@@ -160,26 +160,26 @@ class Controls:
 
     @property
     def sliders(self) -> Given:
-        """The values that were given, and the preset."""
+        """Chosen values and preset."""
         return Given(dict(self.given), self.preset)
 
     def set_value(self, name: str, value: float) -> None:
-        """Give a slider a value, checked before, and apply it to the world."""
+        """Set a checked slider value and apply it to the world."""
         self.given[name] = value
         self._apply({name})
 
     def give(self, sliders: Given) -> None:
-        """Replace all values that were given. A slider without one returns to the scene's value."""
+        """Replace all chosen values. Sliders without a value return to the scene's value."""
         changed = {*self.given, *sliders.values}
         self.given, self.preset = dict(sliders.values), sliders.preset
         self._apply(changed)
 
     def record(self, sliders: Given) -> None:
-        """Record what a restored world was given: it has these values already."""
+        """Record the values of a restored world, which already has them."""
         self.given, self.preset = dict(sliders.values), sliders.preset
 
     def _apply(self, names: set[str]) -> None:
-        """Apply the current values of sliders to the world: one change for each of its properties."""
+        """Apply slider values to the world, with one change per property."""
         if names & set(MATERIAL):
             for body in self.world.bodies:
                 self._give_material(body)
@@ -190,14 +190,14 @@ class Controls:
             self._give_friction(self.given.get("friction"))
 
     def greet(self, body: Body) -> None:
-        """Apply the values that were given to a new body."""
+        """Apply the chosen values to a new body."""
         if set(MATERIAL) & set(self.given):
             self._give_material(body)
         if "friction" in self.given:
             _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
-        """Bodies of springs alone have no such numbers, and stay."""
+        """Apply the material sliders to a body. Bodies made only of springs have no material: skip them."""
         material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}
@@ -205,7 +205,7 @@ class Controls:
             body.set_material(replace(material, **given))
 
     def _give_friction(self, value: float | None) -> None:
-        """Set the friction of everything; None: to the values of the scene."""
+        """Set all frictions; None restores the scene's values."""
         for body in self.world.bodies:
             _set_friction(body, body.asset.contact.friction if value is None else value)
         floor = self._own_friction if value is None else value
@@ -217,15 +217,15 @@ class Controls:
 
 
 def _set_friction(body: Body, value: float) -> None:
-    with suppress(StateError):  # bodies of this world do not touch each other
+    with suppress(StateError):  # contact between soft bodies is off in this world
         body.set_friction(value)
 
 
 def _number(constant: Any) -> float:
-    """One for the whole body: the largest of several."""
+    """Reduce a material constant to one number: the largest of several."""
     return float(constant if isinstance(constant, (int, float)) else constant.max())
 
 
 def _wave_factor(poisson: float) -> float:
-    """Modulus of waves of pressure over Young's modulus."""
+    """Ratio of the P-wave modulus to Young's modulus."""
     return (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))

@@ -1,4 +1,4 @@
-"""Files that visitors ask for: a scene's script with its snapshot, and films."""
+"""Files that visitors request: a scene's script with its snapshot, and films."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from taichi_soft.live.saving import FILM_FPS, film_file, packed
 from taichi_soft.live.scene import SceneSource
 
 MOST_FILES = 8
-"""Files that are kept; older ones are dropped."""
+"""Largest number of stored files; older files are dropped."""
 
 
 class Downloads:
-    """Files by names that nobody guesses."""
+    """Files under unguessable names."""
 
     def __init__(self, audience: Audience) -> None:
         self._audience = audience
         self._files: dict[str, tuple[str, str, bytes]] = {}
-        self._filming: Runner | None = None  # the world that was asked for its last seconds
+        self._filming: Runner | None = None  # the world that writes the frames of a film
         self._is_drawing = False
         self._process: BaseProcess | None = None
 
@@ -33,32 +33,32 @@ class Downloads:
         return self._files.get(key)
 
     def stop(self) -> None:
-        """End the process that draws a film."""
+        """Stop the process that renders a film."""
         if self._process is not None and self._process.is_alive():
             self._process.kill()
 
     def require_idle(self) -> None:
-        """Raise an OptionError while a film is drawn."""
+        """Raise an OptionError while a film is being rendered."""
         is_asked = self._filming is not None and not self._filming.is_over
         if is_asked or self._is_drawing:
-            raise OptionError("a film is being drawn: wait until it is there")
+            raise OptionError("a film is being rendered: wait until it is finished")
 
     def film_asked(self, runner: Runner) -> None:
-        """Record that a world was asked for a film."""
+        """Record that a film was requested from a world."""
         self._filming = runner
 
     async def offer_scene(self, visitor: int, script: str, snapshot: bytes, source: SceneSource) -> None:
-        """Pack a scene and offer it."""
+        """Pack a scene and offer it for download."""
         content = await asyncio.to_thread(packed, script, snapshot, source)
         self._offer(visitor, "application/zip", "scene.zip", content)
 
     def begin_film(self, frames: str) -> bool:
-        """Record that a world has written the frames of a film. Returns: False if it could not."""
+        """Record that a world has written the frames of a film. Returns: False if that failed."""
         self._filming, self._is_drawing = None, bool(frames)
         return self._is_drawing
 
     async def draw_film(self, visitor: int, frames: str) -> None:
-        """Draw a film and offer it."""
+        """Render a film and offer it for download."""
         self._audience.show_activity("film", "film", "drawing")
         path = f"{frames}.mp4"
         process = get_context("spawn").Process(target=film_file, args=(frames, path, FILM_FPS), daemon=True)
@@ -69,7 +69,7 @@ class Downloads:
         self._audience.end_activity("film")
         Path(frames).unlink(missing_ok=True)
         if process.exitcode != 0 or not Path(path).is_file():
-            self._audience.refuse(visitor, "the film could not be drawn: the terminal says why")
+            self._audience.refuse(visitor, "rendering the film failed: see the terminal")
             return
         self._offer(visitor, "video/mp4", "live.mp4", Path(path).read_bytes())
         Path(path).unlink()

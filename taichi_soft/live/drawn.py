@@ -1,4 +1,4 @@
-"""What is drawn of a world: meshes of bodies and colliders, and where they are in each picture."""
+"""Render meshes of a world's bodies and colliders, and their positions in each frame."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from taichi_soft.render.props import SLATE, drawn_surface, is_level
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 
 CREASE = 65.0
-"""Largest angle between neighbouring triangles that is shaded as round [degrees]: above those of a ball of 20
-triangles (42) and of a ring with six sides (60), below that of a box (90)."""
+"""Largest angle between adjacent triangles that is shaded smooth [degrees]: above those of an icosahedron
+(42) and of a ring with six sides (60), below that of a box (90)."""
 
 
 class Drawn:
-    """Meshes of everything, as they are until a body comes, goes or is cut."""
+    """Meshes of all bodies and colliders, valid until a body is added, removed or cut."""
 
     def __init__(self, scene: Scene, version: int) -> None:
         self.scene, self.version = scene, version
@@ -34,7 +34,7 @@ class Drawn:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether there are other bodies, or other meshes of them."""
+        """True if bodies were added, removed or cut since."""
         bodies = self.scene.world.bodies
         same = len(bodies) == len(self.bodies) and all(
             a is b for a, b in zip(bodies, self.bodies, strict=True)
@@ -43,11 +43,11 @@ class Drawn:
 
     @property
     def vertex_count(self) -> int:
-        """Of all bodies."""
+        """Number of vertices of all bodies."""
         return int(self.starts[-1])
 
     def described(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """For a page: a header, and triangles and colours."""
+        """Description for a page: a header, and arrays of triangles and colours."""
         triangles, counts = [], []
         colors = np.empty((self.vertex_count, 3), np.uint8)
         for (body, mesh), start in zip(self.meshes, self.starts[:-1], strict=True):
@@ -78,7 +78,7 @@ class Drawn:
         return header, arrays
 
     def _colors(self, body: Body, mesh: RenderMesh) -> NDArray[np.float32]:
-        """Of vertices, sRGB from 0 to 1; a texture is looked up at them."""
+        """Vertex colours, sRGB from 0 to 1; a texture is sampled at the vertices."""
         plain = self.scene.color(body.index)
         if not isinstance(mesh, SkinMesh):
             return np.broadcast_to(np.asarray(plain, np.float32), (mesh.vertex_count, 3))
@@ -94,10 +94,10 @@ class Drawn:
         return np.asarray(colors * texels[rows, columns], dtype=np.float32)
 
     def fill(self, frame: Frame, alpha: float, tints: NDArray[np.uint8] | None) -> None:
-        """Write where everything is, `alpha` of the way through the last step.
+        """Write all positions, interpolated to the fraction `alpha` of the last step.
 
         Args:
-            tints: of the particles of all bodies in turn, or None.
+            tints: tints of all particles, body by body, or None.
         """
         world, at, firsts = self.scene.world, 0, {}
         for body in self.bodies:

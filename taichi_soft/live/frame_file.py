@@ -1,4 +1,4 @@
-"""The newest picture of a world, in memory that two processes share: the writer never waits for a reader."""
+"""The newest frame of a world in shared memory. The writer never waits for a reader."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 PLACES = 3
-"""Pictures that there is room for: one that is read, one that is written, and the newest."""
+"""Number of buffers: one to read, one to write, and the newest."""
 
 _HEAD = np.dtype([("newest", "<i8"), ("pad", "<i8", 7)])
 _FRAME = np.dtype([("number", "<i8"), ("version", "<i8"), ("time", "<f8"), ("is_tinted", "<i8")])
 
 TRIES = 8
-"""How often a reader begins anew where the writer has come round, until it leaves this picture out."""
+"""Number of attempts to read a frame that the writer overwrites, before the reader skips it."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where everything is at one moment.
+    """Positions of all bodies and colliders at one time.
 
-    `positions` (n, 3) [m] and `normals` (n, 3), float32, of all render vertices; `tints` (n,), uint8, places
-    on a colour scale; `poses` (k, 12), float32: rotation, by rows, and position [m] of each collider.
+    `positions` (n, 3) [m] and `normals` (n, 3), float32, of all render vertices; `tints` (n,), uint8, indices
+    into a colour scale; `poses` (k, 12), float32: rotation, by rows, and position [m] of each collider.
     """
 
     number: int
-    version: int  # of the description of what is drawn
+    version: int  # version of the meshes, see `Drawn`
     time: float  # [s]
     is_tinted: bool
     positions: NDArray[np.float32]
@@ -37,7 +37,7 @@ class Frame:
 
 
 class FrameFile:
-    """Room for pictures of `vertices` vertices and `colliders` colliders, in a file that both sides map."""
+    """A memory-mapped file with buffers for frames of `vertices` vertices and `colliders` colliders."""
 
     def __init__(self, path: Path, vertices: int, colliders: int, *, is_new: bool = False) -> None:
         size = _FRAME.itemsize + vertices * (24 + 1) + 48 * colliders
@@ -60,18 +60,18 @@ class FrameFile:
 
     @property
     def newest_number(self) -> int:
-        """Of the newest picture, 0 before the first."""
+        """Number of the newest frame, 0 before the first."""
         return int(self._newest[0])
 
     def begin(self) -> Frame:
-        """Arrays to fill for the next picture."""
+        """Return arrays to fill for the next frame."""
         number = self.newest_number + 1
         head, frame = self._places[number % PLACES]
-        head["number"] = -1  # whoever reads it now sees that it changes
+        head["number"] = -1  # tells readers that the buffer is being written
         return frame
 
     def publish(self, version: int, time: float, *, is_tinted: bool) -> int:
-        """Make what was filled the newest picture. Returns: its number, from 1."""
+        """Publish the filled arrays as the newest frame. Returns: its number, from 1."""
         number = self.newest_number + 1
         head = self._places[number % PLACES][0]
         head["version"], head["time"], head["is_tinted"] = version, time, is_tinted
@@ -80,7 +80,7 @@ class FrameFile:
         return number
 
     def newest(self) -> Frame | None:
-        """A copy of the newest picture; None before the first."""
+        """Return a copy of the newest frame; None before the first."""
         for _ in range(TRIES):
             number = self.newest_number
             if number == 0:

@@ -1,4 +1,4 @@
-"""Who may see and touch a live world: this machine, or who has the token; no page of another origin."""
+"""Access control of a live world: this machine or holders of the token, and no page of another origin."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from urllib.parse import parse_qs, urlsplit
 MOST_VISITORS = 16
 
 VIEW_KEY = "TAICHI_SOFT_VIEW_KEY"
-"""Name of the environment variable by which a server and the program that started it know each other."""
+"""Environment variable with the key that a server and the program that started it share."""
 
 EVERYWHERE = ("0.0.0.0", "::")
-"""Addresses that stand for all of a machine."""
+"""Wildcard addresses."""
 
 PUBLIC = (
     *("/live.css", "/live.js", "/view.js", "/room.js", "/panel.js", "/slider.js", "/plot.js"),
@@ -28,27 +28,27 @@ PUBLIC = (
 """Files of the page."""
 
 MESSAGES, BURST = 240.0, 480.0
-"""Of one visitor: messages a second, and how many at once. A hand that is moved sends 60."""
+"""Message rate of one visitor [1/s], and its burst. A moving hand sends 60 messages a second."""
 
 _HOST = re.compile(
     r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::(?P<port>[0-9]{1,5}))?", re.ASCII
 )
 
 LARGEST_UPLOAD = 16 * 2**20
-"""Of a visitor's mesh file [bytes]."""
+"""Largest mesh file of a visitor [bytes]."""
 
 LARGEST_TEXT = 4096
-"""Of any other message [bytes]."""
+"""Largest message of any other kind [bytes]."""
 
 
 @dataclass(frozen=True)
 class Guard:
-    """What a request needs.
+    """Checks of requests.
 
     Args:
         host: address that the server is bound to.
-        port: and its port.
-        token: part of the address that visitors are given; None on the loopback address.
+        port: port of the server.
+        token: secret in the address that visitors open; None on the loopback address.
     """
 
     host: str
@@ -57,34 +57,34 @@ class Guard:
 
     @classmethod
     def of(cls, host: str, port: int) -> Guard:
-        """A token for any address but the loopback one."""
+        """Make a guard, with a token for any address except loopback."""
         return cls(host, port, None if is_loopback(host) else secrets.token_urlsafe(16))
 
     def address(self) -> str:
-        """Which a visitor opens."""
+        """Address for visitors to open."""
         name = socket.gethostname() if self.host in EVERYWHERE else self.host
         name = f"[{name}]" if ":" in name else name
         query = "" if self.token is None else f"?token={self.token}"
         return f"http://{name}:{self.port}/{query}"
 
     def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
-        """Why a request is refused, or None. The page's scripts hold no secret, and ask for no token.
+        """Return the reason to refuse a request, or None. The page's scripts need no token.
 
-        A page of another origin may not open a connection, not even if a name server resolves its name to
-        this machine. So `Host` must name this server, and `Origin` must agree with it.
+        A page of another origin must not connect, even if DNS resolves its name to this machine (DNS
+        rebinding). So `Host` must name this server, and `Origin` must match it.
         Args:
-            path: with its query.
-            host, origin: headers of those names.
+            path: path with its query.
+            host, origin: values of these headers.
         """
         place = host_and_port(host)
         if place is None or (self.token is None and not self._is_mine(*place)):
-            return HTTPStatus.FORBIDDEN, f"this world is served for {self.host}:{self.port}, not for {host!r}"
+            return HTTPStatus.FORBIDDEN, f"this world is served at {self.host}:{self.port}, not at {host!r}"
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
-            return HTTPStatus.FORBIDDEN, f"a page of {origin!r} may not touch this world"
+            return HTTPStatus.FORBIDDEN, f"pages of {origin!r} cannot connect to this world"
         if self.token is not None and urlsplit(path).path not in PUBLIC:
             given = parse_qs(urlsplit(path).query).get("token", [""])[0]
             if not hmac.compare_digest(given.encode(), self.token.encode()):
-                return HTTPStatus.UNAUTHORIZED, "this address needs its token: open the one that was printed"
+                return HTTPStatus.UNAUTHORIZED, "the token is missing or wrong: open the printed address"
         return None
 
     def _is_mine(self, name: str, port: int) -> bool:
@@ -104,7 +104,7 @@ def host_and_port(host: str | None) -> tuple[str, int] | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches an address."""
+    """True for an address that only this machine can reach."""
     if host == "localhost":
         return True
     try:
@@ -114,13 +114,13 @@ def is_loopback(host: str) -> bool:
 
 
 class Allowance:
-    """How many messages a visitor may still send: so many at once, and so many a second."""
+    """Token bucket that limits the messages of a visitor, see `MESSAGES` and `BURST`."""
 
     def __init__(self) -> None:
         self._left, self._then = BURST, time.monotonic()
 
     def take(self) -> bool:
-        """One message. Returns: False where it is one too many."""
+        """Count a message. Returns: False if it exceeds the limit."""
         now = time.monotonic()
         self._left = min(BURST, self._left + MESSAGES * (now - self._then))
         self._then = now

@@ -1,4 +1,4 @@
-"""States before the changes that visitors made, for undo."""
+"""States before visitors' changes, for undo."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from taichi_soft import Grab
 from taichi_soft.live.controls import Given
 
 MOST_CHANGES = 20
-"""Changes that can be undone."""
+"""Largest number of changes that can be undone."""
 
 DRAG = 2.0
-"""Values of a slider that follow each other within this time count as one change [s]."""
+"""Longest interval between values of one slider that count as one change [s]."""
 
 
 @dataclass(frozen=True)
 class Before:
-    """A world before a change.
+    """State of a world before a change.
 
     Args:
-        what: the change, as the page names it.
-        sliders: values that were given.
-        snapshot: the whole state; None if only the sliders can be set back.
+        what: name of the change on the page.
+        sliders: chosen slider values.
+        snapshot: complete state; None if only the sliders can be restored.
         held: grabs in that state.
     """
 
@@ -38,31 +38,31 @@ class History:
 
     def __init__(self) -> None:
         self._changes: deque[Before] = deque(maxlen=MOST_CHANGES)
-        self._drag_at = -math.inf  # when the last change, a slider's, got its last value [s]
+        self._drag_at = -math.inf  # time of the last value, if the last change is a slider's [s]
 
     @property
     def last(self) -> str | None:
-        """Name of the change that an undo takes back."""
+        """Name of the change that the next undo reverts."""
         return self._changes[-1].what if self._changes else None
 
     def add(self, before: Before, *, drag_at: float | None = None) -> None:
-        """Record the state before a change; `drag_at`: the time of a slider's change [s]."""
+        """Record the state before a change; `drag_at` is the time of a slider's change [s]."""
         self._changes.append(before)
         self._drag_at = -math.inf if drag_at is None else drag_at
 
     def goes_on(self, what: str, now: float) -> bool:
-        """Return True if a slider's value belongs to the last change: the same slider is still dragged."""
+        """True if the last change is the same slider, which is still being dragged."""
         if self.last != what or now - self._drag_at > DRAG:
             return False
         self._drag_at = now
         return True
 
     def pop(self) -> Before | None:
-        """Return the last change and remove it; None if there is none."""
+        """Remove and return the last change; None if the history is empty."""
         self._drag_at = -math.inf
         return self._changes.pop() if self._changes else None
 
     def clear(self) -> None:
-        """Forget all changes."""
+        """Remove all changes."""
         self._changes.clear()
         self._drag_at = -math.inf

@@ -1,4 +1,4 @@
-"""Requests that wait for a world: the newest of each kind, and a share of the time for each visitor."""
+"""Queue of requests to a world. It keeps the newest request of each kind, and limits each visitor's time."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SERVER = 0
-"""Sender of the server's own messages: they come first, and are neither merged nor refused."""
+"""Sender number of the server. Its messages come first and are neither merged nor refused."""
 
 MOST_WAITING = 64
-"""Waiting requests of one visitor; further ones are refused."""
+"""Largest number of waiting requests of one visitor; further requests are refused."""
 
 SHARE = 0.25
-"""Largest fraction of the time that the requests of all visitors together take."""
+"""Largest fraction of time for the requests of all visitors together."""
 
 BURST = 2.0
-"""A visitor's time that is not used is kept for so long [s]: a few requests after a pause do not wait."""
+"""Longest time over which a visitor's unused share accumulates [s], so that a short burst does not wait."""
 
 LONGEST_WAIT = 1.0
 """Longest wait of a visitor's next request after an expensive one [s]."""
@@ -28,16 +28,16 @@ Message = tuple[Any, ...]
 
 @dataclass
 class _Sender:
-    """The messages of one sender, by kind and segment. A segment ends with a message without a key."""
+    """Messages of one sender, by kind and segment. A message without a key ends a segment."""
 
     waiting: OrderedDict[tuple[Hashable, int], Message] = field(default_factory=OrderedDict)
     segment: int = 0
     used_until: float = -math.inf  # time up to which its share is used [s]
-    turn: int = 0  # when it was served last
+    turn: int = 0  # turn in which it was served last
 
 
 class Inbox:
-    """Messages of several senders, who take turns."""
+    """Messages of several senders, served in turn."""
 
     def __init__(self) -> None:
         self._senders: dict[int, _Sender] = {}
@@ -58,11 +58,11 @@ class Inbox:
         """Add a message.
 
         Args:
-            key: kind of the message. It replaces a waiting one of its kind, unless a message without a key
-                lies between; None: it replaces nothing.
-            is_kept: accept it however many wait.
-            is_last: the sender leaves: drop what it has waiting.
-        Returns: False if too many of this sender wait.
+            key: kind of the message. The message replaces a waiting one of its kind, unless a message without
+                a key came between them. None replaces no message.
+            is_kept: accept the message even if the queue is full.
+            is_last: the sender leaves; drop its waiting messages.
+        Returns: False if too many messages of this sender wait.
         """
         mine = self._senders.setdefault(sender, _Sender())
         if is_last:
@@ -77,10 +77,10 @@ class Inbox:
         return True
 
     def take(self, now: float = math.inf) -> tuple[int, Message] | None:
-        """Return the next message and its sender, or None if every waiting one has to wait on.
+        """Return the next message and its sender, or None if no message can be served now.
 
         Args:
-            now: the time [s]; without it nobody waits for a share of time.
+            now: current time [s]; by default, time shares are ignored.
         """
         ready = [
             (sender != SERVER, each.turn, sender)
@@ -95,7 +95,7 @@ class Inbox:
         return sender, self._senders[sender].waiting.popitem(last=False)[1]
 
     def charge(self, sender: int, now: float, seconds: float) -> None:
-        """Count the time that a visitor's request took, so that all visitors together keep to `SHARE`."""
+        """Charge a visitor for the time of a request, so that all visitors together keep to `SHARE`."""
         if sender == SERVER:
             return
         mine = self._senders.setdefault(sender, _Sender())

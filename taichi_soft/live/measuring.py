@@ -1,4 +1,4 @@
-"""What a live view costs, and how late it is: a visitor without a browser, on this machine."""
+"""Measure cost and latency of a live view, with a local visitor that has no browser."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.live.server import LiveServer
 
 COUNTS = (1, 16, 64)
-"""Spheres in a world."""
+"""Numbers of spheres in the worlds."""
 
 SECONDS = 11.0
-"""That each turn is measured for: the percentiles that a world reports are those of its last 600 steps, which
-take ten seconds, and none of the turn before it may be among them."""
+"""Length of a turn [s]. A world reports percentiles of its last 600 steps, which take 10 s; longer turns keep
+the steps of the previous turn out of them."""
 
 TURNS = 5
-"""Without a visitor and with one."""
+"""Number of turns, each without and with a visitor."""
 
 PULLS = 40
-"""Moves of the hand whose way to a picture is timed."""
+"""Number of timed moves of the hand."""
 
 _SCENE = """\
 from taichi_soft import Material, World, sphere
@@ -47,24 +47,24 @@ world.build()
 
 @dataclass(frozen=True)
 class LiveCost:
-    """Of one world. Steps have their 50th and 99th percentiles, without a visitor and with one: medians of
-    the turns. `ratios` are those of the 99th percentiles in each turn, with over without, in rising order."""
+    """Cost of one world. Step times are 50th and 99th percentiles without and with a visitor, medians over
+    the turns. `ratios` has the ratio of the 99th percentiles, with over without, of each turn, ascending."""
 
     spheres: int
     triangles: int
-    packet: int  # bytes of a picture
-    pictures: float  # a second
-    latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to the first picture with it
+    packet: int  # size of a frame [bytes]
+    pictures: float  # frames per second
+    latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to the first frame that shows it
     alone_ms: tuple[float, float]
     visited_ms: tuple[float, float]
     ratios: tuple[float, ...]
 
 
 def measure(on_part: Callable[[str], object]) -> list[LiveCost]:
-    """Serve worlds of several sizes to one visitor, and look at the clock.
+    """Serve worlds of several sizes to one visitor, and measure times.
 
     Args:
-        on_part: is told what is measured next.
+        on_part: called with the name of each measurement before it starts.
     """
     return asyncio.run(_measured(on_part))
 
@@ -118,7 +118,7 @@ def _pair(numbers: np.ndarray) -> tuple[float, float]:
 
 
 def _step_times(server: LiveServer) -> tuple[float, float]:
-    """What a step took at its 50th and 99th percentile, in the last 600 steps [ms]."""
+    """50th and 99th percentile of the last 600 step times [ms]."""
     state = server.worlds.panes[0].state
     assert state is not None
     return state["step_ms"][0], state["step_ms"][1]
@@ -132,7 +132,7 @@ async def _visitor(server: LiveServer) -> AsyncIterator[_Reader]:
 
 
 class _Reader:
-    """Takes what a page would take."""
+    """Receives packets as a page does."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -167,9 +167,9 @@ class _Reader:
 
 
 async def _latency(reader: _Reader, number: int) -> float:
-    """From a grab that pulls a resting body upwards to the first picture in which it has moved [s]."""
+    """Time from a grab that pulls up a resting body to the first frame in which it has moved [s]."""
     await reader.say("reset")
-    await reader.listen(0.6 + 0.013 * (number % 7))  # anywhere between two pictures
+    await reader.listen(0.6 + 0.013 * (number % 7))  # vary the phase between two frames
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])
     await reader.listen(0.1)
     rest, start = reader.corner[2], time.perf_counter()

@@ -1,4 +1,4 @@
-"""Measurements of a running world for the page: time of a step, speed of simulated time, energies."""
+"""Measurements of a running world for the page: step time, speed relative to real time, energies."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ import numpy as np
 from taichi_soft import World
 
 STEPS = 600
-"""The last steps, whose percentiles are reported."""
+"""Number of recent steps whose percentiles are reported."""
 
 SHARE = 0.05
-"""Largest fraction of the time for energies."""
+"""Largest fraction of time for computing energies."""
 
 
 class Meters:
-    """What a world costs, and what is in it."""
+    """Step times and energies of a world."""
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._begun: list[float] = []  # when the steps since `begin` began
+        self._begun: list[float] = []  # start times of the steps since `begin`
         self._times: deque[float] = deque(maxlen=STEPS)
         self._simulated = self._since = self._factor = 0.0
         self._energies: dict[str, float] = {}
         self._energies_due = 0.0
 
     def begin(self) -> None:
-        """Start to count steps."""
+        """Start recording steps."""
         self._begun.clear()
 
     def begin_step(self) -> None:
-        """Count a step that begins now."""
+        """Record the start of a step."""
         self._begun.append(time.perf_counter())
 
     def end(self, simulated: float) -> None:
-        """Record the steps since `begin`, which simulated a time [s]."""
+        """Record the end of the steps since `begin`, which simulated a time [s]."""
         ends = [*self._begun[1:], time.perf_counter()]
         self._times.extend(end - start for start, end in zip(self._begun, ends, strict=False))
         self._simulated += simulated
 
     def values(self, now: float) -> dict[str, Any]:
-        """Return the percentiles of a step [ms], simulated over real time, and energies [J]."""
+        """Return percentiles of step times [ms], simulated over real time, and energies [J]."""
         if now >= self._energies_due:
             self._energies = self._measured_energies()
             self._energies_due = now + (time.perf_counter() - now) / SHARE

@@ -1,4 +1,4 @@
-"""Where the bodies of a world are, for a world with another law to continue from."""
+"""Transfer positions and velocities of all bodies to a world with another law."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from taichi_soft.live.controls import Controls
 
 @dataclass
 class Motion:
-    """By slot: name of the asset if a visitor added the body, else None; positions [m]; velocities [m/s]."""
+    """By slot: asset name if a visitor added the body, else None; positions [m]; velocities [m/s]."""
 
     rows: dict[int, tuple[str | None, NDArray[Any], NDArray[Any]]] = field(default_factory=dict)
 
 
 def motion_of(controls: Controls) -> Motion:
-    """Return where all bodies are."""
+    """Return positions and velocities of all bodies."""
     world = controls.world
     names = {id(asset): name for name, asset in palette_of(world).items()}
     rows = {
@@ -29,7 +29,7 @@ def motion_of(controls: Controls) -> Motion:
 
 
 def continue_from(controls: Controls, motion: Motion) -> None:
-    """Move all bodies to where they are in another world; spawn and despawn what visitors changed."""
+    """Move all bodies to their state in another world; spawn and despawn the bodies that visitors changed."""
     world = controls.world
     palette, bodies = palette_of(world), {body.index: body for body in world.bodies}
     for slot, (name, positions, velocities) in motion.rows.items():

@@ -1,7 +1,7 @@
-"""What a visitor's page is sent, as bytes: what is drawn, and where it is.
+"""Binary packets for a visitor's page: meshes, and frames with positions.
 
-A packet begins with its kind and the pane that it is for, one byte each. Numbers are little-endian. Positions
-are shares of the picture's box, of 16 bits: a box of 10 m has steps of 0.15 mm.
+A packet begins with its kind and its pane, one byte each. Numbers are little-endian. Positions are quantised
+to 16 bits within the frame's bounding box: a box of 10 m has steps of 0.15 mm.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ DRAWN, PICTURE = 1, 2
 """Kinds of packets."""
 
 STEPS = 65535
-"""Of a coordinate, from one side of the box to the other."""
+"""Quantisation steps along an edge of the bounding box."""
 
 LARGEST_BOX = np.float32(400.0)
-"""Of a picture [m]: what lies outside is drawn at its side."""
+"""Largest edge of the bounding box [m]; points outside are clamped to it."""
 
 _PICTURE = struct.Struct("<BBHIIId3f3f")
-"""Kind, pane, whether it is tinted, number, version, count of vertices, time, lowest corner, size of box."""
+"""Kind, pane, is tinted, number, version, number of vertices, time, lower corner and size of the box."""
 
 
 def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
-    """What is drawn: a header as JSON, which names the arrays that follow it."""
+    """Pack meshes: a JSON header that names the arrays after it."""
     named = {name: [str(each.dtype), list(each.shape)] for name, each in arrays.items()}
     text = json.dumps({**header, "arrays": named}).encode()
     text += b" " * (-(8 + len(text)) % 4)
@@ -41,11 +41,11 @@ def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[An
 
 
 def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArray[np.float32], Any]:
-    """Positions (n, 3) [m] as shares of their box. Returns: the shares, the lowest corner, the size [m]."""
+    """Quantise positions (n, 3) [m]. Returns: integers, lower corner and size of the bounding box [m]."""
     if len(positions) == 0:
         return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)
     low, high = positions.min(axis=0), positions.max(axis=0)
-    if float((high - low).max()) > LARGEST_BOX:  # a body flew away: the others are to be seen well
+    if float((high - low).max()) > LARGEST_BOX:  # a body flew away: keep the resolution of the others
         middle = np.median(positions, axis=0)
         positions = np.clip(positions, middle - LARGEST_BOX / 2, middle + LARGEST_BOX / 2)
         low, high = positions.min(axis=0), positions.max(axis=0)
@@ -54,12 +54,12 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """A picture's packet with the number that it has for one visitor."""
+    """Copy a frame's packet with its number for one visitor."""
     return packet[:4] + struct.pack("<I", number & 0xFFFFFFFF) + packet[8:]
 
 
 def picture_packet(pane: int, frame: Frame) -> bytes:
-    """Where everything is."""
+    """Pack a frame."""
     rows, low, size = quantised(frame.positions)
     normals = np.zeros((len(rows), 4), np.int8)
     normals[:, :3] = np.rint(frame.normals * 127.0)

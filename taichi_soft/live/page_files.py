@@ -1,4 +1,4 @@
-"""What a browser gets by plain requests: the files of the page, and answers with their headers."""
+"""HTTP responses: the files of the page, and headers."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from taichi_soft.live.three_js import fetch_three_js
 PAGE = Path(__file__).parent / "page"
 
 FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:"
-"""Pages that may show a world within them: those of notebooks on this machine. A browser asks for every page
-round it: in VS Code a vscode-webview: within a vscode-file:."""
+"""Sources that may embed a world in a frame: notebooks on this machine. A browser checks every enclosing
+page; in VS Code these are a vscode-webview: inside a vscode-file:."""
 
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """All that a page may ask for, by path: nothing else is ever read from the disk."""
+    """All files that a page can request, by path. No other file is read from disk."""
     fetch_three_js()
     found = {}
     for path in [*PAGE.iterdir(), *(PAGE / "three").iterdir()]:
@@ -31,7 +31,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 def response(status: HTTPStatus, kind: str, content: bytes, name: str | None = None) -> Response:
-    """An answer; `name` makes it a file to keep."""
+    """Make a response; `name` makes it a download."""
     headers = Headers()
     headers["Content-Type"] = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
     headers["Content-Length"] = str(len(content))

@@ -1,4 +1,4 @@
-"""One world in its own process, as the server holds it: what goes to it, and what comes from it."""
+"""The server's side of a world that runs in its own process."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Heard = Callable[["Runner", tuple[Any, ...]], None]
 
 
 class Runner:
-    """A world in another process, with a thread for each direction.
+    """A world in another process, with one thread per direction.
 
-    Neither side waits for the other: requests wait in an `Inbox`, and messages of the world are read as they
-    arrive.
+    Neither side waits for the other: requests queue in an `Inbox`, and messages of the world are read when
+    they arrive.
     """
 
     def __init__(
@@ -35,19 +35,19 @@ class Runner:
         heard: Heard,
         process: BaseProcess | None = None,
     ) -> None:
-        """Speak with a world at the other end of a connection; `process` is ended with it."""
+        """Connect to a world; `process` ends with the connection."""
         self.source, self.heard, self._loop = source, heard, loop
         self._connection, self._process = connection, process
         self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
-        self._packed = 0, 0, b""  # the newest picture
-        self.pulls: dict[int, int] = {}  # by visitor, the move of its hand that the newest picture shows
+        self._packed = 0, 0, b""  # the newest frame
+        self.pulls: dict[int, int] = {}  # by visitor: number of the hand's move that the newest frame shows
         self.is_over = False
-        self.is_lost = False  # the other end is gone
-        self.is_asked = False  # for whom the one that is shown was asked where its bodies are
-        self.is_fresh = False  # begins at its beginning, whatever was shown before it
-        self.keeps_sliders = False  # takes no values of sliders from the world before it
+        self.is_lost = False  # the connection is lost
+        self.is_asked = False  # the shown world was asked for its motion, for this one
+        self.is_fresh = False  # starts in its initial state, not in that of the shown world
+        self.keeps_sliders = False  # does not take the slider values of the shown world
         self._inbox = Inbox()
         self._changed = threading.Condition()
         for target in (self._listen, self._speak):
@@ -62,7 +62,7 @@ class Runner:
         given: Given,
         heard: Heard,
     ) -> Runner:
-        """A new process that runs `running.run`."""
+        """Start a process that runs `running.run`."""
         from taichi_soft.live.running import run
 
         folder.mkdir(parents=True, exist_ok=True)
@@ -74,11 +74,11 @@ class Runner:
         return cls(loop, mine, source, heard, process)
 
     def send(self, *message: Any, sender: int = SERVER, key: Hashable = None) -> bool:
-        """Send a request to the world soon.
+        """Queue a request to the world.
 
         Args:
-            sender: the visitor who asks.
-            key: kind of the request, as `Inbox.put` takes it.
+            sender: number of the visitor.
+            key: kind of the request, see `Inbox.put`.
         Returns: False if too many requests of this visitor wait.
         """
         with self._changed:
@@ -89,7 +89,7 @@ class Runner:
         return True
 
     def stop(self) -> None:
-        """End the process."""
+        """Ask the process to end."""
         self.is_over = True
         with self._changed:
             self._inbox.clear()
@@ -97,13 +97,13 @@ class Runner:
             self._changed.notify()
 
     def kill(self) -> None:
-        """End the process at once, also one that compiles."""
+        """Kill the process, even while it compiles."""
         self.stop()
         if self._process is not None:
             self._process.kill()
 
     def end(self) -> None:
-        """Wait until it has ended: as it ends, it writes its kernels for later starts."""
+        """Wait until the process has ended: it stores its compiled kernels at exit."""
         self.stop()
         if self._process is None:
             return
@@ -113,7 +113,7 @@ class Runner:
             self._process.join(2.0)
 
     def newest_packet(self, pane: int) -> tuple[int, int, bytes]:
-        """The newest picture, packed once for all visitors: version (0 before it), number and packet."""
+        """The newest frame, packed once for all visitors: version (0 before the first), number and packet."""
         number = 0 if self.frames is None else self.frames.newest_number
         if self.frames is not None and number != self._packed[1]:
             frame = self.frames.newest()
@@ -155,7 +155,7 @@ class Runner:
             try:
                 self.frames = FrameFile(Path(path), *sizes)
             except OSError:
-                return  # a newer one has taken its place
+                return  # a newer frame has replaced it
             self.drawn = header, arrays
             self._packed = 0, 0, b""
         elif message[0] == "frame":

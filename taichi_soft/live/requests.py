@@ -1,4 +1,4 @@
-"""Messages of a visitor's page: each is checked and becomes a request, or is refused with the reason."""
+"""Parse messages of a visitor's page into checked requests, or refuse them with a reason."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ FARTHEST = 1e5
 """Largest coordinate of a point or a direction [m]."""
 
 SAVED = ("script", "film")
-"""Files that a visitor can ask for."""
+"""Files that a visitor can request."""
 
 NEWEST = ("pause", "tint", "preset", "reset", "save", "move")
-"""Requests that replace an earlier one of the same name while it waits."""
+"""Requests that replace a waiting request of the same name."""
 
 
 def parse_request(text: str) -> dict[str, Any]:
-    """Return a message as a request: `do`, `pane`, and the values of that request.
+    """Parse a message into a request: `do`, `pane`, and the arguments of that request.
 
     Raises: OptionError for a message that is too long, is not JSON, or has an unknown or invalid request.
     """
     if len(text) > LARGEST_TEXT:
-        raise OptionError(f"a message has at most {LARGEST_TEXT} characters, got {len(text)}")
+        raise OptionError(f"a message must have at most {LARGEST_TEXT} characters, got {len(text)}")
     try:
         said = json.loads(text)
     except (ValueError, RecursionError):
-        raise OptionError("a message is JSON") from None
+        raise OptionError("a message must be JSON") from None
     if not isinstance(said, dict) or not isinstance(said.get("do"), str) or said["do"] not in _CHECKS:
-        raise OptionError(f"a message has a 'do', one of {', '.join(_CHECKS)}")
+        raise OptionError(f"a message must have a 'do', one of {', '.join(_CHECKS)}")
     pane = said.get("pane", 0)
     if pane not in (0, 1) or isinstance(pane, bool):
-        raise OptionError(f"pane is 0 or 1, got {pane!r}")
+        raise OptionError(f"pane must be 0 or 1, got {pane!r}")
     return {"do": said["do"], "pane": int(pane), **_CHECKS[said["do"]](said)}
 
 
 def merge_key(request: dict[str, Any]) -> Hashable:
-    """Return the kind of a request: a waiting one is replaced by the next of its kind. None: it is kept."""
+    """Return the kind of a request, which replaces waiting requests of its kind, or None to keep all."""
     do = request["do"]
     if do == "set":
         return do, request["name"]
@@ -57,7 +57,7 @@ def _nothing(said: dict[str, Any]) -> dict[str, Any]:
 def _number(said: dict[str, Any]) -> int:
     number = said.get("number")
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**32:
-        raise OptionError(f"number is a whole number below 2^32, got {number!r}")
+        raise OptionError(f"number must be an integer below 2^32, got {number!r}")
     return number
 
 
@@ -72,19 +72,19 @@ def _set(said: dict[str, Any]) -> dict[str, Any]:
 def _vector(said: dict[str, Any], name: str) -> list[float]:
     rows = said.get(name)
     if not isinstance(rows, list) or len(rows) != 3:
-        raise OptionError(f"{name} is three numbers, got {rows!r}")
+        raise OptionError(f"{name} must be three numbers, got {rows!r}")
     for each in rows:
         if isinstance(each, bool) or not isinstance(each, (int, float)) or each != each:
-            raise OptionError(f"{name} is three numbers, got {rows!r}")
+            raise OptionError(f"{name} must be three numbers, got {rows!r}")
         if not -FARTHEST <= each <= FARTHEST:
-            raise OptionError(f"{name} lies within {FARTHEST:g}, got {rows!r}")
+            raise OptionError(f"{name} must be within {FARTHEST:g}, got {rows!r}")
     return [float(each) for each in rows]
 
 
 def _grab(said: dict[str, Any]) -> dict[str, Any]:
     direction = _vector(said, "direction")
     if not any(direction):
-        raise OptionError("direction is not zero")
+        raise OptionError("direction must not be zero")
     return {"origin": _vector(said, "origin"), "direction": direction}
 
 
@@ -94,21 +94,21 @@ def _move(said: dict[str, Any]) -> dict[str, Any]:
 
 def _flag(said: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(said.get("is_paused"), bool):
-        raise OptionError("is_paused is true or false")
+        raise OptionError("is_paused must be true or false")
     return {"is_paused": said["is_paused"]}
 
 
 def _name(said: dict[str, Any]) -> dict[str, Any]:
     name = said.get("name")
     if not isinstance(name, str) or not 0 < len(name) <= 100:
-        raise OptionError(f"name is a word, got {name!r}")
+        raise OptionError(f"name must be a word, got {name!r}")
     return {"name": name}
 
 
 def _one_of(said: dict[str, Any], name: str, choices: Any) -> str | None:
     value = said.get(name)
     if value is not None and (not isinstance(value, str) or value not in choices):
-        raise OptionError(f"{name} is one of {', '.join(choices)}, or null, got {value!r}")
+        raise OptionError(f"{name} must be one of {', '.join(choices)}, or null, got {value!r}")
     return value
 
 
@@ -136,7 +136,7 @@ def _preset(said: dict[str, Any]) -> dict[str, Any]:
 def _save(said: dict[str, Any]) -> dict[str, Any]:
     what = _one_of(said, "what", SAVED)
     if what is None:
-        raise OptionError(f"what is one of {', '.join(SAVED)}")
+        raise OptionError(f"what must be one of {', '.join(SAVED)}")
     return {"what": what}
 
 
@@ -160,4 +160,4 @@ _CHECKS = {
     "save": _save,
     "upload": _upload,
 }
-"""Checks of the values of each request."""
+"""Argument checks of each request."""

@@ -1,4 +1,4 @@
-"""The process of a live world: makes the scene, reports how far that is, and steps it."""
+"""Entry point of a live world's process: make the scene, report progress, and step it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from taichi_soft.live.simulation import Simulation, words_of
 
 
 def run(connection: Connection, folder: str, source: SceneSource, given: Given) -> None:
-    """Make a scene and step it until "stop" arrives. Errors are reported, never raised.
+    """Make a scene and step it until "stop" arrives. Errors are reported, not raised.
 
-    Messages in are `(sender, key, (name, *arguments))`: the arguments of `Simulation.do_NAME`. Messages out:
-    ("progress", step, kernels), ("ready", state), ("drawn", ...), ("frame", number, pulls), ("state", state),
-    ("said", words), ("refused", visitor, words), ("saved", ...), ("filmed", ...), ("motion", ...),
-    ("failed", words).
+    Incoming messages are `(sender, key, (name, *arguments))`, the arguments of `Simulation.do_NAME`.
+    Outgoing: ("progress", step, kernels), ("ready", state), ("drawn", ...), ("frame", number, pulls),
+    ("state", state), ("said", words), ("refused", visitor, words), ("saved", ...), ("filmed", ...),
+    ("motion", ...), ("failed", words).
     """
     from taichi_soft import init
 

@@ -1,4 +1,4 @@
-"""What a visitor takes home: the script of the scene with a snapshot, and a film of the last seconds."""
+"""Downloads for visitors: the scene's script with a snapshot, and a film of the last seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from taichi_soft.live.scene import Scene, SceneSource
 _RESTORED = """\
 
 world.restore(Path(__file__).with_name("scene.snapshot").read_bytes())
-assert world.state_hash() == {hash!r}, "another version of taichi-soft, or another script"
+assert world.state_hash() == {hash!r}, "this needs the same version of taichi-soft and the unchanged script"
 
 DT, SUBSTEPS = {dt!r}, {substeps!r}  # of a step: seconds, and parts
 
@@ -33,15 +33,15 @@ if __name__ == "__main__":
 
 
 def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int) -> str:
-    """A script that makes the world as it is now, by the snapshot beside it, and then a second of steps."""
-    title = f'"""The scene {source.title!r} of `taichi-soft live`, as it was saved."""\n\n'
+    """Write a script that restores the current world from a snapshot next to it, and steps it for 1 s."""
+    title = f'"""The scene {source.title!r}, saved by `taichi-soft live`."""\n\n'
     script = source.script(is_alone=True)
     act = "\n        if act is not None:\n            act(world)" if source.kind == "demo" else ""
     return title + script + _RESTORED.format(hash=state_hash, dt=dt, substeps=substeps, act=act)
 
 
 def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
-    """A .zip of the script, its snapshot, and the files that it names."""
+    """Pack the script, its snapshot and the files that it names into a .zip."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("scene.py", script)
@@ -54,28 +54,28 @@ def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
 FILM_FPS = 30.0
 
 LOW_PRIORITY = 10
-"""Nice value of the process that draws a film, of 0 to 19."""
+"""Nice value of the process that renders a film, from 0 to 19."""
 
 KEPT = 10.0
 """Length of a film [s]."""
 
 MOST_KEPT = 2**28
-"""Largest size of the frames that are kept for a film [bytes]: with many vertices it is shorter."""
+"""Largest size of the frames stored for a film [bytes]; with many vertices the film is shorter."""
 
 
 class Recent:
-    """The frames of the last seconds, for a film."""
+    """Frames of the last seconds, for a film."""
 
     def __init__(self) -> None:
         self._rows: deque[tuple[float, int, Any]] = deque()
         self._due = 0.0
 
     def add(self, now: float, moment: float, drawn: Drawn, frame: Frame) -> None:
-        """Keep a frame of the world's time `moment` [s], unless the last one is too recent."""
+        """Store a frame of world time `moment` [s], unless the last one is too recent."""
         if now < self._due:
             return
         if self._rows and moment < self._rows[-1][0]:
-            self._rows.clear()  # the world went back to an earlier state
+            self._rows.clear()  # the world was restored to an earlier state
         self._rows.append((moment, drawn.version, (frame.positions.copy(), frame.poses.copy())))
         most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(drawn.vertex_count, 1)))
         while len(self._rows) > most:
@@ -92,12 +92,12 @@ class Recent:
 
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:
-    """Write what `film_file` draws: pictures of one version of the meshes, and the meshes."""
+    """Write the input of `film_file`: meshes, and frames of their current version."""
     header, arrays = drawn.described()
     own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]
     if not own:
-        raise StateError("nothing has moved yet: there is no film")
-    # Each picture of the film shows the last one that was kept before its moment.
+        raise StateError("nothing has moved yet, so there is no film: let the world run first")
+    # Each film frame shows the last stored frame before its time.
     moments = np.array([moment for moment, _ in own])
     shown = np.arange(moments[0], moments[-1] + 1e-9, 1.0 / FILM_FPS)
     frames = [own[i][1] for i in np.searchsorted(moments, shown + 1e-9, side="right") - 1]
@@ -116,16 +116,16 @@ def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Dra
 
 
 def film_file(frames: str, path: str, fps: float, size: tuple[int, int] = (854, 480)) -> int:
-    """Draw a film of what `film_frames` wrote, at low priority: a live world is stepped meanwhile.
+    """Render a film from the output of `film_frames`, at low priority, because a live world runs meanwhile.
 
-    Lowers the priority of the whole process, which must have nothing else to do.
-    Returns: number of its frames.
+    This lowers the priority of the whole process, so call it in a dedicated process.
+    Returns: number of frames.
     """
     from taichi_soft import init
     from taichi_soft.render import Camera, Renderer, Surface, VideoWriter
     from taichi_soft.render.props import SLATE
 
-    with suppress(AttributeError):  # Windows has none
+    with suppress(AttributeError):  # Windows has no nice values
         os.nice(LOW_PRIORITY)
     init("cpu")
     with np.load(frames) as held:

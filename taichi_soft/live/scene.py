@@ -1,4 +1,4 @@
-"""What a live world is made from, as a script: that which is saved is that which ran."""
+"""Source of a live world, as a script. A saved scene is the script that ran."""
 
 from __future__ import annotations
 
@@ -50,12 +50,13 @@ if not world.is_built:
 
 @dataclass(frozen=True)
 class SceneSource:
-    """What a live world is made from.
+    """Source of a live world.
 
     Args:
-        kind: "playground", bodies on a floor; a "demo" by its `name`; or a "script" by its path.
-        law, strain, flips: of all bodies, None as the scene has them.
-        meshes: paths of surfaces that visitors brought.
+        kind: "playground" for bodies on a floor, "demo" or "script".
+        name: name of the demo, or path of the script.
+        law, strain, flips: of all bodies; None keeps the scene's.
+        meshes: paths of surfaces that visitors uploaded.
     """
 
     kind: Literal["playground", "demo", "script"] = "playground"
@@ -67,19 +68,19 @@ class SceneSource:
 
     @property
     def title(self) -> str:
-        """What visitors are told."""
+        """Title for visitors."""
         return Path(self.name).stem if self.name else "playground"
 
     @property
     def folder(self) -> Path:
-        """Where its script finds the files that it names."""
+        """Folder of the files that the script names."""
         return Path(self.name).resolve().parent if self.kind == "script" else Path.cwd()
 
     def script(self, *, is_alone: bool = False) -> str:
         """The script that makes `world`.
 
         Args:
-            is_alone: whether the files that it names lie in `files` beside it, as where it was saved.
+            is_alone: True if the files that it names are in `files` next to it, as in a saved scene.
         """
         files = ", ".join(self._place(each, is_alone) for each in self.meshes)
         options = [
@@ -96,30 +97,30 @@ class SceneSource:
 
     @staticmethod
     def _place(path: str, is_alone: bool) -> str:
-        """A file, as the script names it."""
+        """Expression for a file's path in the script."""
         return f'Path(__file__).parent / "files" / {Path(path).name!r}' if is_alone else repr(path)
 
 
 @dataclass
 class Scene:
-    """A built world, and how it is stepped and seen."""
+    """A built world with its step, camera and colours."""
 
     title: str
     world: World
     step: FixedStep
     camera: Camera
-    act: Callable[[World], object] | None = None  # before every fixed step
-    colors: dict[int, Color] = field(default_factory=dict)  # of bodies, by the number of their slot
+    act: Callable[[World], object] | None = None  # called before every fixed step
+    colors: dict[int, Color] = field(default_factory=dict)  # colours of bodies, by slot
 
     def color(self, slot: int) -> Color:
-        """Of a body, sRGB from 0 to 1."""
+        """Colour of the body in a slot, sRGB from 0 to 1."""
         return self.colors.get(slot, PALETTE[slot % len(PALETTE)])
 
 
 def made_scene(source: SceneSource) -> Scene:
-    """Run its script.
+    """Run a scene's script.
 
-    Raises: whatever the script raises; OptionError for one that makes no world, or several.
+    Raises: every error of the script; OptionError for a script that makes no world or several worlds.
     """
     path = source.folder / "taichi_soft_live_scene.py"
     names: dict[str, Any] = {"__name__": "taichi_soft_live_scene", "__file__": str(path)}
@@ -131,7 +132,7 @@ def made_scene(source: SceneSource) -> Scene:
         exec(compile(source.script(), path.name, "exec"), names)
     except ValueError as error:
         if "values to unpack" in str(error) and source.kind == "script":
-            raise OptionError(f"{source.name} must make one World, in a variable of its own") from None
+            raise OptionError(f"{source.name} must have exactly one global World") from None
         raise
     stage, world = names.get("stage"), names["world"]
     if isinstance(stage, Stage):
@@ -145,7 +146,7 @@ def _camera_at_start(stage: Stage) -> Camera:
 
 
 def framing_of(world: World) -> Camera:
-    """All bodies, and the floor below them."""
+    """Camera that sees all bodies, and the floor below them."""
     rows = np.concatenate([body.positions() for body in world.bodies] or [np.zeros((1, 3), np.float32)])
     low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)
     if world.settings.floor is not None:
@@ -156,16 +157,16 @@ def framing_of(world: World) -> Camera:
 
 
 def adapter_of(scene: Scene, substeps: int, before: Callable[[World], object]) -> EngineAdapter:
-    """For a scene, with so many substeps; `before` is called before each step."""
-    # Where a world is slower than real time, it shows slow motion rather than few pictures.
+    """Make the adapter of a scene; `before` is called before each step."""
+    # A world slower than real time runs in slow motion rather than at a low frame rate.
     step = FixedStep(dt=scene.step.dt, substeps=substeps, max_steps=2)
     return EngineAdapter(scene.world, step, before_step=before)
 
 
 def found_source(text: str | None) -> SceneSource:
-    """What a command line names: nothing, a demo, a script, or a mesh.
+    """Parse the argument of the command line: nothing, a demo, a script, or a mesh.
 
-    Raises: OptionError for what is none of them.
+    Raises: OptionError for any other text.
     """
     from taichi_soft.render.demos import demo_names
 
@@ -179,5 +180,5 @@ def found_source(text: str | None) -> SceneSource:
     if path.is_file():
         return SceneSource(meshes=(str(path.resolve()),))
     raise OptionError(
-        f"{text!r} is no demo, no script and no mesh: name a file, or {choose_one_of(demo_names(), text)}"
+        f"{text!r} is not a demo, a script or a mesh: name a file, or {choose_one_of(demo_names(), text)}"
     )

@@ -1,4 +1,4 @@
-"""Serves a live world to browsers: the page's files, a connection for each visitor, and its requests."""
+"""Serve a live world to browsers: files of the page, a connection per visitor, and requests."""
 
 from __future__ import annotations
 
@@ -39,23 +39,23 @@ from taichi_soft.live.worlds import Worlds
 from taichi_soft.meshing.surfaces import Up, assumed_up
 
 MOST_MESHES = 8
-"""Meshes that visitors add: a world has room for bodies of each."""
+"""Largest number of meshes that visitors can add; a world reserves capacity for bodies of each."""
 
 BETWEEN_CHOICES = 1.0
-"""Shortest time between two choices of a law [s]: each starts a process."""
+"""Shortest time between two choices of a law [s], because each starts a process."""
 
 VIEWED = ("grab", "move", "release", "tint")
-"""Requests that visitors can make in a world that another program steps."""
+"""Requests that work in a world stepped by another program."""
 
 
 class LiveServer:
-    """Runs worlds in processes of their own, and lets visitors see and touch them.
+    """Runs worlds in separate processes, and serves them to visitors.
 
     Args:
-        source: what the first world is made from.
-        host: address to bind to; any but a loopback one asks for a token.
-        port: 0 takes a free one.
-        attached: to a world that another program steps, in place of one made from `source`.
+        source: source of the first world.
+        host: address to bind to; any address except loopback requires a token.
+        port: port; 0 takes a free one.
+        attached: connection to a world that another program steps, instead of one made from `source`.
     """
 
     def __init__(
@@ -77,12 +77,12 @@ class LiveServer:
         self._count = 0
         self._files = page_files()
         self._last_choice = -math.inf
-        self.is_reading = False  # a visitor's file
+        self.is_reading = False  # a visitor's file is being read
         self._tasks: set[asyncio.Task[None]] = set()
         self._listening: Listening | None = None
 
     async def open(self) -> str:
-        """Begin to serve. Returns: the address to open. Raises: OSError where the port is taken."""
+        """Start to serve. Returns: the address to open. Raises: OSError if the port is in use."""
         self._listening = await serve(
             self._visit,
             self.host,
@@ -106,7 +106,7 @@ class LiveServer:
     async def close(self) -> None:
         """End all processes and connections."""
         for runner in self.worlds.coming.values():
-            runner.kill()  # it reads no messages while it compiles
+            runner.kill()  # a compiling process reads no messages
         for runner in self.worlds.panes.values():
             runner.stop()
         self.downloads.stop()
@@ -119,13 +119,13 @@ class LiveServer:
         self._folder.cleanup()
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        """Run a task beside the others."""
+        """Run a task in the background."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     def _on_file(self, runner: Runner, message: tuple[Any, ...]) -> None:
-        """Handle what a world has written for a visitor."""
+        """Handle a file that a world has written for a visitor."""
         if message[0] == "saved":
             _, visitor, script, snapshot = message
             self._start(self.downloads.offer_scene(visitor, script, snapshot, runner.source))
@@ -133,7 +133,7 @@ class LiveServer:
             self._start(self.downloads.draw_film(message[1], message[2]))
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Return a file of the page, or None for a request that becomes a connection."""
+        """Return a file of the page, or None for a request that opens a WebSocket."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         host, origin = ", ".join(hosts), ", ".join(origins) if origins else None
         refused = self.guard.refusal(request.path, host, origin)
@@ -142,7 +142,7 @@ class LiveServer:
         path = urlsplit(request.path).path
         if path == "/live":
             if len(self.audience.visitors) >= MOST_VISITORS:
-                words = f"{MOST_VISITORS} visitors are here already"
+                words = f"{MOST_VISITORS} visitors are connected already: try again later"
                 return response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", words.encode())
             return None
         if path in self._files:
@@ -150,10 +150,10 @@ class LiveServer:
         made = self.downloads.file(path.removeprefix("/made/"))
         if made is not None:
             return response(HTTPStatus.OK, made[0], made[2], name=made[1])
-        return response(HTTPStatus.NOT_FOUND, "text/plain", b"there is no such page")
+        return response(HTTPStatus.NOT_FOUND, "text/plain", b"no such page")
 
     async def _visit(self, connection: ServerConnection) -> None:
-        """Serve one page from its first message to its last."""
+        """Serve one page until it disconnects."""
         self._count += 1
         visitor = self.audience.visitors[self._count] = Visitor(self._count, connection)
         speaking = asyncio.create_task(self.audience.speak(visitor, self.worlds))
@@ -173,7 +173,7 @@ class LiveServer:
             speaking.cancel()
 
     def _offered(self) -> dict[str, Any]:
-        """Return what a page needs for its controls."""
+        """Return the data for the page's controls."""
         sliders = [asdict(each) for each in SLIDERS.values()]
         laws = [{"name": law.name, "about": law.summary} for law in LAWS.values()]
         offered = {
@@ -194,13 +194,13 @@ class LiveServer:
             visitor.put(refused=str(error))
 
     def obey(self, visitor: Visitor, request: dict[str, Any]) -> None:
-        """Do what a request asks for. Raises: OptionError for a request that is refused."""
+        """Execute a request. Raises: OptionError for a request that is refused."""
         do, runner = request["do"], self.worlds.panes.get(request["pane"])
         if do == "seen":
             visitor.seen = max(visitor.seen, min(request["number"], visitor.sent))
             visitor.wake.set()
         elif self.attached is not None and do not in VIEWED:
-            raise OptionError("the program that steps this world decides that")
+            raise OptionError("another program steps this world: change it there")
         elif do == "upload":
             visitor.upload = request["name"], request["up"]
         elif do in ("choose", "compare"):
@@ -208,7 +208,7 @@ class LiveServer:
         elif do == "alone":
             self.worlds.show_one()
         elif runner is None:
-            missing = "there is no second world", "there is no world yet: it is being prepared"
+            missing = "there is no second world", "the world is still being prepared: wait until it is shown"
             raise OptionError(missing[request["pane"] == 0])
         elif do in ("grab", "move", "release"):
             values = [request[key] for key in ("origin", "direction", "point", "number") if key in request]
@@ -231,7 +231,7 @@ class LiveServer:
         self.downloads.film_asked(runner)
 
     def _choose(self, do: str, request: dict[str, Any]) -> None:
-        """Prepare a world with another law, in place of the one that is shown or beside it."""
+        """Prepare a world with another law, to replace the shown one or to stand next to it."""
         self._require_patience()
         chosen = {key: request[key] for key in ("law", "strain", "flips")}
         pane = 1 if do == "compare" else request["pane"]
@@ -240,7 +240,7 @@ class LiveServer:
     def _require_patience(self) -> None:
         now = asyncio.get_running_loop().time()
         if now - self._last_choice < BETWEEN_CHOICES:
-            raise OptionError("a world was begun just now: wait a second")
+            raise OptionError("another world was started less than a second ago: try again")
         self._last_choice = now
 
     def _obey_for_all(self, visitor: Visitor, request: dict[str, Any]) -> None:
@@ -259,22 +259,22 @@ class LiveServer:
     @staticmethod
     def _send(runner: Runner, visitor: Visitor, request: dict[str, Any], *message: Any) -> None:
         if not runner.send(*message, sender=visitor.number, key=merge_key(request)):
-            raise OptionError("the world is busy: too many of your requests wait")
+            raise OptionError("too many of your requests are waiting: try again later")
 
     def take_upload(self, visitor: Visitor, content: bytes) -> None:
-        """Check a visitor's mesh in another process, and then prepare a world with room for it."""
+        """Check a visitor's mesh in another process, then prepare a world with capacity for it."""
         upload, visitor.upload = visitor.upload, None
         if upload is None:
-            raise OptionError("a file came without its name")
+            raise OptionError("a file arrived without its name")
         if self.is_reading:
-            raise OptionError("another file is being read: wait until it is there")
+            raise OptionError("another file is being read: wait until it is added")
         if len(self.worlds.source(0).meshes) >= MOST_MESHES:
-            raise OptionError(f"{MOST_MESHES} meshes were added: there is no room for more")
+            raise OptionError(f"{MOST_MESHES} meshes is the limit: restart the server to add others")
         self.is_reading = True
         self._start(self._add_mesh(visitor, *upload, content))
 
     async def _add_mesh(self, visitor: Visitor, name: str, up: Up | None, content: bytes) -> None:
-        self.audience.show_activity("mesh", name, "reading it and making tetrahedra")
+        self.audience.show_activity("mesh", name, "reading the file and making tetrahedra")
         if up is None and (assumed := assumed_up(Path(name).name)):
             visitor.put(said=f"{name}: {assumed}")
         taken = {*SHAPES, *(Path(each).stem for each in self.worlds.source(0).meshes)}

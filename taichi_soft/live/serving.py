@@ -1,4 +1,4 @@
-"""The process that serves a world which another program steps."""
+"""Entry point of the process that serves a world stepped by another program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process that steps a world and writes its frames. It uses no network, and waits for nobody."""
+"""Step a live world and write its frames. This process uses no network and never waits for visitors."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ from taichi_soft.live.scene import Scene, SceneSource, adapter_of
 from taichi_soft.live.tints import Tints
 
 FRAMES = 60.0
-"""Largest number of frames a second."""
+"""Largest number of frames per second."""
 
 TOLD = 5.0
-"""Reports of numbers a second."""
+"""Reports of measurements per second."""
 
 SHARE = 0.05
-"""Largest fraction of the time for colours."""
+"""Largest fraction of time for computing colours."""
 
 MOST_HELD = 8
-"""Bodies that visitors hold at a time."""
+"""Largest number of simultaneous grabs of all visitors."""
 
 ANSWERING = 0.008
-"""Time after which no further request is begun before the next step [s]: half of a frame."""
+"""Time after which the next step comes before further requests [s]: half of a frame."""
 
 
 def words_of(error: BaseException) -> str:
-    """Return the message of an error, with its type unless it is one of ours."""
+    """Return the message of an error, with its type unless it is a TaichiSoftError."""
     text = str(error) or type(error).__name__
     return text if isinstance(error, TaichiSoftError) else f"{type(error).__name__}: {text}"
 
 
 class Simulation:
-    """One world with its visitors' hands in it."""
+    """One world with the grabs of its visitors."""
 
     def __init__(self, connection: Connection, folder: Path, scene: Scene, source: SceneSource) -> None:
         self.connection, self.folder, self.scene, self.source = connection, folder, scene, source
         self.world = scene.world
         self.controls = Controls(self.world, scene.step.dt, scene.step.substeps)
         self.adapter: EngineAdapter = adapter_of(scene, self.controls.substeps, self._before_step)
-        self.first = b""  # its state before anything moved
-        self.is_playing, self.is_moving = False, True  # until it is shown
+        self.first = b""  # initial state
+        self.is_playing, self.is_moving = False, True  # starts when it is shown
         self.hands: dict[int, Grab] = {}
         self.inbox, self.history = Inbox(), History()
         self.tints: Tints | None = None
@@ -69,11 +69,11 @@ class Simulation:
         self.frames: FrameFile
         self._due = {"frame": 0.0, "told": 0.0, "tints": 0.0}
         self._steps_seen = 0
-        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: a move that no frame shows, the step
-        self._alpha: float | None = None  # of a world that somebody else steps
+        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: unshown move, step
+        self._alpha: float | None = None  # set if another program steps the world
 
     def start(self, given: Given) -> None:
-        """Compile everything that a visitor can ask for, and send what is drawn."""
+        """Compile the kernels of all requests, and send the meshes."""
         self.world.warm_up()
         self.first = self.world.snapshot()
         self.controls.give(given)
@@ -83,7 +83,7 @@ class Simulation:
         self.connection.send(("ready", self._told()))
 
     def look(self, alpha: float) -> None:
-        """Answer requests, and show a world that another program steps."""
+        """Answer requests and write a frame of a world that another program steps."""
         self._answer()
         if self.world.step_count != self._steps_seen:
             self._steps_seen, self.is_moving = self.world.step_count, True
@@ -105,14 +105,14 @@ class Simulation:
             self.connection.poll(max(left, 0.0005) if self.is_playing else 0.02)
 
     def _answer(self) -> bool:
-        """Answer requests for a part of a frame's time. Returns: False if the server ends the world."""
+        """Answer requests for a limited time. Returns: False if the server ends the world."""
         while self.connection.poll():
             sender, key, message = self.connection.recv()
             if message[0] == "stop":
                 return False
             ends = {"is_kept": message[0] == "release", "is_last": message[0] == "leave"}
             if not self.inbox.put(sender, message, key, **ends):
-                self._refuse(sender, "too many of your requests wait: this one is left out")
+                self._refuse(sender, "too many of your requests are waiting: this one is skipped")
         end = time.perf_counter() + ANSWERING
         while (now := time.perf_counter()) < end:
             taken = self.inbox.take(now)
@@ -124,13 +124,13 @@ class Simulation:
         return True
 
     def _obey(self, sender: int, message: tuple[Any, ...]) -> None:
-        """Do what one request asks for. One that fails is refused, and changes nothing."""
+        """Execute a request. A request that fails is refused and changes nothing."""
         name, *arguments = message
         try:
             getattr(self, f"do_{name}")(*arguments)
         except Exception as error:
             self._refuse(sender, words_of(error))
-        if self.drawn.is_outdated:  # counts as time of this visitor
+        if self.drawn.is_outdated:  # charged to this visitor
             self.describe()
         self.is_moving = True
 
@@ -141,8 +141,8 @@ class Simulation:
     def _undoable(self, what: str, *, is_slider: bool = False) -> Iterator[None]:
         """Record the state before a change, unless the change fails.
 
-        In a scene with code of its own, only sliders can be undone: no snapshot contains what that code
-        remembers.
+        In a scene with its own code, only sliders can be undone, because a snapshot does not contain the
+        state of that code.
         """
         has_code, now = self.scene.act is not None, time.perf_counter()
         if (has_code and not is_slider) or (is_slider and self.history.goes_on(what, now)):
@@ -159,7 +159,7 @@ class Simulation:
         self.meters.begin_step()
 
     def _advance(self, seconds: float) -> None:
-        """Let time go on. A step that fails stops the world, which says why."""
+        """Advance the world's time. If a step fails, the world stops and reports the reason."""
         before = self.world.step_count
         self.meters.begin()
         with warnings.catch_warnings(record=True) as caught:
@@ -172,15 +172,14 @@ class Simulation:
         self.meters.end((self.world.step_count - before) * self.adapter.fixed_step.dt)
         self.is_moving = True  # also between two steps
         for each in caught:
-            # The page predicts by itself what is unstable: of the materials that bodies have, not of those
-            # that there is room for.
+            # The page predicts stability from the materials of existing bodies, not of reserved ones.
             if not issubclass(each.category, UnstableStepWarning):
                 self.connection.send(("said", str(each.message)))
 
-    # What a visitor may wish for.
+    # Requests of visitors.
 
     def do_set(self, name: str, value: float) -> None:
-        """Give a slider a value."""
+        """Set a slider."""
         before = self.controls.substeps
         with self._undoable(SLIDERS[name].label, is_slider=True):
             self.controls.set_value(name, value)
@@ -189,18 +188,18 @@ class Simulation:
         self._due["told"] = 0.0
 
     def do_preset(self, name: str | None) -> None:
-        """Give the sliders of the material the values of a preset; None: those of the scene."""
+        """Set the material sliders to a preset; None restores the scene's values."""
         with self._undoable("Preset", is_slider=True):
             self.controls.give(self.controls.sliders.with_preset(name))
         self._renew_adapter()
 
     def do_give(self, given: Given) -> None:
-        """Give all sliders the values that they have in another world."""
+        """Set all sliders to the values of another world."""
         self.controls.give(given)
         self._renew_adapter()
 
     def do_undo(self) -> None:
-        """Go back to the state before the last change."""
+        """Restore the state before the last change."""
         before = self.history.pop()
         if before is None:
             raise StateError("there is no change to undo")
@@ -216,19 +215,19 @@ class Simulation:
         self._renew_adapter()
 
     def do_settle(self, is_first: bool) -> None:
-        """Start with an empty history; the first world of a pane resets to its present state."""
+        """Clear the history. The first world of a pane will reset to its current state."""
         self.history.clear()
         if is_first and not self.controls.given:
             self.first = self.world.snapshot()
 
     def do_pause(self, is_paused: bool) -> None:
-        """Stop, or go on."""
+        """Pause or continue."""
         self.is_playing = not is_paused
-        self._pulls.clear()  # a pause is no latency
+        self._pulls.clear()  # a pause must not count as latency
         self._due["told"] = 0.0
 
     def do_step(self) -> None:
-        """Make one step of a world that stands."""
+        """Make one step of a paused world."""
         self.is_playing = False
         self.meters.begin()
         self.adapter.step()
@@ -236,9 +235,9 @@ class Simulation:
         self._due["told"] = 0.0
 
     def do_reset(self) -> None:
-        """Go back to the beginning, and all sliders to the scene's values or those of the preset.
+        """Restore the initial state, and set all sliders to the scene's values or the preset's.
 
-        The server makes a scene with code of its own anew: no snapshot contains what that code remembers.
+        The server restarts scenes with their own code, because a snapshot does not contain its state.
         """
         with self._undoable("Reset"):
             self.do_release_all()
@@ -249,16 +248,16 @@ class Simulation:
         self._renew_adapter()
 
     def do_grab(self, visitor: int, origin: list[float], direction: list[float]) -> None:
-        """Take hold of what a ray hits first."""
+        """Grab the first body that a ray hits."""
         self.do_release(visitor)
         if len(self.hands) >= MOST_HELD:
-            raise TaichiSoftError(f"{MOST_HELD} bodies are held already: let one go")
+            raise TaichiSoftError(f"{MOST_HELD} bodies are grabbed already: release one first")
         grab = self.world.grab(origin, direction)
         if grab is not None:
             self.hands[visitor] = grab
 
     def do_move(self, visitor: int, point: list[float], number: int = 0) -> None:
-        """Pull what a visitor holds to a point; `number` tells its moves apart."""
+        """Move a visitor's grab to a point; `number` identifies the move."""
         grab = self.hands.get(visitor)
         if grab is not None and grab.is_held:
             grab.move(point)
@@ -266,25 +265,25 @@ class Simulation:
                 self._pulls.setdefault(visitor, (number, self.world.step_count))
 
     def do_release(self, visitor: int) -> None:
-        """Let go of what a visitor holds, with the speed that it has."""
+        """Release a visitor's grab; the body keeps its velocity."""
         grab = self.hands.pop(visitor, None)
         if grab is not None and grab.is_held:
             grab.release()
 
     def do_leave(self, visitor: int) -> None:
-        """Let go of what a visitor held who has left."""
+        """Release the grab of a visitor who has left."""
         self.do_release(visitor)
 
     def do_release_all(self) -> None:
-        """Let all go."""
+        """Release all grabs."""
         for visitor in list(self.hands):
             self.do_release(visitor)
 
     def do_spawn(self, name: str) -> None:
-        """Add a body of the palette above the middle of what is seen."""
+        """Add a body of the palette above the centre of the view."""
         palette = palette_of(self.world)
         if name not in palette:
-            raise TaichiSoftError(f"there is no {name!r} here: choose one of {', '.join(palette) or 'none'}")
+            raise TaichiSoftError(f"unknown shape {name!r}: choose one of {', '.join(palette) or 'none'}")
         target = np.array(self.scene.camera.target)
         number = len(self.world.bodies)
         spot = target + 0.35 * np.array([np.cos(2.4 * number), np.sin(2.4 * number), 0.0])
@@ -295,37 +294,37 @@ class Simulation:
             self.controls.greet(body)
 
     def do_despawn(self) -> None:
-        """Remove the body that a visitor added last."""
+        """Remove the last body that a visitor added."""
         added = {id(asset) for asset in palette_of(self.world).values()}
         mine = [body for body in self.world.bodies if id(body.asset) in added]
         if not mine:
-            raise TaichiSoftError("no body was added that could be removed")
+            raise TaichiSoftError("no visitor's body is left to remove")
         with self._undoable("Remove last"):
             self.world.despawn(mine[-1])
 
     def do_tint(self, quantity: str | None) -> None:
-        """Colour bodies by a quantity, or by themselves."""
+        """Colour bodies by a quantity; None restores their own colours."""
         self.tints = None if quantity is None else Tints(quantity)
         if self.tints is not None:
             self.tints.renew(self.world)
 
     def do_motion(self) -> None:
-        """Send where all bodies are, for a world with another law to continue from."""
+        """Send the motion of all bodies to a world with another law."""
         self.connection.send(("motion", motion_of(self.controls)))
 
     def do_take_motion(self, motion: Motion) -> None:
-        """Continue from where the bodies of another world are."""
+        """Continue from the motion of another world."""
         continue_from(self.controls, motion)
 
     def do_save(self, number: int) -> None:
-        """Write the script that makes this world, and a snapshot."""
+        """Write the script of this world, and a snapshot."""
         snapshot = self.world.snapshot()
         step = self.adapter.fixed_step
         text = saved_script(self.source, self.world.state_hash(), step.dt, self.controls.substeps)
         self.connection.send(("saved", number, text, snapshot))
 
     def do_film(self, number: int) -> None:
-        """Write the last seconds as frames to draw."""
+        """Write the frames of the last seconds for a film."""
         path = self.folder / f"film{number}.npz"
         try:
             film_frames(path, self.recent.rows(), self.drawn, self.scene)
@@ -334,10 +333,10 @@ class Simulation:
             raise
         self.connection.send(("filmed", number, str(path)))
 
-    # What is told.
+    # Output.
 
     def draw(self, now: float, is_moving: bool) -> None:
-        """Write a frame if it is time for one and something moved."""
+        """Write a frame if one is due and something moved."""
         if self.drawn.is_outdated:
             self.describe()
             is_moving = True
@@ -361,13 +360,13 @@ class Simulation:
         self.is_moving = False
 
     def describe(self) -> None:
-        """Tell what is drawn."""
+        """Send the meshes."""
         self.versions += 1
         self.drawn = Drawn(self.scene, self.versions)
         path = self.folder / f"frames{self.versions}"
         self.frames = FrameFile(path, self.drawn.vertex_count, len(self.drawn.colliders), is_new=True)
         self.recent.clear()
-        with suppress(OSError):  # one that is still read where files in use cannot be removed
+        with suppress(OSError):  # on Windows a file in use cannot be removed
             (self.folder / f"frames{self.versions - 2}").unlink(missing_ok=True)
         if self.tints is not None:
             self.tints.renew(self.world)

@@ -1,4 +1,4 @@
-"""Stress of all bodies as a table and a plot, for notebooks."""
+"""Table and plot of the stress in all bodies, for notebooks."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from taichi_soft import StateError, TetMesh, World
 from taichi_soft.render.colors import ColorScale
 
 BARS = 24
-"""Of a plot."""
+"""Number of bars of the plot."""
 
-WIDTH, HEIGHT = 480, 120  # of a plot [pixels]
+WIDTH, HEIGHT = 480, 120  # size of the plot [pixels]
 
 
 @dataclass(frozen=True)
 class StressRow:
     """Stress of one body."""
 
-    body: int  # its slot
-    law: str  # its force law
-    largest: float  # von Mises stress of a tetrahedron [Pa]
-    mean: float  # von Mises stress, by volume [Pa]
-    strain: float  # largest of a tetrahedron
-    flipped: int  # tetrahedra that are inside out
+    body: int  # slot of the body
+    law: str  # force law
+    largest: float  # largest von Mises stress of a tetrahedron [Pa]
+    mean: float  # mean von Mises stress, weighted by volume [Pa]
+    strain: float  # largest strain of a tetrahedron
+    flipped: int  # number of inverted tetrahedra
 
 
 @dataclass(frozen=True)
 class StressTable:
-    """Made by `stress_table`. A notebook shows it as a table, with volume over stress as bars beneath it."""
+    """Result of `stress_table`. Notebooks show a table, and a histogram of volume over stress below it."""
 
-    rows: tuple[StressRow, ...]  # one for each body
-    edges: NDArray[np.float64]  # of the bars [Pa], (BARS + 1,)
-    volumes: NDArray[np.float64]  # of the material within each [m^3], (BARS,)
+    rows: tuple[StressRow, ...]  # one per body
+    edges: NDArray[np.float64]  # edges of the bars [Pa], (BARS + 1,)
+    volumes: NDArray[np.float64]  # volume of material in each bar [m^3], (BARS,)
 
     def _repr_html_(self) -> str:
-        names = "body", "law", "largest", "mean", "strain", "inside out"
+        names = "body", "law", "largest", "mean", "strain", "inverted"
         heads = "".join(f"<th>{name}</th>" for name in names)
         lines = "".join(
             f"<tr><td>{row.body}</td><td>{row.law}</td><td>{_pascals(row.largest)}</td>"
@@ -57,7 +57,7 @@ class StressTable:
             place = f'x="{i * wide:.1f}" y="{HEIGHT - tall:.1f}" width="{wide - 1:.1f}" height="{tall:.1f}"'
             bars.append(f'<rect {place} fill="rgb({color[0]},{color[1]},{color[2]})"/>')
         low, top = scale.ticks()
-        label = f"Volume of material over its stress, from {low} to {top}"
+        label = f"Histogram of material volume over stress, from {low} to {top}"
         head = f'<svg width="{WIDTH}" height="{HEIGHT + 20}" role="img" aria-label="{label}">'
         foot = f'<text x="0" y="{HEIGHT + 15}">{low}</text>'
         foot += f'<text x="{WIDTH}" y="{HEIGHT + 15}" text-anchor="end">{top}, von Mises</text>'
@@ -65,17 +65,17 @@ class StressTable:
 
 
 def stress_table(world: World) -> StressTable:
-    """Stress of all bodies of tetrahedra, as they are now.
+    """Compute the current stress of all tetrahedral bodies.
 
     Args:
-        world: built, with at least one body of tetrahedra.
-    Raises: StateError for a world that is not built, or has no such body.
+        world: a built world with at least one tetrahedral body.
+    Raises: StateError for a world that is not built or has no tetrahedral body.
     """
     if not world.is_built:
-        raise StateError("the world is not built: call world.build() before its stress is asked for")
+        raise StateError("the world is not built: call world.build() before stress_table(world)")
     bodies = [body for body in world.bodies if isinstance(body.mesh, TetMesh)]
     if not bodies:
-        raise StateError("no body of this world has tetrahedra, which alone have a stress")
+        raise StateError("no body of this world has tetrahedra: only tetrahedra have stress")
     rows, stresses, volumes = [], [], []
     for body in bodies:
         stress, volume = body.tet_stress(), np.abs(body.volumes())

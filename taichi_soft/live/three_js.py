@@ -1,6 +1,6 @@
-"""three.js, which draws in the browser (MIT licence): a wheel brings it, a checkout fetches it.
+"""Fetch three.js (MIT licence), which renders in the browser. Wheels include it; checkouts fetch it.
 
-Needs nothing but Python: `hatch_build.py` runs it while a wheel is built.
+This module needs only the standard library, because `hatch_build.py` runs it while a wheel is built.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 VERSION = "0.187.0"
 ADDRESS = f"https://registry.npmjs.org/three/-/three-{VERSION}.tgz"
 SHA512 = "Qiu7R+Cmh8CstZsY1uJOSWnVlfo7ZtNLV7mF8Jltk3LB3AtDu9cRZlcnRKkAk8Y4z6KKw35z7Y7Urd7jWY8etA=="
-"""Of the archive, as the registry tells it."""
+"""SHA-512 of the archive, as the registry reports it."""
 
 FOLDER = Path(__file__).parent / "page" / "three"
 
@@ -25,13 +25,13 @@ FILES = (
     "build/three.module.js",
     "examples/jsm/controls/OrbitControls.js",
 )
-"""Of the archive, what a page asks for."""
+"""Files of the archive that the page requests."""
 
 
 def fetch_three_js(folder: Path = FOLDER) -> None:
-    """Have its files in a folder; nothing happens where they are.
+    """Fetch the files into a folder, unless they exist.
 
-    Raises: OSError where the registry cannot be reached, or sends something else.
+    Raises: OSError if the registry cannot be reached or sends another file.
     """
     if all((folder / Path(name).name).is_file() for name in FILES):
         return
@@ -39,7 +39,7 @@ def fetch_three_js(folder: Path = FOLDER) -> None:
         archive = answer.read()
     found = base64.b64encode(hashlib.sha512(archive).digest()).decode()
     if found != SHA512:
-        raise OSError(f"{ADDRESS} has sha512 {found}, and not {SHA512}")
+        raise OSError(f"{ADDRESS} has sha512 {found}, expected {SHA512}")
     folder.mkdir(parents=True, exist_ok=True)
     with tarfile.open(fileobj=io.BytesIO(archive)) as packed:
         for name in FILES:

@@ -1,4 +1,4 @@
-"""Colours of bodies by what goes on in them."""
+"""Colour bodies by a physical quantity."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Quantity:
-    """What can be shown: its name, its unit and the values of a body's vertices."""
+    """A quantity to show: name, unit and function for the values at a body's vertices."""
 
     name: str
     unit: str
@@ -45,11 +45,11 @@ QUANTITIES = {
         Quantity("flips", "", _flips),
     )
 }
-"""By name."""
+"""Quantities by name."""
 
 
 class Tints:
-    """Values of all vertices as places on a scale from 0 to 255, and that scale."""
+    """Values of all vertices on a scale from 0 to 255, and that scale."""
 
     def __init__(self, quantity: str) -> None:
         self.quantity = QUANTITIES[quantity]
@@ -57,7 +57,7 @@ class Tints:
         self.rows = np.zeros(0, np.uint8)
 
     def renew(self, world: World) -> None:
-        """Look at all bodies. The scale grows with what is found, and shrinks where that is much less."""
+        """Update the values. The scale grows to the largest value, and shrinks if all are much smaller."""
         found = [self._values(body) for body in world.bodies]
         values = np.concatenate(found) if found else np.zeros(0)
         if self.quantity.name != "flips" and len(values):
@@ -69,17 +69,17 @@ class Tints:
     def _values(self, body: Body) -> Floats:
         try:
             return np.nan_to_num(self.quantity.values(body), posinf=0.0)
-        except MeshError:  # it has no tetrahedra
+        except MeshError:  # a body without tetrahedra
             return np.zeros(body.vertex_count)
 
     @property
     def scale(self) -> dict[str, Any]:
-        """For a page."""
+        """Scale for the page."""
         return {"quantity": self.quantity.name, "unit": self.quantity.unit, "high": self.high}
 
 
 def _round_up(value: float) -> float:
-    """The next of 1, 2, 5, 10, ..."""
+    """Round up to the next of 1, 2, 5, 10, ..."""
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** math.floor(math.log10(value))

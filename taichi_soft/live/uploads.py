@@ -1,4 +1,4 @@
-"""Mesh files that visitors bring: small, of a known kind, and looked at where they can break nothing."""
+"""Check mesh files that visitors upload, in a separate process."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from taichi_soft.meshing.surface import Surface
 from taichi_soft.meshing.surfaces import UP, Up
 
 KINDS = (".glb", ".obj", ".ply", ".stl", ".off")
-"""Files of one piece. A .gltf names others, which a visitor could choose."""
+"""Self-contained formats. A .gltf could name other files on the server."""
 
 MOST_SECONDS = 60.0
-"""That making tetrahedra of a visitor's file may take."""
+"""Time limit for making tetrahedra from a visitor's file [s]."""
 
 MOST_TRIANGLES = 200_000
 
@@ -28,20 +28,22 @@ MOST_TRIANGLES = 200_000
 def require_mesh(
     folder: Path, name: str, content: bytes, taken: Collection[str] = (), up: Up | None = None
 ) -> Path:
-    """Keep a visitor's file in a new folder, once it is known to make a body.
+    """Store a visitor's file in a new folder if it can be made into a body.
 
     Args:
-        folder: is made, for this file alone.
-        name: as the visitor calls it: what is no letter, digit, - or _ is left out, folders too.
-        taken: names that others have, by which bodies are told apart: a number is put behind one of these.
-        up: axis that points up in it. If that is not the usual one of its format, it is kept as .glb.
-    Raises: OptionError for a file that is too large or of another kind; MeshError for one that makes no body.
+        folder: folder to create for this file.
+        name: the visitor's file name. Folders, and characters except letters, digits, - and _ are removed.
+        taken: names in use; a number is appended to a name that is taken.
+        up: axis that points up in the file. If it is not the default of the format, the file is stored as
+            .glb.
+    Raises: OptionError for a file that is too large or of another format; MeshError for one that cannot be
+        made into a body.
     """
     suffix = Path(name).suffix.lower()
     if suffix not in KINDS:
-        raise OptionError(f"{name!r} is none of {', '.join(KINDS)}")
+        raise OptionError(f"{name!r} has the wrong format: use {', '.join(KINDS)}")
     if not 0 < len(content) <= LARGEST_UPLOAD:
-        raise OptionError(f"{name!r} has {len(content):,} bytes: from 1 to {LARGEST_UPLOAD:,} are taken")
+        raise OptionError(f"{name!r} has {len(content):,} bytes: from 1 to {LARGEST_UPLOAD:,} are accepted")
     own = re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] or "mesh"
     stem = next(each for each in chain([own], (f"{own[:36]}{i}" for i in count(2))) if each not in taken)
     folder.mkdir(parents=True)
@@ -55,20 +57,20 @@ def require_mesh(
     try:
         words = mine.recv() if mine.poll(MOST_SECONDS) else f"it took longer than {MOST_SECONDS:g} s"
     except EOFError:
-        words = "reading it broke down"
+        words = "the process that read it crashed"
     process.kill()
     process.join()
     if words:
         shutil.rmtree(folder, ignore_errors=True)
-        raise MeshError(f"{name!r} makes no body: {words}")
+        raise MeshError(f"{name!r} cannot be made into a body: {words}")
     turned = path.with_suffix(".glb")
     return turned if turned.is_file() else path
 
 
 def _look_at(path: str, up: Up | None, connection: Connection) -> None:
-    """Make a body of it, and write it as .glb if another axis points up than the usual one of its format.
+    """Make a body from a file. If its upward axis is not the default of the format, write it as .glb.
 
-    Sends: "" or what is wrong.
+    Sends "" or the reason of the failure.
     """
     from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.live.choices import VISITOR
@@ -77,7 +79,7 @@ def _look_at(path: str, up: Up | None, connection: Connection) -> None:
         asset = SoftBodyAsset.from_surface(Path(path), VISITOR, up=up)
         triangles = sum(len(skin.surface.triangles) for skin in asset.skins)
         if triangles > MOST_TRIANGLES:
-            connection.send(f"it has {triangles:,} triangles, and {MOST_TRIANGLES:,} are taken")
+            connection.send(f"it has {triangles:,} triangles: use at most {MOST_TRIANGLES:,}")
         elif max(asset.mesh.bounds[1] - asset.mesh.bounds[0]) > 20.0:
             connection.send("it is larger than 20 m: scale it to metres")
         else:
@@ -89,7 +91,7 @@ def _look_at(path: str, up: Up | None, connection: Connection) -> None:
 
 
 def _write_glb(surfaces: tuple[Surface, ...], path: Path) -> None:
-    import trimesh  # half a second that a server need not wait for
+    import trimesh  # imported here because it is slow
 
     scene = trimesh.Scene()
     for number, each in enumerate(surfaces):

@@ -1,4 +1,4 @@
-"""A world that a notebook or a script steps, live in a browser."""
+"""Show a world that a notebook or a script steps live in a browser."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from taichi_soft.render.colors import Color
 
 
 class View:
-    """A window into a world that goes on being stepped here. Made by `view`.
+    """A live view of a world that this program steps. Returned by `view`.
 
-    A notebook shows it where it is the last thing of a cell. `address` opens it anywhere.
+    A notebook shows it as the last expression of a cell. Any browser on this machine can open `address`.
     """
 
     def __init__(self, world: World, colors: Mapping[Body, Color], height: int) -> None:
-        """Made by `view`."""
+        """Use `view` instead."""
         self._world, self._height = world, height
         self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-view-", ignore_cleanup_errors=True)
         key = secrets.token_bytes(16)
@@ -43,7 +43,7 @@ class View:
             command = [sys.executable, "-m", "taichi_soft.live.serving", place]
             path = os.pathsep.join(each for each in sys.path if each)
             environment = {**os.environ, VIEW_KEY: key.hex(), "PYTHONPATH": path}
-            # A group of its own: what interrupts a notebook's cell does not end it.
+            # A separate process group: interrupting a notebook's cell does not end the server.
             group: dict[str, Any] = {"start_new_session": True}
             if sys.platform == "win32":
                 group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -55,7 +55,7 @@ class View:
         self.address = self._server.stdout.readline().strip()
         if not self.address:
             self._end()
-            raise StateError("the server of this view could not begin to serve: see what it said")
+            raise StateError("the server of this view could not start: see its output above")
         slots = {body.index: color for body, color in colors.items()}
         scene = Scene("a world", world, FixedStep(), framing_of(world), None, slots)
         self._simulation = Simulation(self._connection, Path(self._folder.name), scene, SceneSource())
@@ -64,23 +64,23 @@ class View:
         self.update()
 
     def update(self, alpha: float = 1.0) -> None:
-        """Show the world as it is now, and let visitors' hands act: call it once a frame, between steps.
+        """Show the current state and apply visitors' grabs. Call this once per frame, between steps.
 
-        Pictures are at most 60 a second, however often it is called.
+        It sends at most 60 frames per second, at any call rate.
         Args:
-            alpha: how far the picture is from the previous step (0) to the last one (1).
-        Raises: StateError once closed.
+            alpha: interpolation between the previous step (0) and the last one (1).
+        Raises: StateError after `close`.
         """
         if not self._end.alive:
-            raise StateError("this view was closed: make another")
+            raise StateError("this view is closed: call view(world) again")
         try:
             self._simulation.look(alpha)
         except (EOFError, OSError) as error:
             self.close()
-            raise StateError("the server of this view has ended: make another") from error
+            raise StateError("the server of this view has ended: call view(world) again") from error
 
     def close(self) -> None:
-        """End it, and let go of what visitors hold."""
+        """Close the view and release all visitors' grabs."""
         try:
             self._simulation.do_release_all()
         finally:
@@ -93,7 +93,7 @@ class View:
         self.close()
 
     def _repr_html_(self) -> str:
-        """For notebooks."""
+        """HTML for notebooks."""
         source = escape(self.address, quote=True)
         style = f"width: 100%; height: {self._height}px; border: 1px solid #8a97a5"
         return f'<iframe src="{source}" style="{style}" title="a live world of taichi-soft"></iframe>'
@@ -109,41 +109,41 @@ def view(
             world.step(1 / 60)
             window.update()
 
-    It is served by a process of its own, to this machine only. Visitors turn it, colour it by stress, and
-    pull bodies about.
+    A separate process serves it, to this machine only. Visitors can turn the view, colour bodies by stress
+    and pull them.
     Args:
-        world: built, or an adapter of it.
-        colors: of bodies, sRGB from 0 to 1.
-        height: in a notebook [pixels].
-    Raises: StateError for a world that is not built; OptionError for what is none, and for odd colours or
-        heights; MissingExtraError without the extra `live`.
+        world: a built world, or its adapter.
+        colors: colours of bodies, sRGB from 0 to 1.
+        height: height in a notebook [pixels].
+    Raises: StateError for a world that is not built; OptionError for another argument; MissingExtraError
+        without the extra `live`.
     """
     require_extra("live", "a live world needs")
     found = world.world if isinstance(world, EngineAdapter) else world
     if not isinstance(found, World):
         raise OptionError(f"world must be a World or an EngineAdapter, got {world!r}")
     if not found.is_built:
-        raise StateError("the world is not built: call world.build() before it is viewed")
+        raise StateError("the world is not built: call world.build() before view(world)")
     return View(found, _checked({} if colors is None else colors), as_count(height, "height"))
 
 
 def _checked(colors: Mapping[Body, Color]) -> dict[Body, Color]:
     if not isinstance(colors, Mapping) or not all(isinstance(body, Body) for body in colors):
-        raise OptionError(f"colors is a mapping from bodies to their colours, got {colors!r}")
+        raise OptionError(f"colors must be a mapping from bodies to their colours, got {colors!r}")
     for color in colors.values():
         as_color(color, "a color")
     return dict(colors)
 
 
 def _accepted(listener: Listener, server: subprocess.Popen[str]) -> Any:
-    """The connection that a server makes. Raises: StateError where it ends before."""
+    """Wait for the server's connection. Raises: StateError if the server ends first."""
     found: list[Any] = []
     waiting = threading.Thread(target=lambda: found.append(listener.accept()), daemon=True)
     waiting.start()
     while waiting.is_alive():
         waiting.join(0.1)
         if server.poll() is not None:
-            raise StateError(f"the server of this view ended with code {server.returncode}: see what it said")
+            raise StateError(f"the server of this view ended with code {server.returncode}: see its output")
     return found[0]
 
 

@@ -1,4 +1,4 @@
-"""The worlds that are shown and prepared, each in a process of its own."""
+"""Worlds that are shown or being prepared, each in its own process."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from taichi_soft.live.pane import Runner
 from taichi_soft.live.scene import SceneSource
 
 MOST_BREAKDOWNS = 2
-"""Failures of a world within a minute; after further ones it is not restarted."""
+"""Largest number of failures per minute after which a world is restarted."""
 
 USUAL_KERNELS = 70
-"""About the number of kernels that a world compiles."""
+"""Approximate number of kernels that a world compiles."""
 
 _log = logging.getLogger("taichi_soft")
 
@@ -31,10 +31,10 @@ class Worlds:
     """One world, or two side by side, and those that will replace them.
 
     Args:
-        source: of the first world.
-        folder: for what processes share.
-        audience: is told what goes on.
-        on_file: gets the messages "saved" and "filmed".
+        source: source of the first world.
+        folder: folder for files that processes share.
+        audience: receives status messages.
+        on_file: called with the messages "saved" and "filmed".
         is_attached: True if another program steps the world.
     """
 
@@ -43,12 +43,12 @@ class Worlds:
     ) -> None:
         self._source, self._folder, self._audience = source, folder, audience
         self._on_file, self._is_attached = on_file, is_attached
-        self.panes: dict[int, Runner] = {}  # that are shown
-        self.coming: dict[int, Runner] = {}  # that are prepared, by pane
+        self.panes: dict[int, Runner] = {}  # shown worlds
+        self.coming: dict[int, Runner] = {}  # worlds being prepared, by pane
         self.paused = False
-        self.tint: str | None = None  # the quantity that bodies are coloured by
+        self.tint: str | None = None  # quantity that colours the bodies
         self._count = 0
-        self._failures: list[float] = []  # times [s]
+        self._failures: list[float] = []  # times of failures [s]
 
     def attach(self, connection: Connection) -> None:
         """Show a world that another program steps."""
@@ -58,11 +58,11 @@ class Worlds:
     def begin(
         self, pane: int, source: SceneSource, *, is_fresh: bool = False, given: Given | None = None
     ) -> None:
-        """Prepare a world. The one that is shown goes on until the new one is ready.
+        """Prepare a world. The shown one continues until the new one is ready.
 
         Args:
-            is_fresh: start at the beginning; else where the bodies are.
-            given: values of its sliders; None: those of the world that is shown.
+            is_fresh: start in the initial state instead of the shown world's motion.
+            given: slider values; None takes those of the shown world.
         """
         if pane in self.coming:
             self.coming.pop(pane).kill()
@@ -77,19 +77,19 @@ class Worlds:
         self._audience.show_activity(f"world {pane}", described(source), "starting")
 
     def given(self) -> Given:
-        """Return the values that visitors gave to sliders, as the first world has them."""
+        """Return the slider values that visitors chose, from the first world."""
         state = self.panes[0].state if 0 in self.panes else None
         return Given() if state is None else Given(dict(state["given"]), state["preset"])
 
     def source(self, pane: int) -> SceneSource:
-        """Return what the world of a pane is made from, of a prepared one if there is one."""
+        """Return the source of a pane's world, preferably of the one being prepared."""
         for runners in (self.coming, self.panes):
             if pane in runners:
                 return runners[pane].source
         return self._source
 
     def add_mesh(self, path: str) -> None:
-        """Prepare worlds with room for a mesh."""
+        """Prepare worlds with capacity for a mesh."""
         for pane in sorted({0, *self.panes, *self.coming}):
             source = self.source(pane)
             self.begin(pane, replace(source, meshes=(*source.meshes, path)))
@@ -98,12 +98,12 @@ class Worlds:
         """End the second world."""
         for runners in (self.panes, self.coming):
             if 1 in runners:
-                runners.pop(1).kill()  # also one that compiles, and reads no messages
+                runners.pop(1).kill()  # it may be compiling and read no messages
         self._audience.end_activity("world 1")
         self._audience.wake()
 
     def reset(self, sender: int = SERVER) -> None:
-        """Reset all worlds. One with code of its own is made anew: no snapshot has what that remembers."""
+        """Reset all worlds. Worlds with their own code restart: a snapshot lacks the state of that code."""
         for pane, runner in list(self.panes.items()):
             if self.restarts(pane):
                 self.begin(pane, runner.source, is_fresh=True, given=self.given().at_reset())
@@ -111,17 +111,17 @@ class Worlds:
                 runner.send("reset", sender=sender, key="reset")
 
     def restarts(self, pane: int) -> bool:
-        """Return True if a reset of this pane makes its world anew."""
+        """True if a reset restarts the world of this pane."""
         runner = self.panes.get(pane)
         return runner is not None and bool((runner.state or {}).get("restarts"))
 
     def leave(self, visitor: int) -> None:
-        """Release what a visitor holds, and drop its waiting requests."""
+        """Release a visitor's grab, and drop its waiting requests."""
         for runner in self.panes.values():
             runner.send("leave", visitor, sender=visitor)
 
     def runners(self) -> list[Runner]:
-        """Return all worlds."""
+        """Return all worlds, shown or being prepared."""
         return [*self.panes.values(), *self.coming.values()]
 
     def _heard_of(self, pane: int) -> Callable[[Runner, tuple[Any, ...]], None]:
@@ -163,7 +163,7 @@ class Worlds:
         self._audience.show_activity(f"world {pane}", described(runner.source), step, kernels, about)
 
     def _switch(self, pane: int, runner: Runner) -> None:
-        """Show a world that is ready, with the bodies where they are in the one before."""
+        """Show a world that is ready, with the motion of the one before."""
         before = self.panes.get(pane)
         goes_on = before is not None and not before.is_lost and not runner.is_fresh
         if before is not None and goes_on and before.send("motion"):
@@ -193,17 +193,17 @@ class Worlds:
         runner.send("pause", self.paused)
         self._audience.end_activity(f"world {pane}")
         names = ", ".join(Path(mesh).stem for mesh in new)
-        arrived = f": {names} falls in now, and its button adds more" if names else ""
+        arrived = f": {names} was added, and its button adds more" if names else ""
         self._audience.say(f"{described(runner.source)} is ready{arrived}")
         self._audience.wake()
 
     def _settle(self, first: Runner | None = None) -> None:
-        """Start all histories anew, so that an undo does the same in both worlds."""
+        """Clear all histories, so that an undo acts equally in both worlds."""
         for runner in self.panes.values():
             runner.send("settle", runner is first)
 
     def _fail(self, pane: int, runner: Runner, words: str) -> None:
-        """Leave out a world that could not be made; restart one that failed while it was shown."""
+        """Drop a world that failed while being prepared; restart one that failed while it was shown."""
         runner.stop()
         runner.is_lost = True
         if self.coming.get(pane) is runner:
@@ -215,7 +215,7 @@ class Worlds:
                 self._audience.set_trouble(words)
                 _log.warning("live: %s", words)
             return
-        if pane in self.coming:  # it is shown as soon as it is ready
+        if pane in self.coming:  # that one is shown as soon as it is ready
             if self.coming[pane].is_asked:
                 self._show(pane, self.coming[pane])
             return
@@ -225,10 +225,10 @@ class Worlds:
         now = asyncio.get_running_loop().time()
         self._failures = [each for each in self._failures if now - each < 60.0] + [now]
         if len(self._failures) > MOST_BREAKDOWNS:
-            self._audience.set_trouble(f"the world failed again ({words}): end the server and start it anew")
+            self._audience.set_trouble(f"the world failed again ({words}): restart the server")
             del self.panes[pane]
             return
-        self._audience.say(f"the world broke down ({words}): it is made anew")
+        self._audience.say(f"the world failed ({words}) and is restarted")
         self.begin(pane, runner.source)
 
 

@@ -1,4 +1,4 @@
-"""What a frame costs: measured, never guessed."""
+"""Measure the cost of a frame."""
 
 from taichi_soft.profiling.baseline import compile_baseline, find_compiler
 from taichi_soft.profiling.budget import measure_budget

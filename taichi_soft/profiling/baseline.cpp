@@ -1,6 +1,6 @@
 // Substeps of the virial law, of springs and of volume springs with edge damping in plain C++: one thread, array of
 // structures, no intrinsics.
-// What a careful programmer writes first; the yardstick of `taichi-soft profile --baseline`.
+// A careful straightforward implementation; the reference of `taichi-soft profile --baseline`.
 
 #include <cmath>
 
@@ -19,7 +19,7 @@ static void add_elastic_forces(int tet_count, const Vec *x, const int *vertices,
                                const float *lame, Vec *force) {
     for (int t = 0; t < tet_count; t++) {
         const int *i = vertices + 4 * t;
-        const float *a = rest_inverse + 9 * t;  // row by row
+        const float *a = rest_inverse + 9 * t;  // row-major
         const float lambda = lame[2 * t], mu = lame[2 * t + 1];
         const Vec b0 = x[i[1]] - x[i[0]], b1 = x[i[2]] - x[i[0]], b2 = x[i[3]] - x[i[0]];
         const Vec f0 = a[0] * b0 + a[3] * b1 + a[6] * b2;
@@ -74,7 +74,7 @@ static void move(int particle_count, Vec *x, Vec *v, Vec *force, const float *in
     }
 }
 
-// Thesis eq. 5.4: how much each tetrahedron has grown pulls its six edges together.
+// Thesis eq. 5.4: the volume change of each tetrahedron pulls its six edges together.
 static void add_volume_pressure(int tet_count, const Vec *x, const int *vertices, const float *inv_volume6,
                                 const float *modulus, const int *edges, float *pressure) {
     for (int t = 0; t < tet_count; t++) {

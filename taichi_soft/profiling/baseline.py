@@ -1,4 +1,4 @@
-"""The C++ yardstick: compiled where it is run, on the same arrays in the same order as the Taichi kernels."""
+"""The C++ reference: compiled on this machine, on the same arrays in the same order as the Taichi kernels."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ RELAXED = (
     *("-fno-math-errno", "-fno-signed-zeros", "-fno-trapping-math", "-fassociative-math"),
     *("-freciprocal-math", "-ffinite-math-only"),
 )
-"""What -ffast-math stands for, by name: given whole, GCC also makes the thread that loads the library take
-subnormal numbers for zero from then on. Scipy's trees then end the process."""
+"""The flags that -ffast-math implies. With -ffast-math itself, GCC also turns on flush-to-zero in the thread
+that loads the library, and scipy's trees then crash the process."""
 
 FLAGS = ("-O3", "-march=native", *RELAXED, "-shared", "-fPIC", "-std=c++17")
-"""As Taichi compiles its own kernels: for this processor, with relaxed rounding."""
+"""The options with which Taichi compiles its kernels: for this processor, with relaxed rounding."""
 
 NO_FLOOR = -1.0e9
 
 
 def find_compiler() -> str | None:
-    """The C++ compiler there is: $CXX, g++, clang++ or c++."""
+    """Find a C++ compiler: $CXX, g++, clang++ or c++."""
     for name in (os.environ.get("CXX", ""), "g++", "clang++", "c++"):
         if name and shutil.which(name):
             return name
@@ -40,11 +40,11 @@ def find_compiler() -> str | None:
 
 
 def compile_baseline() -> ctypes.CDLL:
-    """The yardstick as a loaded library. Raises: DeviceError without a C++ compiler or if it fails."""
+    """Compile and load the reference. Raises: DeviceError without a C++ compiler or if it fails."""
     compiler = find_compiler()
     if compiler is None:
         raise DeviceError("no C++ compiler found: install g++ or clang++, or name one in CXX")
-    # A library that is loaded needs its file no more, but Windows does not let go of it.
+    # A loaded library no longer needs its file, but Windows keeps it locked.
     with tempfile.TemporaryDirectory(prefix="taichi-soft-", ignore_cleanup_errors=True) as folder:
         library = Path(folder) / "baseline.so"
         command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
@@ -59,7 +59,7 @@ class Baseline:
     """One body in plain C++."""
 
     def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
-        """Take over the arrays of `body`, in kernel order: of the virial law, springs or volume springs."""
+        """Copy the arrays of `body` in kernel order: virial law, springs or volume springs."""
         self._run = library.run_substeps if body.bonds is None else library.run_spring_substeps
         self._run.restype = None
         self.positions = body.rest_position.astype(np.float32)
@@ -72,7 +72,7 @@ class Baseline:
             (1.0 / body.mass).astype(np.float32),
             *elements,
         ]
-        # Springs that do not look at tetrahedra get none.
+        # Plain springs use no tetrahedra.
         looks_at_tets = body.bonds is None or body.bonds.expansion_modulus is not None
         tets = len(body.tet_vertices) if looks_at_tets else 0
         self._counts = [ctypes.c_int(n) for n in (len(body.mass), tets, len(body.edge_vertices))]

@@ -1,4 +1,4 @@
-"""How many bodies fit a frame."""
+"""Estimate how many bodies fit a frame."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ FRAME_RATES = (60, 120)  # [Hz]
 
 @dataclass(frozen=True)
 class Budget:
-    """Spheres that can be stepped and read within a whole frame of one rate, at its 99th percentile."""
+    """Number of spheres that can be stepped and read within a frame, at its 99th percentile."""
 
     rate: int  # [Hz]
     substeps: int
     bodies: int
     tets: int
-    measured: Phases  # what this is scaled from
+    measured: Phases  # measurement that this is scaled from
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each rate and scale to a full frame, what a frame costs by itself included.
+    """Measure `count` spheres at each rate and scale to a full frame, including the fixed cost of a frame.
 
-    The substep is limited by the material, so a frame twice as short needs half the substeps.
+    The material limits the substep, so a frame of half the length needs half as many substeps.
     """
     found = []
     for rate in FRAME_RATES:

@@ -1,4 +1,4 @@
-"""Time per element and substep against plain C++, in turns within one run."""
+"""Compare the time per element and substep with plain C++, in turns within one run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.world import World
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
-"""Cells of a box that has about as many tetrahedra. The largest first: the others take over its kernels."""
+"""Cells of a box by approximate number of tetrahedra. Largest first, because the others reuse its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
 SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
@@ -27,12 +27,12 @@ PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
 
 
 NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")
-"""What `baseline.cpp` has."""
+"""Laws that `baseline.cpp` implements."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One body on one thread, with Taichi and in C++."""
+    """One body on one thread, in Taichi and in C++."""
 
     law: LawName
     element: str  # "tetrahedron" or "edge"

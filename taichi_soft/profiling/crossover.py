@@ -1,4 +1,4 @@
-"""From which size on the threads should share one body rather than leave it to one of them."""
+"""Find the body size from which several threads should share one body."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Crossover:
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:
-    """Time one body of growing size, in turns."""
+    """Time bodies of increasing size under both schedules, in turns."""
     found = []
     for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))

@@ -1,4 +1,4 @@
-"""From how many tetrahedra on a GPU is faster than the CPU's threads. A process has one device."""
+"""Find the number of tetrahedra from which a GPU is faster than the CPU's threads, one process per device."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.profiling.spread import Spread, time_calls
 
 SUBSTEPS = 8
 SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
-"""Bodies, and cells along each side of a box; 0: a sphere of 1,280 tetrahedra. None touches another."""
+"""Bodies, and cells along each side of a box; 0 is a sphere of 1,280 tetrahedra. The bodies do not touch."""
 
 STEPS_PER_TURN = 3
 
@@ -33,7 +33,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class DeviceGain:
-    """A frame of 8 substeps [ms], all positions read after it, on the CPU and on a GPU."""
+    """Time of a frame of 8 substeps and reading all positions [ms], on the CPU and on a GPU."""
 
     bodies: int
     tets: int
@@ -43,14 +43,14 @@ class DeviceGain:
 
 
 class Frames:
-    """Of one scene after the other, in this process."""
+    """Times frames of several scenes in this process."""
 
     def __init__(self) -> None:
         self._scene: tuple[int, int] | None = None
         self._frame: Callable[[], None] = lambda: None
 
     def time(self, bodies: int, cells: int) -> float:
-        """What a frame takes [s], the median of a few."""
+        """Median time of a few frames [s]."""
         if self._scene != (bodies, cells):
             self._scene, self._frame = (bodies, cells), _make_frame(bodies, cells)
         return Spread.of(time_calls(self._frame, STEPS_PER_TURN)).median
@@ -80,8 +80,8 @@ def measure_devices(
 
     Args:
         gpu: "cuda", "vulkan" or "metal".
-        cores: to which the threads are bound, or none.
-    Raises: DeviceError if a process fails, as where there is no such GPU.
+        cores: cores to bind the threads to; may be empty.
+    Raises: DeviceError if a process fails, for example without such a GPU.
     """
     with _start("cpu", threads, cores) as one, _start(gpu, None, None) as other:
         return [_compare(one, other, *scene, repeats) for scene in scenes]

@@ -1,4 +1,4 @@
-"""What a game's features cost: unused, used, and in a heap. In turns with bodies that do without."""
+"""Measure the cost of a game's features: unused, used, and in a heap, in turns with bodies without them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
-DT, SUBSTEPS = 1 / 60, 12  # 720 steps a second, the thesis's for its sphere
+DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as in the thesis for its sphere
 COUNT = 16
-SPACING = 3.0  # [m], of spheres of radius 1
+SPACING = 3.0  # between spheres of radius 1 [m]
 SETTLING = 180
-"""Frames in which a heap comes down, or bodies on the floor fall asleep."""
+"""Frames until a heap has settled or bodies on the floor sleep."""
 
 UNUSED_FACTOR = 25
-"""Times as many pairs of steps for what is not used: a median of 300 tells 1.01 from 1.03, of 30 not."""
+"""Factor on the pairs of steps for unused features: only the median of about 300 separates 1.01 from 1.03."""
 
 
 @dataclass(frozen=True)
@@ -44,23 +44,23 @@ class FeatureCost:
 
 @dataclass(frozen=True)
 class Heap:
-    """A fixed step of a heap of spheres, all threads."""
+    """A fixed step of a heap of spheres on all threads."""
 
     mesh: str
     bodies: int
     tets: int
     threads: int
-    step: Spread  # [ms], one after the other
-    real_time: float  # simulated time over what it took, median
-    ratio: Spread  # over as many free bodies, pair by pair
-    stolen: float | None  # part of the processors' time that the host gave to other machines, in those steps
+    step: Spread  # [ms], consecutive steps
+    real_time: float  # median of simulated time over step time
+    ratio: Spread  # over a step of as many free bodies, pair by pair
+    stolen: float | None  # fraction of CPU time that the host gave to other machines
 
 
 @dataclass(frozen=True)
 class Moments:
-    """What happens at one moment, not in every step."""
+    """Cost of something that does not happen in every step."""
 
-    name: str  # with the unit
+    name: str  # including the unit
     cost: Spread
 
 
@@ -75,7 +75,7 @@ def _spheres(
     damping_ratio: float = 0.0,
     **options: Any,
 ) -> World:
-    """Spheres side by side, their middles at `height` [m]."""
+    """Make spheres side by side, with centres at `height` [m]."""
     world = World(**options)
     material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
@@ -92,7 +92,7 @@ def _stepping(world: World) -> Callable[[], object]:
 
 def measure_features(repeats: int = 41) -> list[FeatureCost]:
     """Measure every feature."""
-    high = 1.0e5  # [m]: nothing is near, however long they fall
+    high = 1.0e5  # [m]: they stay far from everything while they fall
     free = _stepping(_spheres(high, floor=None))
     found = []
 
@@ -156,7 +156,7 @@ def _settled(world: World, frames: int = SETTLING) -> World:
 
 
 def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
-    """Measure heaps of the thesis's own sphere, where the source of the package is at hand, and of ours."""
+    """Measure heaps of our sphere, and of the thesis's sphere if the package's sources are available."""
     meshes = {"regular": _mesh()}
     if (ASSETS / "sphere.npz").exists():
         meshes = {"thesis": load_mesh(ASSETS / "sphere.npz"), **meshes}
@@ -164,8 +164,8 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 
 
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
-    """Drop 32 spheres into a pit, and time them when they lie there: alone, as a game has one world, and then
-    in turns with as many free ones, which take the processor's caches from them."""
+    """Drop 32 spheres into a pit and time them at rest: first alone, as in a game with one world, and then in
+    turns with as many free spheres, which evict them from the CPU's caches."""
     world = World(collider_room=8, soft_contact=True, sleep_speed=0.0)
     free = World(floor=None)
     for side in (-1, 1):
@@ -187,7 +187,7 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
 
 
 def measure_moments(repeats: int = 61) -> list[Moments]:
-    """What a snapshot takes, and what a frame takes in which a body comes or goes."""
+    """Measure a snapshot, and frames in which a body is spawned or despawned."""
     big = World(floor=None)
     big.add_body(box((1.0, 1.0, 1.0), (10, 10, 10)), preset("thesis_sphere"), law="virial")
     big.build()

@@ -1,4 +1,4 @@
-"""What implicit Euler gains: over leapfrog for the CMPM (thesis 4.2) and for a stiff bar, and over scipy."""
+"""Measure the gain of implicit Euler: over leapfrog for CMPM (thesis 4.2) and a stiff bar, and over scipy."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.world import World
 
 GROWTH = 100
-"""How much longer a step the thesis takes: from about 1e-4 s to 1e-2 s."""
+"""Growth of the step in the thesis: from about 1e-4 s to 1e-2 s."""
 
 CMPM_MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""So stiff that leapfrog needs steps of about 1e-4 s. Without damping this law gains energy at any step."""
+"""Leapfrog needs steps of about 1e-4 s for this stiffness. Undamped, this law gains energy at any step."""
 
 BAR_CELLS = (20, 10, 5)  # 5,000 tetrahedra
 BAR_MATERIAL = Material(young=1.0e6, poisson=0.3, density=1000.0, damping=20.0, damping_ratio=0.0)
@@ -28,16 +28,16 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ImplicitGain:
-    """Time to simulate one second, both ways in turns."""
+    """Time to simulate one second with two methods, in turns."""
 
     name: str
     step: float  # of implicit Euler [s]
-    other_step: float  # of what it is compared with [s]
+    other_step: float  # of the other method [s]
     implicit: Spread  # [ms per simulated second]
     other: Spread
     gain: Spread  # other over implicit, pair by pair
-    deviation: float | None  # of positions over the body's size; None where the systems differ
-    is_sound: bool  # whether the body went through it whole
+    deviation: float | None  # of positions over the body's size; None if the systems differ
+    is_sound: bool  # True if the body stayed valid
 
 
 def measure_implicit(repeats: int = 5) -> list[ImplicitGain]:
@@ -76,7 +76,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
 
 
 def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
-    """What the gradients of tetrahedra cost, which the thesis did without (section 6.5)."""
+    """Measure the bar, with gradients of tetrahedra, which the thesis does not use (section 6.5)."""
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}
@@ -108,7 +108,7 @@ def _bar_against_scipy(repeats: int) -> ImplicitGain:
     world.build()
     native = SparseBody(mesh, BAR_MATERIAL)
     bent = mesh.vertices.copy()
-    bent[:, 2] += 0.1 * np.sin(2.0 * bent[:, 0])  # so that there is something to solve
+    bent[:, 2] += 0.1 * np.sin(2.0 * bent[:, 0])  # gives the solver a nonzero right-hand side
     body.set_motion(bent, np.zeros_like(bent))
     native.positions[:] = bent
     ours, theirs = partial(world.step, FRAME), partial(native.step, FRAME, TOLERANCE)

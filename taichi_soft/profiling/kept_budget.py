@@ -1,4 +1,4 @@
-"""Whether a budget of milliseconds is kept: by bodies that take twice as long as they may."""
+"""Measure whether a time budget is kept by bodies that take twice as long without it."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ from taichi_soft.world.world import World
 DT = 1 / 60
 CELLS = (10, 7, 5)
 ROWS = 5
-"""Of as many bodies each."""
+"""Rows of bodies."""
 
 SPACING = 1.6
-"""Of bodies of a metre at most [m]: they do not touch each other, see docs/speed.md."""
+"""Distance between bodies of at most 1 m [m]; they do not touch, see docs/speed.md."""
 
 SETTLING = 60
-"""Frames in which they come down."""
+"""Frames until the bodies have landed."""
 
 SHARE = 0.5
-"""The budget, of the median step without one."""
+"""Budget as a fraction of the median step without a budget."""
 
 EYE = (-8.0, 0.0, 2.0)  # [m]
 
 IN_TURN = 10
-"""Steps of which the first and the median fit a budget that is met."""
+"""A budget counts as met when the first and the median of this many steps fit it."""
 
 
 @dataclass(frozen=True)
 class KeptBudget:
     """Steps of the same bodies, without a budget or with one."""
 
-    budget: float  # [ms]; the steps without one are held against it, too
-    is_kept: bool  # whether there was a budget to keep
-    is_fixed: bool  # whether levels were those of such a run's end, from the beginning
+    budget: float  # [ms]; also the reference for the run without a budget
+    is_kept: bool  # True if the run had a budget
+    is_fixed: bool  # True if the levels were fixed to those at the end of a run with a budget
     step: Spread  # [ms]: `World.step`
-    work: Spread  # [ms]: what the processors worked on it, without waiting for other programs
-    settled: Spread  # [ms]: the same, from when the budget was met, or of all steps
-    frame: Spread  # [ms]: `EngineAdapter.step`, with what deciding takes and changes of level
-    late: float  # part of all steps that took longer than the budget
-    late_settled: float  # the same, from when the budget was met, or of all steps
-    met_after: int | None  # steps; None where it was never met
-    deciding: Spread | None  # [ms]: all of a frame but its step, in frames without a change
-    changing: Spread | None  # [ms]: the same, in frames with changes; None where there were none
+    work: Spread  # [ms]: CPU time of a step, without waiting for other programs
+    settled: Spread  # [ms]: steps after the budget was met, or all steps
+    frame: Spread  # [ms]: `EngineAdapter.step`, including decisions and changes of level
+    late: float  # fraction of steps longer than the budget
+    late_settled: float  # the same after the budget was met, or of all steps
+    met_after: int | None  # steps until the budget was met; None if it was never met
+    deciding: Spread | None  # [ms]: frame without its step, in frames without a change
+    changing: Spread | None  # [ms]: the same in frames with changes; None without such frames
     frames_with_changes: int
-    skipped: float  # part of all steps of all bodies that they stood still in
-    levels: dict[int, int]  # bodies at each level, in the end
-    levels_in_order: tuple[int, ...]  # of each body
-    tets: int  # in the end
-    frozen: int  # bodies that went non-finite
-    stolen: float | None  # part of the processors' time that the host gave to other machines
+    skipped: float  # fraction of skipped steps over all bodies
+    levels: dict[int, int]  # number of bodies by level at the end
+    levels_in_order: tuple[int, ...]  # level of each body
+    tets: int  # at the end
+    frozen: int  # bodies that became non-finite
+    stolen: float | None  # fraction of CPU time that the host gave to other machines
 
 
 def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
-    """Measure bodies without a budget, and the same with half of what their median step took. Then again
-    without one, at the levels that they had in the end: what then is longer than the median is the machine.
+    """Measure bodies without a budget, and with a budget of half their median step. Then measure them without
+    a budget at the final levels: longer steps in that run are noise of the machine.
 
-    One after the other, as a game has one world. Nobody sleeps, or there would be nothing to save.
+    The runs are consecutive, because a game has one world. Sleep is off, so that there is work to reduce.
     """
     kinds = _kinds()
     levels = (0,) * ROWS**2
@@ -79,7 +79,7 @@ def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
 
 
 def _kinds() -> list[SoftBodyAsset]:
-    """Balls, rings and capsules, of three levels of detail each."""
+    """Make balls, rings and capsules, with three levels of detail each."""
     material = Material(2e5, 0.4, 1000.0)
     surfaces = (
         trimesh.creation.icosphere(subdivisions=3, radius=0.4),
@@ -90,7 +90,7 @@ def _kinds() -> list[SoftBodyAsset]:
 
 
 def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
-    """Side by side on the floor, where they were let fall, and then changed to `levels`."""
+    """Drop bodies side by side onto the floor, and then set them to `levels`."""
     world = _TimedWorld(soft_contact=True, sleep_speed=0.0)
     for kind in kinds:
         world.reserve(kind, -(-(ROWS**2) // len(kinds)))
@@ -108,39 +108,39 @@ def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
 
 
 class _TimedWorld(World):
-    """Knows what each of its steps took."""
+    """World that records the time of each step."""
 
     def __init__(self, **options: Any) -> None:
-        """As a World."""
+        """See World."""
         super().__init__(**options)
         self.took: list[float] = []  # [ms]
-        self.work: list[float] = []  # [ms]: of the processors
+        self.work: list[float] = []  # [ms]: CPU time
         self.skipped = 0
 
     def step(self, dt: float, substeps: int | None = None) -> None:
-        """As a World."""
+        """See World."""
         start, work = perf_counter(), process_time()
         super().step(dt, substeps)
         self.took.append(1e3 * (perf_counter() - start))
         self.work.append(1e3 * (process_time() - work))
 
     def skip_step(self, bodies: Sequence[Body]) -> None:
-        """As a World."""
+        """See World."""
         self.skipped += len(bodies)
         super().skip_step(bodies)
 
 
 @dataclass
 class Course:
-    """What happened in a run, step by step."""
+    """Times and levels of a run, step by step."""
 
-    steps: list[float]  # what each took [ms]
-    frames: list[float]  # the same, of whole frames
-    levels: list[tuple[int, ...]]  # of all bodies: before the first step, and after each
+    steps: list[float]  # step times [ms]
+    frames: list[float]  # frame times [ms]
+    levels: list[tuple[int, ...]]  # levels of all bodies before the first step and after each step
 
 
 def first_met(steps: list[float], limit: float) -> int | None:
-    """Steps before the first that fits with the median of `IN_TURN` from there on; None where none does."""
+    """Number of steps before the budget is met, see `IN_TURN`; None if it is never met."""
     for i in range(len(steps) - IN_TURN + 1):
         if steps[i] <= limit and np.median(steps[i : i + IN_TURN]) <= limit:
             return i
@@ -148,9 +148,9 @@ def first_met(steps: list[float], limit: float) -> int | None:
 
 
 def tell(course: Course, limit: float, **facts: Any) -> KeptBudget:
-    """What steps and frames of a run took.
+    """Summarise the steps and frames of a run.
 
-    Args: limit: the budget [ms]. facts: the rest of a KeptBudget, as it is.
+    Args: limit: the budget [ms]. facts: remaining fields of the KeptBudget.
     """
     rest = [frame - step for frame, step in zip(course.frames, course.steps, strict=True)]
     changed = [one != other for one, other in pairwise(course.levels)]

@@ -1,4 +1,4 @@
-"""What each force law costs, in turns with the thesis's."""
+"""Measure the cost of each force law, in turns with the thesis's virial law."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
 
 @dataclass(frozen=True)
 class LawCost:
-    """A law with one of the strains it takes, None where it has none to choose, and one kind of material."""
+    """Cost of a law with one strain (None if it has no choice) and one kind of material."""
 
     law: LawName
     strain: StrainName | None
     is_anisotropic: bool
-    element: str  # that it works on: "tetrahedron" or "edge"
-    cost: Spread  # of a whole substep, edge damping included [ns per element]
+    element: str  # "tetrahedron" or "edge"
+    cost: Spread  # whole substep, including edge damping [ns per element]
     ratio: Spread  # over that of "virial" with the linear strain, pair by pair
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
-    """Each law with every strain, None where it has none to choose, and once with anisotropic material."""
+    """List each law with each strain (None if it has no choice), and once with anisotropic material."""
     found: list[tuple[Law, StrainName | None, bool]] = []
     for law in laws:
         strains: list[StrainName | None] = [strain.value for strain in law.strains] or [None]
@@ -44,7 +44,7 @@ def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
 
 
 def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
-    """Measure every kind of these laws, on one body and so on one thread. Raises: OptionError for no law."""
+    """Measure every kind of these laws, on one body and thus one thread. Raises: OptionError."""
     laws = [element_model(name).law for name in names]
     usual = _falling("virial", None, MATERIAL)
     found = []

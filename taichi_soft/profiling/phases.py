@@ -1,4 +1,4 @@
-"""Where the time of a frame goes: phase by phase, and what Python adds."""
+"""Break down the time of a frame: by phase, and the overhead of Python."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPACING = 3.0  # of spheres of radius 1 [m]
-TINY_H = 1.0e-6  # [s], so that phases run by themselves move nothing
+TINY_H = 1.0e-6  # [s], so that separately run phases move nothing
 
 
 @dataclass(frozen=True)
 class Phases:
-    """One fixed step of a number of equal bodies."""
+    """One fixed step of equal bodies."""
 
     bodies: int
     tets: int
     substeps: int
     phases: dict[str, Spread]  # on one thread, all substeps of the step [ms]
     frame: Spread  # advance and read all positions, on all threads [ms]
-    read: Spread  # of it, reading all positions [ms]
-    python: Spread  # advance and read a single tetrahedron: what a frame costs before any physics [ms]
+    read: Spread  # part of `frame`: reading all positions [ms]
+    python: Spread  # advance and read a single tetrahedron: the overhead of a frame [ms]
 
 
 def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = None) -> World:
-    """A built world of equal bodies in free fall, spheres of 1,280 tetrahedra unless `mesh` is given."""
+    """Build a world of equal bodies in free fall, by default spheres of 1,280 tetrahedra."""
     mesh = mesh or sphere(radius=1.0, resolution=4)
     world = World(schedule=schedule)
     side = int(np.ceil(np.sqrt(count)))

@@ -1,4 +1,4 @@
-"""Python processes asked line by line, in turns: Taichi's device and threads are fixed per process."""
+"""Measure in separate Python processes, because Taichi's device and threads are fixed per process."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ WARM_TURNS = 2
 
 
 class Process:
-    """Answers each line with a time [s]."""
+    """A process that answers each line with a time [s]."""
 
     def __init__(self, program: str, name: str, advice: str) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
-            program: its source, which reads lines and prints a time [s] for each.
-            name: what a message calls it.
-            advice: what to try where it fails.
+            program: source code, which reads lines and prints a time [s] for each.
+            name: name for error messages.
+            advice: advice for error messages.
         """
         self._failure = f"{name} failed: {advice}"
         self._process = subprocess.Popen(
@@ -38,7 +38,7 @@ class Process:
         self._process.communicate()
 
     def ask(self, line: str) -> float:
-        """Its answer. Raises: DeviceError if the process has failed."""
+        """Send a line and return the answer. Raises: DeviceError if the process has failed."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
@@ -50,7 +50,7 @@ class Process:
 
 
 def compare_processes(one: Process, other: Process, line: str, repeats: int) -> tuple[Spread, Spread, Spread]:
-    """Ask two in turns, after some to warm up: a machine that slows down for a while slows both.
+    """Ask two processes in turns, after a warm-up. A temporary slowdown of the machine affects both.
 
     Returns: the times of each [ms], and `one` over `other`, pair by pair.
     """

@@ -1,4 +1,4 @@
-"""Profiles as tables for people."""
+"""Format profiles as tables."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from taichi_soft.profiling.spread import Spread
 
 
 def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """Title and table of each measurement there is, under the keys of `taichi-soft profile --json`."""
+    """Yield title and table of each measurement in `found`, by the keys of `taichi-soft profile --json`."""
     if "budget" in found:
         measured = found["budget"][0].measured
         size = f"{measured.bodies} spheres, {measured.tets:,} tetrahedra"
-        yield f"{size}, {measured.substeps} substeps a frame [ms]", _phase_table(measured)
+        yield f"{size}, {measured.substeps} substeps per frame [ms]", _phase_table(measured)
         yield "What fits a frame at p99", _budget_table(found["budget"])
     if "baseline" in found:
         table = _table("law", "element", "tetrahedra", "Taichi", "C++", "ratio least", "median", "most")
@@ -62,13 +62,13 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         table = _table("world", "kernel cache", "first frame", "all warm")
         for row in found["startup"]:
             table.add_row(row.world, row.cache, f"{row.first_frame:.2f}", f"{row.warm:.2f}")
-        yield "A new process until its first frame, and until nothing compiles any more [s]", table
+        yield "Start of a new process until its first frame, and until everything is compiled [s]", table
     if "features" in found:
         table = _table("a step with", "used", "least", "median", "most")
         for row in found["features"]:
             used = "yes" if row.is_used else "no"
             table.add_row(row.name, used, *_ratios(row.ratio))
-        yield "What features cost: a step over that of as many bodies that fall freely", table
+        yield "Cost of features: step time over that of as many bodies in free fall", table
     if "heap" in found:
         table = _table("mesh", "tets", "step [ms]", "x real", "of free", "stolen")
         for row in found["heap"]:
@@ -90,7 +90,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
 
 
 def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
-    """Every law: what it takes, whether it keeps energy, where it comes from, and what it costs."""
+    """Rows of all laws: parameters, energy conservation, source and cost."""
     rows = []
     for each in costs:
         law = LAWS[each.law]
@@ -111,7 +111,7 @@ def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
 
 
 def law_table(costs: list[LawCost]) -> Table:
-    """`law_rows` for people: the medians of their costs."""
+    """Table of `law_rows` with median costs."""
     table = Table()
     for name in ("law", "source", "parameters", "strain", "flips", "energy", "element", "ns"):
         table.add_column(name, no_wrap=name == "law")
@@ -165,28 +165,28 @@ def _budget_table(budgets: list[Budget]) -> Table:
 
 
 def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
-    """A column for the run without a budget, one for that with it, one for the levels of its end."""
+    """Columns: the run without a budget, with a budget, and with its final levels."""
     names = ("with a budget" if run.is_kept else "its levels" if run.is_fixed else "without" for run in runs)
     table = _table("", *names)
     for name, attribute in (
         ("step", "step"),
         ("step, once it is met", "settled"),
-        ("what processors worked on a step", "work"),
+        ("CPU time of a step", "work"),
         ("frame", "frame"),
         ("deciding, in a frame without a change", "deciding"),
-        ("deciding and changing, in others", "changing"),
+        ("deciding and changing, in other frames", "changing"),
     ):
         table.add_row(name, *(_late_cells(getattr(run, attribute)) for run in runs))
     for name, value_of in (
         ("step: p99 over p50", lambda run: f"{run.step.p99 / run.step.median:.2f}"),
         ("the same, once it is met", lambda run: f"{run.settled.p99 / run.settled.median:.2f}"),
         ("steps over the budget", lambda run: f"{run.late:.1%}"),
-        ("over it, once it is met", lambda run: f"{run.late_settled:.1%}"),
+        ("over the budget, once it is met", lambda run: f"{run.late_settled:.1%}"),
         ("met after steps", lambda run: "never" if run.met_after is None else str(run.met_after)),
         ("frames with changes", lambda run: str(run.frames_with_changes)),
-        ("steps of bodies that are skipped", lambda run: f"{run.skipped:.1%}"),
+        ("skipped steps of bodies", lambda run: f"{run.skipped:.1%}"),
         ("bodies at level", lambda run: ", ".join(f"{level}: {n}" for level, n in run.levels.items())),
-        ("tetrahedra in the end", lambda run: f"{run.tets:,}"),
+        ("tetrahedra at the end", lambda run: f"{run.tets:,}"),
         ("non-finite bodies", lambda run: str(run.frozen)),
         ("stolen", lambda run: "?" if run.stolen is None else f"{run.stolen:.0%}"),
     ):

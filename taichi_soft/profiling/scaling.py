@@ -1,4 +1,4 @@
-"""How much faster many bodies run on several threads. Taichi's thread count is fixed per process."""
+"""Measure the speed-up of many bodies on several threads. Taichi's thread count is fixed per process."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from taichi_soft.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
-"""Of a step: what this body needs at 60 Hz, and the thesis's 700 per second at 50 Hz."""
+"""Substeps per step: the number that this body needs at 60 Hz, and the thesis's 700 per second at 50 Hz."""
 
 STEPS_PER_TURN = 5
 
@@ -41,7 +41,7 @@ def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[
     """Time one thread and `threads`, in turns.
 
     Args:
-        cores: to which the latter are bound, or none.
+        cores: cores to bind the threads to; may be empty.
     Raises: DeviceError if a process fails.
     """
     with _start(1) as single, _start(threads, cores) as parallel:

@@ -1,8 +1,7 @@
-"""The same implicit steps by scipy: sparse assembly of every tetrahedron, and its conjugate gradients.
+"""The same implicit steps with scipy: sparse assembly of all tetrahedra, and conjugate gradients.
 
-Only for the virial law with the linear strain, upright or mirrored, in free fall. Written in numpy from the
-equations in `laws.stiffness` and `kernels.rigid_rotation`, not from kernels, so that agreement means
-something.
+Only for the virial law with the linear strain, normal or inverted, in free fall. Written in numpy from the
+equations in `laws.stiffness` and `kernels.rigid_rotation`, independently of the kernels.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class SparseBody:
         self._inverse = rest_inverses(mesh)
         self._gradients = np.concatenate(
             [-self._inverse.sum(axis=1, keepdims=True), self._inverse], axis=1
-        )  # of the four corners, (m, 4, 3)
+        )  # gradients at the four corners, (m, 4, 3)
         self._masses = vertex_masses(mesh, material.per_tet("density", count))
         self._damping = edge_damping(mesh, material.per_tet("damping", count))
         index = 3 * mesh.tets[:, :, None] + np.arange(3)
@@ -55,7 +54,7 @@ class SparseBody:
         self._edge_columns = np.tile(ends.reshape(-1, 6), (1, 6)).ravel()
 
     def step(self, h: float, tolerance: float) -> None:
-        """One implicit step of `h` [s]."""
+        """Make one implicit step of `h` [s]."""
         forces, stiffness = self._forces(), self._stiffness()
         damping = self._damping_matrix()
         v = self.velocities.ravel()
@@ -93,7 +92,7 @@ class SparseBody:
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._inverse)
 
     def _forces(self) -> Floats:
-        """P = sigma cof F, turned round where the tetrahedron is; f_i = -V0 P g_i."""
+        """P = sigma cof F, negated for inverted tetrahedra; f_i = -V0 P g_i."""
         F = self._deformations()
         strain = 0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3))
         lame_lambda, lame_mu = (value[:, None, None] for value in self._lame)
@@ -107,7 +106,7 @@ class SparseBody:
         return np.asarray(total)
 
     def element_stiffness(self) -> Floats:
-        """Projected matrix of every tetrahedron, (m, 12, 12) [N/m]."""
+        """Projected stiffness matrix of every tetrahedron, (m, 12, 12) [N/m]."""
         U, s, Vt = np.linalg.svd(self._deformations())
         for turned in (np.linalg.det(U) < 0, np.linalg.det(Vt) < 0):
             s[turned, 2] *= -1

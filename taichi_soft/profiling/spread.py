@@ -1,4 +1,4 @@
-"""Repeated times of one thing, in one number for each question."""
+"""Summarise repeated measurements."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Spread:
         )
 
     def scaled(self, factor: float) -> Spread:
-        """The same in another unit."""
+        """Convert to another unit."""
         return Spread(self.least * factor, self.median * factor, self.p99 * factor, self.most * factor)
 
 
 def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
-    """What each of `repeats` calls takes [s]."""
+    """Time each of `repeats` calls [s]."""
     times = []
     for _ in range(repeats):
         start = perf_counter()
@@ -44,9 +44,9 @@ def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
 def compare(
     one: Callable[[], object], other: Callable[[], object], repeats: int, unit: float
 ) -> tuple[Spread, Spread, Spread]:
-    """Time two calls in turns, after two rounds to warm up.
+    """Time two calls in turns, after two warm-up rounds.
 
-    A machine that slows down for a while then slows both, and their ratio holds.
+    A temporary slowdown of the machine then affects both, and their ratio stays valid.
     Returns: the times of each, in seconds times `unit`, and `one` over `other`, pair by pair.
     """
     pairs = [(time_calls(one, 1)[0], time_calls(other, 1)[0]) for _ in range(repeats + 2)][2:]

@@ -1,4 +1,4 @@
-"""How long a new process takes until a game can begin, with an empty kernel cache and with a full one."""
+"""Time the start of a new process until a game can begin, with an empty and with a full kernel cache."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
 """,
 }
-"""By name: a body and a floor; bodies that touch each other, a pool, a collider; a body that can be cut."""
+"""By name: a body and a floor; soft contact, a pool and a collider; a body that can be cut."""
 
 
 @dataclass(frozen=True)
 class Startup:
-    """From starting Python until a world has drawn its first frame, and until nothing compiles any more."""
+    """Time from the start of Python to the first frame, and until everything is compiled."""
 
-    world: str  # one of `WORLDS`
-    cache: str  # "empty", or "full" of what the same program compiled
+    world: str  # key of `WORLDS`
+    cache: str  # "empty", or "full" after a run of the same program
     first_frame: float  # [s]
     warm: float  # [s], after `World.warm_up`
 
@@ -61,14 +61,14 @@ class Startup:
 def measure_startup(
     arch: ArchName, threads: int, cores: tuple[int, ...], worlds: tuple[str, ...] = tuple(WORLDS)
 ) -> list[Startup]:
-    """Run a small game of each world twice in processes of their own, with a cache of their own.
+    """Run a small game of each world twice, in new processes with a separate cache.
 
-    Python's bytecode is there in all of them, as after an installation.
+    Python's bytecode is precompiled, as after an installation.
 
     Args:
-        cores: to which the threads are bound, or none.
-        worlds: names of `WORLDS`.
-    Raises: DeviceError if such a process fails.
+        cores: cores to bind the threads to; may be empty.
+        worlds: keys of `WORLDS`.
+    Raises: DeviceError if a process fails.
     """
     found = []
     with tempfile.TemporaryDirectory(prefix="taichi-soft-") as folder:
@@ -83,14 +83,14 @@ def measure_startup(
 
 
 def _times_of(program: str, environment: dict[str, str]) -> tuple[float, float]:
-    """When it says so, in seconds from its start on."""
+    """Return the times that a program prints, from its start [s]."""
     start = time.time()
     first_frame, warm = (float(line) - start for line in _run(program, environment).split())
     return first_frame, warm
 
 
 def _run(program: str, environment: dict[str, str]) -> str:
-    """What it prints."""
+    """Run a program and return its output."""
     done = subprocess.run(
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False
     )

@@ -1,4 +1,4 @@
-"""Processor time that this machine wanted and did not get, because its host gave it to other machines."""
+"""Measure steal time: CPU time that the host of this machine gave to other machines."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ TIMES = Path("/proc/stat")
 
 
 class Ticks(NamedTuple):
-    """Time of all processors since the machine started [ticks]."""
+    """CPU time of all cores since the machine started [ticks]."""
 
     wanted: int
     stolen: int
 
 
 def processor_ticks() -> Ticks | None:
-    """As proc(5) lists them: user, nice, system, idle, iowait, irq, softirq, steal; None on other systems."""
+    """Read /proc/stat: user, nice, system, idle, iowait, irq, softirq, steal; None on other systems."""
     if not TIMES.exists():
         return None
     times = [int(number) for number in TIMES.read_text().split("\n", 1)[0].split()[1:9]]
@@ -24,7 +24,7 @@ def processor_ticks() -> Ticks | None:
 
 
 def stolen_since(before: Ticks | None) -> float | None:
-    """Part of what was wanted since then; None where the system does not tell."""
+    """Stolen fraction of the requested CPU time since then; None if the system does not report it."""
     now = processor_ticks()
     if before is None or now is None:
         return None

@@ -1,4 +1,4 @@
-"""Pictures and films of soft bodies without a display."""
+"""Render images and films of soft bodies without a display."""
 
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import FLIPPED, PALETTE, ColorScale, colormap, highlight

@@ -1,4 +1,4 @@
-"""Frames of a stage, with its words written on them."""
+"""Draw the frames of a stage, with text overlays."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from taichi_soft.render.take import Take, skins_of
 from taichi_soft.render.texture import Texture
 
 _RECENT = 25
-"""Frames of whose times the picture tells the median."""
+"""Number of recent frames whose median step time is shown."""
 
-LABEL_ROOM = 1.2
-"""How far in front of the middle of a body its label stands, in half widths of the body at rest."""
+LABEL_DISTANCE = 1.2
+"""Distance from the centre of a body to its label, in half widths of the body at rest."""
 
 
 def speed_of(times: Sequence[float], fps: float) -> str:
-    """How fast the last frames were, at the median: one of them may have been disturbed.
+    """Format the median speed of the last frames; the median ignores single outliers.
 
     Args:
-        times: of stepping each frame [s]. The first shows the stage as it stands, and does not count.
+        times: step time of each frame [s]. The first frame makes no step and is skipped.
     """
     recent = times[1:][-_RECENT:]
     if not recent:
@@ -38,16 +38,16 @@ def speed_of(times: Sequence[float], fps: float) -> str:
 
 
 class Artist:
-    """Draws a take and writes the words of its stage on it.
+    """Draws a take and the text overlays of its stage.
 
     Args:
         size: width and height [pixels].
-        rate: frames per second of the world.
-        slow: how many times slower than the world the film is.
-        stats: write the time of the world and the speed of the last steps, too.
+        rate: frames per second of world time.
+        slow: slow-motion factor of the film.
+        stats: also show the world's time and the speed of the last steps.
 
     Attributes:
-        times: that drawing each frame took [s].
+        times: drawing time of each frame [s].
     """
 
     def __init__(self, take: Take, size: tuple[int, int], rate: float, slow: float, stats: bool) -> None:
@@ -59,11 +59,11 @@ class Artist:
         )
         self.times: list[float] = []
         self._spent = 0.0
-        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and version of its topology
-        self._textures: dict[int, tuple[Any, Texture]] = {}  # by picture, which is kept: its id stays its own
+        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and topology version
+        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; holds the image so that ids stay unique
 
     def draw(self) -> NDArray[np.uint8]:
-        """The picture of the take as it is now, without words."""
+        """Draw the current state of the take, without text."""
         start = time.perf_counter()
         take = self.take
         surfaces = take.scenery.at(take.adapter.alpha).copy()
@@ -84,7 +84,7 @@ class Artist:
         return picture
 
     def finish(self, pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-        """The mean of the pictures of a frame, with the words of the stage; one alone is changed in place."""
+        """Average the subframes of a frame and draw the text on it. A single subframe is changed in place."""
         start = time.perf_counter()
         picture = mean_picture(pictures)
         stage = self.take.stage
@@ -107,7 +107,7 @@ class Artist:
         return picture
 
     def _surfaces_of(self, actor: Actor) -> list[Surface]:
-        """Its skins, or else its surface, made anew where a cut has changed it."""
+        """Return the actor's skins, or its surface if it has none. A cut makes new surfaces."""
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:
             skins = [self._skin_surface(mesh, actor) for mesh in skins_of(actor)]
@@ -115,7 +115,7 @@ class Artist:
         return self._surfaces[key]
 
     def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
-        """In its own colours and texture where it has any."""
+        """Make the surface of a skin, in the colours and texture of its mesh if it has any."""
         picture, texture = texture_picture(mesh.visual, mesh.vertex_count), None
         if picture is not None:
             if id(picture) not in self._textures:
@@ -133,7 +133,7 @@ class Artist:
         )
 
     def _draw_labels(self, picture: NDArray[np.uint8]) -> None:
-        """A caption on the floor in front of each body that has one, clear of it."""
+        """Draw each body's caption on the floor in front of the body."""
         stage = self.take.stage
         named = [(a, rows) for a, rows in zip(stage.actors, self.take.positions, strict=True) if a.label]
         if not named:
@@ -144,7 +144,7 @@ class Artist:
         feet = np.array([rows.mean(axis=0) for _, rows in named], dtype=np.float64)
         for foot, (actor, rows) in zip(feet, named, strict=True):
             half = float(np.ptp(actor.body.mesh.vertices, axis=0)[:2].max()) / 2
-            foot[:2] += LABEL_ROOM * half * forward
+            foot[:2] += LABEL_DISTANCE * half * forward
             foot[2] = rows[:, 2].min() if floor is None else floor
         places = camera.project(feet, self.renderer.width, self.renderer.height)
         draw_labels(picture, [actor.label for actor, _ in named], places)

@@ -1,4 +1,4 @@
-"""Sky and floor behind the bodies of a picture."""
+"""Sky and floor behind the bodies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Light = tuple[float, float, float]
 
 
 class Backdrop(Choice):
-    """Where a picture seems to be taken."""
+    """Sky and floor colours of an image."""
 
     DAY = "day"  # pale checks under a blue sky
     DUSK = "dusk"  # sand under an evening sky
@@ -28,8 +28,8 @@ class BackdropColors:
     """Colours of a backdrop, linear light.
 
     Args:
-        horizon, zenith: of the sky; it fades from one to the other.
-        bright, dark: of the checks of the floor; equal ones make a plain floor.
+        horizon, zenith: ends of the sky's gradient.
+        bright, dark: colours of the floor's checks; equal colours make a plain floor.
     """
 
     horizon: Light

@@ -1,6 +1,6 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Sky and floor, painted once per camera, and how light becomes a pixel."""
+"""Paint sky and floor, once per camera, and convert linear light to pixels."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
@@ -33,7 +33,7 @@ def check_average(x, width):
 @ti.func
 def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
     """Store linear light as sRGB; `encode` is `tone.encode_table`."""
-    # A fixed pattern of less than one step of brightness, against bands in smooth gradients.
+    # Ordered dithering below one step of brightness prevents banding in smooth gradients.
     grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
     for k in ti.static(range(3)):
         root = ti.sqrt(ti.math.clamp(color[k] / WHITE, 0.0, 1.0))
@@ -58,21 +58,22 @@ def paint_backdrop(
     out: image,
     plain: picture,
 ):
-    """Sky and floor without shadows.
+    """Paint sky and floor without shadows.
 
     Args:
         rays: see `pixel_ray`.
         target: the checks fade with the distance from it [m].
         check: edge of a check [m].
-        fade: distance at which the floor has become air [m].
-        horizon, zenith, bright, dark: as `BackdropColors` has them.
-        out: (height, width, 4), linear light and the share of it that is floor.
-        plain: (height, width, 3), that light as sRGB.
+        fade: distance at which the floor has faded into the sky [m].
+        horizon, zenith, bright, dark: see `BackdropColors`.
+        out: (height, width, 4), linear light and the floor's share of it.
+        plain: (height, width, 3), the same light as sRGB.
     """
     for y, x in ti.ndrange(out.shape[0], out.shape[1]):
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
-        # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
+        # Brightest at the horizon, darker upwards. Below the horizon, where the floor has faded, it stays
+        # bright.
         color = horizon + (zenith - horizon) * smoothstep(-0.05, 0.65, ti.sqrt(ti.max(up, 0.0)))
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
@@ -87,7 +88,7 @@ def paint_backdrop(
             wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
             wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
-            # Checks that are hardly larger than a pixel would shimmer.
+            # Fade checks near the size of a pixel, which would shimmer.
             wave *= 1.0 - smoothstep(0.15, 0.7, ti.max(wide_x, wide_y))
             tiles = dark + (bright - dark) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade

@@ -1,4 +1,4 @@
-"""Where a picture is taken from: a perspective camera that looks at a point."""
+"""Perspective camera that looks at a point."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from taichi_soft.render.arguments import as_point
 
 Point = tuple[float, float, float]
 
-# Nearest visible depth as a share of the distance to the target: nearer than that is inside the lens.
+# Depth of the near plane, as a fraction of the distance to the target.
 NEAREST = 1e-3
-# Largest angle between the line of sight and the ground of a camera that frames a box [degrees].
+# Largest elevation of a camera that frames a box [degrees].
 STEEP = 89.0
-# Sine of the smallest angle between the line of sight and `up` that still says where up is.
+# Sine of the smallest angle between the line of sight and `up` that still defines an upright image.
 STEEPEST = 1e-4
 
 
@@ -27,11 +27,11 @@ class Camera:
     """A camera at `eye` that looks at `target`; world z is up, lengths in metres.
 
     Args:
-        eye: where it stands [m].
-        target: what lies in the middle of the picture [m].
-        up: direction that is upright in the picture, of any length.
-        fov_degrees: angle of view across the shorter side of the picture, 1 to 150, so that a view that
-            fits a square fits every aspect ratio.
+        eye: position of the camera [m].
+        target: point at the centre of the image [m].
+        up: direction that is upright in the image, of any length.
+        fov_degrees: field of view across the shorter side of the image, 1 to 150. A view that fits a square
+            therefore fits every aspect ratio.
     Raises: OptionError for numbers that are not finite, eye on target, `up` along the line of sight or an
         angle out of range.
     """
@@ -70,15 +70,15 @@ class Camera:
         margin: float = 1.1,
         aspect: float = 1.0,
     ) -> Camera:
-        """The nearest camera that sees the whole box.
+        """Return the closest camera that sees the whole box.
 
         Args:
             lower, upper: opposite corners of the box [m].
             azimuth: direction from the box to the eye in the ground plane, from the x axis to y [degrees].
-            elevation: of the eye above the horizon, -89 to 89 [degrees].
+            elevation: angle of the eye above the horizon, -89 to 89 [degrees].
             fov_degrees: see `Camera`.
-            margin: room round the box, 1 (none) to 10.
-            aspect: width over height of the picture; with 1 the box fits into a picture of any.
+            margin: size of the view relative to the box, 1 to 10.
+            aspect: width over height of the image; with 1 the box fits images of any aspect.
         Raises: OptionError for a box without extent or numbers out of range.
         """
         low, high = np.array(as_point(lower, "lower")), np.array(as_point(upper, "upper"))
@@ -89,27 +89,27 @@ class Camera:
         half = math.tan(math.radians(as_number(fov_degrees, "fov_degrees", 1.0, 150.0)) / 2.0)
         half /= as_number(margin, "margin", 1.0, 10.0)
         ratio = as_number(aspect, "aspect", 0.05, 20.0)
-        # Tangents across the picture and down it; the angle of view belongs to the shorter side.
+        # Tangents of half the view, right and down; the field of view belongs to the shorter side.
         reach = half * np.array([max(ratio, 1.0), max(1.0 / ratio, 1.0)])
         outward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
         target = (low + high) / 2.0
         probe = cls(tuple(target + outward), tuple(target), fov_degrees=fov_degrees)
         corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
         seen = (corners - target) @ probe.axes.T
-        # A corner at depth d + z is inside where |x| and |y| are at most reach * (d + z).
+        # A corner at depth d + z is visible if |x| and |y| are at most reach * (d + z).
         distance = float(((np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2]).max())
         return cls(tuple(target + distance * outward), tuple(target), fov_degrees=fov_degrees)
 
     def seeing(
         self, lower: ArrayLike, upper: ArrayLike, *, margin: float = 1.1, aspect: float = 1.0
     ) -> Camera:
-        """A camera that looks the same way with the same angle, from just far enough to see the whole box.
+        """Return a camera with the same direction and angle, just far enough away to see the whole box.
 
         Args:
             lower, upper: opposite corners of the box [m].
-            margin: room round the box, 1 (none) to 10.
-            aspect: width over height of the picture.
-        Raises: as `framing`. One that looked straight up or down looks a little aside.
+            margin: size of the view relative to the box, 1 to 10.
+            aspect: width over height of the image.
+        Raises: as `framing`. A camera that looks straight up or down is tilted slightly.
         """
         x, y, z = np.subtract(self.eye, self.target)
         return Camera.framing(
@@ -124,7 +124,7 @@ class Camera:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """Unit vectors right, down and forward of the picture as the rows of a (3, 3)."""
+        """Unit vectors right, down and forward of the image, the rows of a (3, 3)."""
         forward = (np.array(self.target) - self.eye) / self.distance
         right = np.cross(forward, self.up)
         right /= np.linalg.norm(right)
@@ -132,15 +132,15 @@ class Camera:
 
     @property
     def near(self) -> float:
-        """Depth in front of which nothing is drawn [m]."""
+        """Depth of the near plane [m]."""
         return NEAREST * self.distance
 
     def matrix(self, width: int, height: int) -> NDArray[np.float64]:
-        """(3, 4) that takes (x, y, z, 1) to (u d, v d, d): pixel u to the right, v down, and depth d [m].
+        """Matrix (3, 4) from (x, y, z, 1) to (u d, v d, d): pixel u right, pixel v down, and depth d [m].
 
         The first pixel covers u and v from 0 to 1.
         Args:
-            width, height: of the picture [pixels].
+            width, height: size of the image [pixels].
         """
         width, height = as_count(width, "width"), as_count(height, "height")
         focal = min(width, height) / (2.0 * math.tan(math.radians(self.fov_degrees) / 2.0))
@@ -150,13 +150,13 @@ class Camera:
         return matrix
 
     def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
-        """Where points lie in a picture: pixel right, pixel down and depth [m], (n, 3).
+        """Project points into an image: pixel right, pixel down and depth [m], (n, 3).
 
         Args:
             points: (n, 3) [m].
-            width, height: of the picture [pixels].
+            width, height: size of the image [pixels].
 
-        Points nearer than `near` or behind the camera have no place in the picture: their pixels are NaN.
+        The pixels of points closer than `near` or behind the camera are NaN.
         """
         rows = as_array(points, "points", (None, 3), "m")
         seen = np.column_stack([rows, np.ones(len(rows))]) @ self.matrix(width, height).T

@@ -1,4 +1,4 @@
-"""Cameras that move while a film runs: round a place, or with a body."""
+"""Cameras that move during a film: around a point, or with a body."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from taichi_soft.render.camera import Camera
 from taichi_soft.world.body import Body
 
 BoxOf = Callable[[Body], NDArray[np.float64]]
-"""Lower and upper corner of a body as it is drawn, (2, 3) [m]."""
+"""Function that returns the bounding box of a body as it is drawn, (2, 3) [m]."""
 
 LOOSE = 0.35
-"""How far from the middle of the picture a body that is followed gets [half of the shorter side]."""
+"""Largest distance of a followed body from the centre of the image [half of the shorter side]."""
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """A camera that goes round the upright line through its target, at the same height and distance.
+    """A camera that orbits the vertical axis through its target, at constant height and distance.
 
     Args:
-        view: where it is when the world's time is 0.
-        period: of one turn [s of the world], anticlockwise seen from above; negative the other way round.
-    Raises: OptionError for a period of 0 or what is not finite.
+        view: the camera at world time 0.
+        period: world time of one turn [s], counterclockwise seen from above; negative turns clockwise.
+    Raises: OptionError for a period that is 0 or not finite.
     """
 
     view: Camera
@@ -40,11 +40,11 @@ class Orbit:
             raise OptionError(f"period must be finite and not 0, got {self.period!r}")
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Where it is at a time.
+        """Return the camera at a time.
 
         Args:
-            time: of the world [s].
-            box_of: not used.
+            time: world time [s].
+            box_of: ignored.
         """
         angle = 2.0 * math.pi * time / self.period
         c, s = math.cos(angle), math.sin(angle)
@@ -56,15 +56,15 @@ class Orbit:
 
 
 class Follow:
-    """A camera that goes with a body and always looks the same way.
+    """A camera that follows a body and keeps its direction.
 
-    It comes after the body smoothly, but the middle of the body never gets farther from the middle of the
-    picture than a third of the way to its nearer edge. It is told of times in their order.
+    It follows smoothly, but the centre of the body stays within about a third of the distance from the
+    image's centre to its nearer edge. Times must ascend.
 
     Args:
-        body: to look at; an actor of the stage.
-        view: a camera whose direction, distance and angle are kept. Its target does not matter.
-        lag: how long it takes to come nearer by a factor of e [s of the world], 0 to 10.
+        body: body to follow; an actor of the stage.
+        view: camera that gives direction, distance and angle. Its target is ignored.
+        lag: time constant of the smoothing [s of world time], 0 to 10.
     Raises: OptionError for numbers out of range.
     """
 
@@ -78,11 +78,11 @@ class Follow:
         self._target = np.zeros(3)
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Where it is at a time. A time before the last one begins anew.
+        """Return the camera at a time. A time before the last one restarts the smoothing.
 
         Args:
-            time: of the world [s].
-            box_of: function that returns the lower and the upper corner of a body as it is drawn, (2, 3) [m].
+            time: world time [s].
+            box_of: function that returns the bounding box of a body as it is drawn, (2, 3) [m].
         """
         middle = np.asarray(box_of(self.body)).mean(axis=0)
         passed = time - self._time

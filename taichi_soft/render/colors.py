@@ -1,4 +1,4 @@
-"""Colours: of bodies, and of numbers."""
+"""Colours of bodies, and colour maps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PALETTE: tuple[Color, ...] = (
     (0.32, 0.62, 0.85),  # sky
     (0.66, 0.50, 0.38),  # clay
 )
-"""Body colours, sRGB from 0 to 1, told apart by hue at about the same lightness; cycle through them."""
+"""Body colours, sRGB from 0 to 1, of different hue and similar lightness; cycle through them."""
 
 RAMP: tuple[Color, ...] = (
     (0.30, 0.52, 0.80),
@@ -36,23 +36,23 @@ RAMP: tuple[Color, ...] = (
 """Colours of a `ColorScale` at equal steps, sRGB from 0 to 1."""
 
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0))
-"""Of units, the largest first; taken from ten of it on."""
+"""Prefixes of units, largest first. A prefix is used from ten of its units on."""
 
 FLIPPED: Color = (0.93, 0.10, 0.42)
-"""Colour of what is turned inside out, found in no body of `PALETTE`, sRGB from 0 to 1."""
+"""Colour of inverted tetrahedra, sRGB from 0 to 1; it is not in `PALETTE`."""
 
 
 def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
-    """Numbers as colours that run evenly from dark violet (`low`) to bright yellow (`high`): viridis.
+    """Map numbers to colours with viridis, from dark violet (`low`) to bright yellow (`high`).
 
     Args:
-        values: (n,), one per vertex; those out of range take the colour of the end they passed.
+        values: (n,), one per vertex; values out of range are clamped.
         low, high: the range, low < high.
     Returns: sRGB from 0 to 1, float32 (n, 3).
     Raises: OptionError for values that are not finite or an empty range.
     """
     place = _places(values, low, high) * 255.0
-    # The library has 256 colours; between two of them is interpolated.
+    # OpenCV's table has 256 colours: interpolate between them.
     table = cv2.applyColorMap(np.arange(256, dtype=np.uint8).reshape(-1, 1), cv2.COLORMAP_VIRIDIS)
     rgb = table[:, 0, ::-1].astype(np.float32) / 255.0
     channels = [np.interp(place, np.arange(256), rgb[:, k]) for k in range(3)]
@@ -60,7 +60,7 @@ def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
 
 
 def _places(values: ArrayLike, low: float, high: float) -> NDArray[np.float64]:
-    """Where numbers lie from `low` (0) to `high` (1). Raises: as `colormap`."""
+    """Scale numbers from [low, high] to [0, 1]. Raises: as `colormap`."""
     numbers = as_array(values, "values", (None,))
     start, end = as_number(low, "low", -1e300, 1e300), as_number(high, "high", -1e300, 1e300)
     if not start < end:
@@ -70,13 +70,13 @@ def _places(values: ArrayLike, low: float, high: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class ColorScale:
-    """Numbers as colours, and what a bar beside the picture says of them.
+    """A colour scale of a quantity, and the labels of its bar.
 
     Args:
-        quantity: its name, plain ASCII.
+        quantity: name of the quantity, plain ASCII.
         low, high: the range, low < high, in `unit`.
-        unit: SI, without a prefix: "Pa". The bar finds one that suits.
-    Raises: OptionError for an empty range or other text.
+        unit: SI unit without a prefix, such as "Pa". The bar chooses the prefix.
+    Raises: OptionError for an empty range or text that is not ASCII.
     """
 
     quantity: str
@@ -92,10 +92,10 @@ class ColorScale:
         self.colors([self.low])
 
     def colors(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Colours from blue (`low`) over yellow to red (`high`), bright enough to show light and shadow.
+        """Map numbers to colours from blue (`low`) over yellow to red (`high`), bright enough for shading.
 
         Args:
-            values: (n,), one per vertex; those out of range take the colour of the end they passed.
+            values: (n,), one per vertex; values out of range are clamped.
         Returns: sRGB from 0 to 1, float32 (n, 3).
         Raises: OptionError for values that are not finite.
         """
@@ -104,18 +104,18 @@ class ColorScale:
         return np.stack(channels, axis=1).astype(np.float32)
 
     def ticks(self) -> tuple[str, str]:
-        """Both ends in words, the upper one with the unit: ("0", "200 kPa")."""
+        """Labels of both ends, the upper one with its unit: ("0", "200 kPa")."""
         largest = max(abs(self.low), abs(self.high))
         prefix, factor = next(each for each in PREFIXES if largest >= 10 * each[1] or each is PREFIXES[-1])
         return f"{self.low / factor:.4g}", f"{self.high / factor:.4g} {prefix}{self.unit}"
 
 
 def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED) -> NDArray[np.float32]:
-    """Vertex colours that show which vertices are flagged, for example those of flipped tetrahedra.
+    """Colour the vertices that are flagged, for example those of inverted tetrahedra.
 
     Args:
         flagged: (n,) of bool.
-        color, marked: sRGB of the others and of the flagged.
+        color, marked: sRGB of vertices without and with a flag.
     Returns: sRGB from 0 to 1, float32 (n, 3).
     Raises: OptionError for wrong shapes or colours.
     """
@@ -127,13 +127,13 @@ def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED)
 
 
 def to_linear(srgb: NDArray[np.float32]) -> NDArray[np.float32]:
-    """sRGB from 0 to 1 as linear light, in which colours may be added."""
+    """Convert sRGB from 0 to 1 to linear light, in which colours can be added."""
     low = srgb <= 0.04045
     return np.where(low, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def to_srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Linear light from 0 to 1 as sRGB."""
+    """Convert linear light from 0 to 1 to sRGB."""
     low = linear <= 0.0031308
     return np.where(low, linear * 12.92, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055).astype(
         np.float32

@@ -1,4 +1,4 @@
-"""Kinds of film file: how each is written, and how to count what is in it."""
+"""Film formats: how to write each and how to count its frames."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Frame = NDArray[np.uint8]
 Found = tuple[int, set[tuple[int, int]]]
 """Number of frames, and their sizes (width, height)."""
 
-# Players take these numbers as the meaning of a film's colours; the first filter makes them true.
+# Colour tags that players read; the first filter converts the frames to match them.
 COLORS = (
     *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"),
     *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
 )
 CODECS = {
-    # With the index at its start, so that browsers begin before they have the whole file.
+    # The index comes first, so that browsers start playing before the download ends.
     ".mp4": ("-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-movflags", "+faststart"),
     ".webm": (
         *("-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"),
@@ -33,10 +33,10 @@ CODECS = {
     ),
 }
 LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
-# One palette for a whole film: what stands still then keeps its pixels, and takes no room in later frames. An
-# ordered pattern between its colours does not crawl either.
+# One palette for the whole film, and ordered dithering: pixels that do not move stay equal, so later frames
+# compress well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # frames per second; shows are timed in 1/100 s, and viewers slow down what lasts only one
+GIF_FASTEST = 50.0  # frames per second; delays count in 1/100 s, and viewers slow down frames of one
 
 
 @contextlib.contextmanager
@@ -51,16 +51,16 @@ def quiet() -> Iterator[None]:
 
 
 class Container(ABC):
-    """A film that is being written to a folder of its own."""
+    """A film that is being written to its own folder."""
 
     @abstractmethod
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
-        """Begin, with frames of `size` (width, height). Raises: VideoError or OptionError."""
+        """Start a film with frames of `size` (width, height). Raises: VideoError or OptionError."""
 
     @property
     @abstractmethod
     def files(self) -> list[Path]:
-        """What is to be moved to the film's place in the end: one file, or a picture for each frame."""
+        """Finished files to move to the film's path: one file, or one image per frame."""
 
     @abstractmethod
     def write(self, frame: Frame) -> None:
@@ -72,11 +72,11 @@ class Container(ABC):
 
     @abstractmethod
     def measure(self) -> Found:
-        """What is in it, read back. Raises: VideoError for what cannot be read."""
+        """Read the files back and count their frames. Raises: VideoError for unreadable files."""
 
     @abstractmethod
     def abandon(self) -> None:
-        """Let go of the file as it is."""
+        """Close the file without completing it."""
 
 
 class Stream(Container):
@@ -104,7 +104,7 @@ class Stream(Container):
 
 
 class Gif(Container):
-    """.gif. Frames wait on the disk, without loss, until their colours are all known."""
+    """.gif. Frames are stored losslessly on disk until the palette is known."""
 
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
         if fps > GIF_FASTEST:
@@ -156,7 +156,7 @@ class Pictures(Container):
         self._files.append(name)
 
     def finish(self) -> None:
-        """Nothing is left to do: every frame was complete once written."""
+        """Do nothing: every frame was complete when written."""
 
     def measure(self) -> Found:
         sizes = []
@@ -168,11 +168,11 @@ class Pictures(Container):
         return len(sizes), set(sizes)
 
     def abandon(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""
 
 
 def _frames_of(fps: float, size: tuple[int, int]) -> list[str]:
-    """What ffmpeg has to know of the frames in its pipe."""
+    """Arguments that describe the raw frames in ffmpeg's pipe."""
     rate = Fraction(fps).limit_denominator(100_000)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     return [*raw, "-r", f"{rate.numerator}/{rate.denominator}", "-i", "pipe:0"]

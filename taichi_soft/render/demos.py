@@ -1,4 +1,4 @@
-"""The demos: each file in `demos/` sets one stage."""
+"""Find and load the demos in `demos/`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from taichi_soft.core.package_data import DEMOS
 
 
 def demo_names() -> list[str]:
-    """Names of the demos there are. What sets no stage is a program of its own."""
+    """Names of the demos that define a stage. Files without a stage are separate programs."""
     stages = (path for path in DEMOS.glob("[a-z]*.py") if "\ndef stage(" in path.read_text(encoding="utf-8"))
     return sorted(path.stem for path in stages)
 
 
 def load_demo(name: str) -> ModuleType:
-    """The demo of that name, a module with `stage()` and `proof(stage)`. Raises: OptionError."""
+    """Load a demo, a module with `stage()` and `proof(stage)`. Raises: OptionError."""
     names = demo_names()
     if name not in names:
         raise OptionError(f"unknown demo {name!r}: {choose_one_of(names, name)}")

@@ -1,4 +1,4 @@
-"""ffmpeg, in a process of its own: a crash of it is an error here, and its licence stays on its side."""
+"""Run ffmpeg in a separate process, which contains its crashes and its licence."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ QUIET = ("-hide_banner", "-nostdin", "-nostats", "-v", "error", "-y")
 
 
 def find_ffmpeg() -> str:
-    """Path of the ffmpeg that the package imageio-ffmpeg brings, or that $IMAGEIO_FFMPEG_EXE names.
+    """Path of ffmpeg: $IMAGEIO_FFMPEG_EXE, or the one in the package imageio-ffmpeg.
 
-    Raises: MissingExtraError where that package is missing; VideoError where it has none for this system.
+    Raises: MissingExtraError without that package; VideoError if it has no ffmpeg for this system.
     """
     require_extra("film", "a .mp4, .webm or .gif film needs", "imageio_ffmpeg")
     from imageio_ffmpeg import get_ffmpeg_exe  # type: ignore[import-untyped, import-not-found]
@@ -37,15 +37,15 @@ def find_ffmpeg() -> str:
 
 
 class Ffmpeg:
-    """A run of ffmpeg that takes frames.
+    """A running ffmpeg that receives frames.
 
-    It reads them from a pipe. The pipe ends with this process, however that ends, and ffmpeg with the pipe.
-    Ctrl-C of a terminal does not reach it: the process that started it decides. It has the priority of that
-    process.
+    It reads frames from a pipe. The pipe closes when this process ends for any reason, and then ffmpeg ends
+    too. Ctrl-C in a terminal does not reach ffmpeg; this process handles it. ffmpeg inherits the priority of
+    this process.
     """
 
     def __init__(self, arguments: Sequence[str | Path]) -> None:
-        """`arguments` stand behind those of `QUIET`. Raises: as `find_ffmpeg`; VideoError."""
+        """Start ffmpeg with the options `QUIET`, then `arguments`. Raises: as `find_ffmpeg`; VideoError."""
         options: dict[str, Any] = {"start_new_session": True}
         if sys.platform == "win32":
             options = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.CREATE_NO_WINDOW}
@@ -64,7 +64,7 @@ class Ffmpeg:
             raise VideoError(f"cannot start {command[0]}: {error.strerror or error}") from error
 
     def write(self, frame: NDArray[np.uint8]) -> None:
-        """Give it a frame. Raises: VideoError where it has ended."""
+        """Send a frame. Raises: VideoError if ffmpeg has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(np.ascontiguousarray(frame).data)
@@ -73,9 +73,9 @@ class Ffmpeg:
             raise VideoError(f"ffmpeg ended: {self._complaint()}") from None
 
     def finish(self) -> None:
-        """Say that there are no more frames, and wait for its end. Raises: VideoError where it failed."""
+        """Close the pipe and wait for ffmpeg to end. Raises: VideoError if it failed."""
         try:
-            with contextlib.suppress(OSError):  # it has ended before: its exit code says how
+            with contextlib.suppress(OSError):  # it has already ended: check its exit code below
                 self._process.communicate()
             if self._process.returncode != 0:
                 raise VideoError(f"ffmpeg failed: {self._complaint()}")
@@ -83,14 +83,14 @@ class Ffmpeg:
             self.kill()
 
     def kill(self) -> None:
-        """End it at once, if it still runs."""
+        """Kill ffmpeg if it is running."""
         self._process.kill()
-        with contextlib.suppress(OSError):  # what it has not read is lost
+        with contextlib.suppress(OSError):  # unread frames are lost
             self._process.communicate()
         self._complaints.close()
 
     def _complaint(self) -> str:
-        """The last line that it wrote."""
+        """Last line of ffmpeg's error output."""
         self._complaints.seek(0)
         lines = self._complaints.read().decode(errors="replace").split("\n")
         said = [line.strip() for line in lines if line.strip()]
@@ -98,16 +98,16 @@ class Ffmpeg:
 
 
 def run_ffmpeg(arguments: Sequence[str | Path]) -> None:
-    """Run it on files. Raises: as `Ffmpeg`."""
+    """Run ffmpeg on files. Raises: as `Ffmpeg`."""
     Ffmpeg(arguments).finish()
 
 
 def count_frames(path: Path, list_file: Path) -> tuple[int, set[tuple[int, int]]]:
-    """How many frames of a film can be decoded, and their size (width, height).
+    """Count the frames of a film that can be decoded, and list their sizes (width, height).
 
     Args:
-        list_file: a place for ffmpeg's list of them, one line each.
-    Raises: as `Ffmpeg`; VideoError for a file that is no film.
+        list_file: path for ffmpeg's list of frames, one line each.
+    Raises: as `Ffmpeg`; VideoError for a file that is not a film.
     """
     run_ffmpeg(["-i", path, "-map", "0:v:0", "-fps_mode", "passthrough", "-f", "framecrc", list_file])
     lines = list_file.read_text().splitlines()

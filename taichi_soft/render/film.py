@@ -1,4 +1,4 @@
-"""Films of a world: steps it as a game loop would, draws every frame, and times the steps."""
+"""Film a world: step it as a game loop does, draw each frame and time the steps."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class FilmReport:
-    """What a film took. Drawing, writing and compiling are not part of the step times.
+    """Figures of a film. Step times exclude drawing, writing and compiling.
 
-    What `Stage.act` alone calls compiles where it calls it first, in a film as in a game.
+    Kernels that only `Stage.act` calls compile at their first call, which counts as step time.
     """
 
-    path: Path | None  # of the film; None where nothing was written
+    path: Path | None  # of the film; None if nothing was written
     frames: int  # number of frames
     fps: float  # frames per second
-    simulated: float  # time that passed in the world [s]
-    step_times: NDArray[np.float64]  # of stepping and reading each frame but the first [s]
-    draw_times: NDArray[np.float64]  # of drawing each frame [s]; empty where nothing is drawn
-    slow: float = 1.0  # by how much the film is slower than the world
+    simulated: float  # world time that passed [s]
+    step_times: NDArray[np.float64]  # stepping and reading of each frame but the first [s]
+    draw_times: NDArray[np.float64]  # drawing of each frame [s]; empty if nothing is drawn
+    slow: float = 1.0  # slow-motion factor of the film
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated time over the time it took; 0 if too few frames were made to tell."""
+        """Simulated time over the time spent on steps; 0 if there are too few frames."""
         if len(self.step_times) == 0:
             return 0.0
         return float(len(self.step_times) / (self.fps * self.slow) / self.step_times.sum())
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the film, and what it took."""
+        """HTML for notebooks: the film and its figures."""
         figures = {
             "film": f"{self.frames} frames, {self.frames / self.fps:.1f} s",
             "simulated": f"{self.simulated:.2f} s",
@@ -77,25 +77,25 @@ def film(
     stats: bool = False,
     on_frame: Progress | None = None,
 ) -> FilmReport:
-    """Run a stage and write what it shows.
+    """Run a stage and write it to a film.
 
     Args:
-        stage: what to film; it goes on from where it stands.
-        path: of the film, see `VideoWriter`; None draws and writes nothing.
+        stage: stage to film; it continues from its current state.
+        path: path of the film, see `VideoWriter`; None draws and writes nothing.
         fps: frames per second.
         size: width and height [pixels].
-        seconds: of the world that it shows [s]; None takes the stage's own.
-        slow: how many times longer the film is than what it shows, 1 to 1000. The world makes the same steps;
-            between two of them bodies are drawn on the straight way from one to the other.
-        blur: how many pictures within the time of the shutter are averaged to one, 1 to 64; 1 is sharp.
-        stats: write the time of the world [s] and the speed of this machine on each frame, too.
-        on_frame: called with (frames made, frames in all) after each.
-    Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
+        seconds: world time to film [s]; None takes the stage's default.
+        slow: slow-motion factor, 1 to 1000. The world makes the same steps; frames between two steps are
+            interpolated linearly.
+        blur: subframes averaged while the shutter is open, 1 to 64; 1 turns motion blur off.
+        stats: also show the world's time [s] and the speed of this machine in each frame.
+        on_frame: called with (frames made, total frames) after each frame.
+    Raises: VideoError or OptionError. Wrong arguments are refused before the world moves.
     """
     if not isinstance(stage, Stage):
         raise OptionError(f"stage must be a Stage, got {type(stage).__name__}")
     if not (on_frame is None or callable(on_frame)):
-        raise OptionError(f"on_frame must be a function (frames made, frames in all), got {on_frame!r}")
+        raise OptionError(f"on_frame must be a function (frames made, total frames), got {on_frame!r}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
     rate = as_positive(fps, "fps", "1/s") * as_number(slow, "slow", 1.0, 1000.0)  # per second of the world
     shots = as_count(blur, "blur", 1, 64)
@@ -118,7 +118,7 @@ def film(
         _warm_up(stage, take, artist)
         for number in range(count):
             pictures = []
-            # The first frame shows the stage as it stands.
+            # The first frame shows the initial state.
             for share in shutter_times(shots) if number else [0.0]:
                 take.play(share / rate)
                 if artist:
@@ -140,7 +140,7 @@ def film(
 
 
 def _warm_up(stage: Stage, take: Take, artist: Artist | None) -> None:
-    """Compile what steps and pictures need. Nothing moves."""
+    """Compile the kernels of steps and rendering without moving anything."""
     worlds = {id(world): world for world in [stage.world, *(a.world or stage.world for a in stage.actors)]}
     for world in worlds.values():
         warm_up_step(context_of_world(world))

@@ -1,4 +1,4 @@
-"""A film in a notebook: the file itself within the HTML, and figures beneath it."""
+"""Show a film in a notebook: HTML with the file embedded, and a table of figures below."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from html import escape
 from pathlib import Path
 
 MIME_TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
-"""Of what a browser plays."""
+"""MIME types of the films that a browser plays."""
 
 LARGEST = 10_000_000
-"""A larger film is named and not shown: a notebook is saved with all that it shows [bytes]."""
+"""Largest film that is embedded [bytes]: a notebook is saved with its embedded files."""
 
 
 def film_html(path: Path | None, figures: Mapping[str, str]) -> str:
-    """The film and a table.
+    """HTML of the film and a table.
 
     Args:
-        path: of the film; None where nothing was written.
-        figures: what was measured, by name.
+        path: path of the film; None if nothing was written.
+        figures: formatted values, by name.
     """
     rows = "".join(
         f'<tr><th scope="row" style="text-align: left">{escape(name)}</th><td>{escape(value)}</td></tr>'
@@ -29,16 +29,16 @@ def film_html(path: Path | None, figures: Mapping[str, str]) -> str:
 
 
 def _shown(path: Path) -> str:
-    """The film, or why there is none."""
+    """HTML of the film, or the reason why it is not shown."""
     name = escape(str(path), quote=True)
     mime = MIME_TYPES.get(path.suffix.lower())
     if mime is None:
-        return f"<p>{name}: pictures, one for each frame</p>"
+        return f"<p>{name}: images, one per frame</p>"
     if not path.is_file():
-        return f"<p>{name} is not there any more</p>"
+        return f"<p>{name} no longer exists</p>"
     size = path.stat().st_size
     if size > LARGEST:
-        return f"<p>{name} has {size / 1e6:.0f} MB: too large to be shown here</p>"
+        return f"<p>{name} has {size / 1e6:.0f} MB: too large to show here</p>"
     data = f"data:{mime};base64,{base64.b64encode(path.read_bytes()).decode()}"
     if mime.startswith("image/"):
         return f'<img src="{data}" alt="Film {name}" style="max-width: 100%">'

@@ -1,4 +1,4 @@
-"""Which tiles of a picture can show a shadow on the floor; the others are copied as they are."""
+"""Find the tiles of an image that may show a shadow on the floor; all others are copied from the backdrop."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from taichi_soft.render.kernel_types import TILE
 
 
 class FloorTiles:
-    """The floor under each tile of a picture, found once per camera.
+    """The floor area that each tile of an image shows, computed once per camera.
 
     Args:
-        rays: (3, 3), takes (u, v, 1) to the direction through a pixel.
-        eye: where the camera stands [m].
+        rays: (3, 3), maps (u, v, 1) to the direction through a pixel.
+        eye: position of the camera [m].
         floor: height of the floor [m], or None.
     """
 
@@ -33,7 +33,7 @@ class FloorTiles:
         directions = corners @ rays.T  # (tiles, 4, 3)
         down = directions[..., 2] < -1e-6
         sees_floor = floor is not None and eye[2] > floor
-        # A tile across the horizon reaches infinitely far: it is never ruled out.
+        # A tile across the horizon has no bounded area and is always kept.
         self._unbounded = down.any(axis=1) & ~down.all(axis=1) & sees_floor
         self._bounded = down.all(axis=1) & sees_floor
         drop = (floor or 0.0) - eye[2]
@@ -41,10 +41,10 @@ class FloorTiles:
         self._hits = np.concatenate([hits, np.ones_like(hits[..., :1])], axis=-1)
 
     def shadowed(self, maps: Sequence[tuple[NDArray[np.float32], NDArray[np.bool_]]]) -> NDArray[np.int32]:
-        """1 for tiles on which a shadow may lie, else 0, int32 (tiles,).
+        """1 for tiles that may show a shadow, else 0, int32 (tiles,).
 
         Args:
-            maps: pairs of a matrix (4, 4) from (x, y, z, 1) to texels, and which texels (n, n) are dark.
+            maps: pairs of a matrix (4, 4) from (x, y, z, 1) to texels, and the mask (n, n) of dark texels.
         """
         touched = np.zeros(len(self._hits), dtype=bool)
         for matrix, dark in maps:
@@ -53,7 +53,7 @@ class FloorTiles:
                 continue
             texels = self._hits @ matrix[:2].T.astype(np.float64)
             low, high = texels.min(axis=1), texels.max(axis=1)
-            # A tile's floor is convex, so its corners bound it; texels reach one further when interpolated.
+            # A tile's floor area is convex, so its corners bound it; interpolation adds one texel.
             across = (low[:, 0] <= columns[-1] + 2) & (high[:, 0] >= columns[0] - 1)
             along = (low[:, 1] <= rows[-1] + 2) & (high[:, 1] >= rows[0] - 1)
             touched |= self._unbounded | (self._bounded & across & along)

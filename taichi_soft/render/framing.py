@@ -1,4 +1,4 @@
-"""A stage whose camera sees all places to which its bodies come."""
+"""Move a stage's camera so that it sees its bodies during the whole run."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 MARGIN = 1.06
-"""Room round the bodies."""
+"""Size of the view relative to the bodies."""
 
 DIRECTIONS = 72
-"""From which a camera that goes round has to see all of them."""
+"""Number of directions from which an orbiting camera must see all bodies."""
 
 
 def framed(
@@ -33,18 +33,17 @@ def framed(
     seconds: float | None = None,
     orbit: float | None = None,
 ) -> Stage:
-    """A stage, its camera moved along its line of sight until it sees all places to which bodies come.
+    """Make a stage and move its camera along the line of sight until it sees the bodies at all times.
 
-    The stage is made twice: one is run to its end, in which its script may keep what it likes; the other is
-    returned as it begins.
+    The stage is made twice: the first is run to its end, so its script may have side effects; the second is
+    returned in its initial state.
     Args:
-        make_stage: makes the same stage whenever it is called.
-        aspect: width over height of the picture.
-        seconds: of the world that are looked at [s]; None takes the stage's own.
-        orbit: period of a camera that goes round the bodies [s of the world], as `Orbit` takes it; None for
-            one that stays.
-    Raises: OptionError for a stage whose camera moves by itself or numbers out of range, before anything
-        moves; and what the stage's steps raise.
+        make_stage: function that returns the same stage at each call.
+        aspect: width over height of the image.
+        seconds: world time to run [s]; None takes the stage's default.
+        orbit: period of an orbiting camera [s of world time], see `Orbit`; None for a fixed camera.
+    Raises: OptionError for a stage with a moving camera or numbers out of range, before anything moves; and
+        every error of the stage's steps.
     """
     width = as_number(aspect, "aspect", 0.05, 20.0)
     if orbit is not None:
@@ -65,14 +64,14 @@ def framed(
 
 
 def _no_box(body: Body) -> Floats:
-    """For a camera that follows nothing."""
+    """Placeholder for cameras that do not use the box."""
     raise AssertionError(body)
 
 
 def _box_of_run(stage: Stage, seconds: float | None) -> tuple[Floats, Floats]:
-    """Lower and upper corner of all places of its bodies [m]."""
+    """Bounding box of the stage's bodies over the whole run [m]."""
     if not isinstance(stage.camera, Camera):
-        raise OptionError(f"the camera moves by itself: {type(stage.camera).__name__}")
+        raise OptionError(f"stage.camera must be a fixed Camera, got {type(stage.camera).__name__}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
     steps = length / stage.step.dt
     if steps > LARGEST_COUNT:

@@ -1,10 +1,10 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Vertices and triangles of one frame: smooth normals, and where each triangle lies in a picture.
+"""Compute smooth normals and project triangles into an image.
 
 A triangle with homogeneous corners v0, v1, v2 = (u d, v d, d) covers the pixel (u, v) where the three
-numbers E_i . (u, v, 1) are positive, E_i being the cross product of the two other corners; no corner has to
-be in front of the camera for that, so nothing is clipped. The same holds without perspective with d = 1.
+numbers E_i . (u, v, 1) are positive, where E_i is the cross product of the two other corners. This also holds
+for corners behind the camera, so no clipping is needed. An orthographic projection has d = 1.
 """
 
 from taichi_soft.core.runtime import ti
@@ -14,7 +14,7 @@ PLANE = 12
 """Numbers per triangle: three edges and the depth, each a, b, c of a u + b v + c."""
 
 OVERLAP = 0.01
-"""Each triangle is grown by this [pixels], more than the rounding of its edges, to close the seams."""
+"""Growth of each triangle [pixels]; larger than the rounding of its edges, so that no seams appear."""
 
 
 @ti.kernel
@@ -54,16 +54,16 @@ def project_triangles(
     boxes: int_rows,
     tile_begin: ints,
 ) -> ti.i32:
-    """Edges, depth and pixel box of each triangle, and how many triangles each tile has.
+    """Compute edges, depth and pixel box of each triangle, and the number of triangles per tile.
 
     Args:
-        to_picture: takes (x, y, z, 1) to (u d, v d, d, q d); the largest q is what is seen.
+        to_picture: maps (x, y, z, 1) to (u d, v d, d, q d); the largest q is visible.
         near: smallest d that is drawn.
-        planes: out (m, 12), the edges scaled to add up to one at the picture's depth plane.
+        planes: out (m, 12), the edges scaled to add up to one at the image's depth plane.
         boxes: out (m, 4), first and last pixel right, first and last pixel down; empty where the triangle
-            faces away (its corners run clockwise in a picture whose v points down) or is out of sight.
+            faces away (its corners run clockwise in an image whose v points down) or is not visible.
         tile_begin: out, running sum of the triangles in tiles 0 to i - 1, row by row.
-    Returns: the number of entries all tiles together have.
+    Returns: the number of entries of all tiles.
     """
     for t in range(triangles.shape[0]):
         corners = ti.Matrix.zero(ti.f32, 3, 4)
@@ -81,7 +81,7 @@ def project_triangles(
         v2 = ti.Vector([corners[2, 0], corners[2, 1], corners[2, 2]])
         normal = (v1 - v0).cross(v2 - v0)
         determinant = normal.dot(v0)
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # which whole numbers hold
+        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # fits an integer
         for i in range(3):
             j = (i + 1) % 3
             d, e = corners[i, 2], corners[j, 2]
@@ -89,7 +89,7 @@ def project_triangles(
                 u, v = corners[i, 0] / d, corners[i, 1] / d
                 low_u, high_u = ti.min(low_u, u), ti.max(high_u, u)
                 low_v, high_v = ti.min(low_v, v), ti.max(high_v, v)
-            if (d >= near) != (e >= near):  # the edge passes the near plane: the box ends there
+            if (d >= near) != (e >= near):  # the edge crosses the near plane: the box ends there
                 s = (near - d) / (e - d)
                 u = (corners[i, 0] + s * (corners[j, 0] - corners[i, 0])) / near
                 v = (corners[i, 1] + s * (corners[j, 1] - corners[i, 1])) / near

@@ -1,11 +1,11 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Arguments of the drawing kernels. NumPy arrays go in as they are, and a new length compiles nothing."""
+"""Argument types of the drawing kernels: NumPy arrays, whose length can change without recompiling."""
 
 from taichi_soft.core.runtime import ti
 
 TILE = 32
-"""Pixels along a tile. Smaller ones repeat triangles, larger ones divide badly among threads."""
+"""Edge of a tile [pixels]. Smaller tiles repeat triangles, larger ones balance badly between threads."""
 
 vec3 = ti.types.vector(3, ti.f32)
 matrix = ti.types.matrix(4, 4, ti.f32)

@@ -1,22 +1,22 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Light on a point: shadows from their maps, and what a body sends to the eye."""
+"""Shade a point: look up its shadows and compute the light that it reflects to the eye."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
 from taichi_soft.render.look import CLOTH_BACK, JELLY, MATTE
 
 COARSE = 4.0
-"""Texels of the sun's map along one of the maps of far shadows."""
+"""Texels of the sun's map per texel of the far-shadow maps, along one axis."""
 
 FAINTEST = 0.002
-"""Share of a shadow below which it is not drawn."""
+"""Shadow strength below which a shadow is not drawn."""
 
 SOFT_TAPS = 8
-"""Width of the box over which shadows on bodies are averaged [texels of the shadow map]."""
+"""Width of the box filter for shadows on bodies [texels of the shadow map]."""
 
 LIFT = 0.7
-"""How far a point is lifted off its surface, and again towards the sun, before it is looked up [texels]."""
+"""Shadow bias along the normal, and again towards the sun [texels]."""
 
 
 @ti.func
@@ -35,7 +35,7 @@ def bilinear(map: ti.template(), size, u, v):
 
 @ti.func
 def light_place(light: ti.template(), p):
-    """Texel coordinates and height towards the light [m] of a point; `light` is (4, 4), rows u, v, -, q."""
+    """Project a point to texel coordinates and height towards the light [m]; `light` has rows u, v, -, q."""
     row = [
         light[k, 0] * p.x + light[k, 1] * p.y + light[k, 2] * p.z + light[k, 3] for k in ti.static((0, 1, 3))
     ]
@@ -44,7 +44,7 @@ def light_place(light: ti.template(), p):
 
 @ti.func
 def box_average(depth: ti.template(), size, left, top, fu, fv, height):
-    """Share of a box of the shadow map that is open above `height`.
+    """Fraction of a box of the shadow map that is unoccluded above `height`.
 
     The box starts at (fu, fv) inside the texel (left, top).
     """
@@ -59,10 +59,10 @@ def box_average(depth: ti.template(), size, left, top, fu, fv, height):
 
 @ti.func
 def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
-    """Share of the sun that reaches a point of a body, 0 to 1, averaged over a box in the shadow map.
+    """Fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the shadow map.
 
-    The map holds what faces away from the sun, so that a body does not shadow the side that it is lit from;
-    `LIFT` is for the rim of that side.
+    The map holds back faces, so that a body does not shadow its own lit side; `LIFT` handles the rim of that
+    side.
     """
     place = light_place(light, p + LIFT * texel * normal)
     u, v, height = place.x - 0.5 * SOFT_TAPS, place.y - 0.5 * SOFT_TAPS, place.z + LIFT * texel
@@ -70,7 +70,7 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
     fu, fv = u - left, v - top
     lit = 1.0
     if left >= 0 and top >= 0 and left + SOFT_TAPS < size and top + SOFT_TAPS < size:
-        # Nine of the texels first: where they agree, so do the others between them.
+        # Sample nine texels first: if they agree, so do the texels between them.
         open_texels = 0
         for j in range(3):
             for i in range(3):
@@ -93,13 +93,13 @@ def floor_shadow(
     contact_place: ti.template(),
     contact: ti.template(),
 ):
-    """Share of its light that a point of the floor lacks, per colour."""
+    """Fraction of light that a point of the floor loses to shadows, per colour."""
     lack = ti.Vector([0.0, 0.0, 0.0])
     place = light_place(light, at)
     u, v = place.x / COARSE, place.y / COARSE
     far = bilinear(far_shadow, far_shadow.shape[0], u, v)
     if far > FAINTEST:
-        # The higher what casts the shadow, the softer its edge.
+        # Higher occluders cast softer shadows.
         height = bilinear(far_height, far_shadow.shape[0], u, v) / far
         near = bilinear(near_shadow, near_shadow.shape[0], place.x, place.y)
         lack = (near + (far - near) * ti.min(height, 1.0)) * (1.0 - lighting.SHADED)
@@ -110,13 +110,13 @@ def floor_shadow(
 
 @ti.func
 def fifth_power(x):
-    """Of x: how reflection rises towards grazing angles."""
+    """Fifth power of x, Schlick's rise of reflection towards grazing angles."""
     return x * x * x * x * x
 
 
 @ti.func
 def mirrored(normal, view, sun, doublings: ti.template()):
-    """Brightness of the key's mirror image, 0 to 1; the more doublings the smaller it is."""
+    """Specular highlight of the key light, 0 to 1; more doublings make it sharper."""
     half = sun + view
     shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
     for _ in ti.static(range(doublings)):
@@ -126,25 +126,25 @@ def mirrored(normal, view, sun, doublings: ti.template()):
 
 @ti.func
 def surroundings(normal, sun, above):
-    """Light from everywhere but the key on a surface of albedo 1.
+    """Ambient and fill light on a surface of albedo 1.
 
     Args:
-        above: 0 on the floor to 1 well above it, where its underside sees light.
+        above: height, from 0 on the floor to 1 well above it, where the underside is lit.
     """
     upward = 0.5 + 0.5 * normal.z
     below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
     over = lighting.SKY_LIGHT * (0.75 + 0.25 * above)
-    # The fill stands opposite the key, at the height of the eye.
+    # The fill light is opposite the key, at the height of the eye.
     aside = 0.5 - 0.5 * (normal.x * sun.x + normal.y * sun.y) / ti.sqrt(1.0 - sun.z * sun.z)
     return below + (over - below) * upward + lighting.FILL * (aside * aside)
 
 
 @ti.func
 def dimmed(light, color, openness):
-    """Light from around where only a share `openness` of it is seen.
+    """Ambient light at a point that sees only the fraction `openness` of its surroundings.
 
-    What hides the rest is taken to be about as bright as the surface itself: bright bodies do not get dirty
-    where they touch.
+    Occluders count as about as bright as the surface itself, so that bright bodies do not look dirty at
+    contacts.
     """
     return light * (openness / (1.0 - 0.55 * (1.0 - openness) * color))
 
@@ -158,7 +158,7 @@ def smooth_rise(x):
 
 @ti.func
 def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
-    """Rubber; the arguments of this and of the next two are those of `glow` and what it computes."""
+    """Shade rubber. The three materials take the arguments of `glow` and its intermediate results."""
     total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
     total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
     return total + lighting.HORIZON * (lighting.RIM * fifth_power(rim) * (0.5 + 0.5 * normal.z) * openness)
@@ -166,13 +166,13 @@ def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
 
 @ti.func
 def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
-    """Light goes in and comes out beside where it went in, and some comes straight through from behind."""
+    """Shade jelly: subsurface scattering, and transmitted light from behind."""
     facing = normal.dot(sun)
-    # Thick parts are deeper in colour than those at the rim.
+    # Thick parts have deeper colours than the rim.
     inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
     wrapped = ti.max((facing + lighting.JELLY_WRAP) / (1.0 + lighting.JELLY_WRAP), 0.0)
     kept = lighting.JELLY_KEPT + (1.0 - lighting.JELLY_KEPT) * lit * smooth_rise(facing)
-    # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
+    # Light transmitted from the lit side brightens the dark side.
     through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
     total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
     clear = lighting.JELLY_CLEAR * (1.0 - rim * rim)
@@ -185,13 +185,13 @@ def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
 
 @ti.func
 def cloth_glow(look, color, normal, sun, around, key, rim, openness):
-    """Fibres, through which some of the light of the other side comes."""
+    """Shade cloth, which transmits some light from its other side."""
     own = color
     if look == CLOTH_BACK:
         own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
     facing = normal.dot(sun)
     straight, tint = facing, own
-    if facing < 0.0:  # what comes through has been coloured by more threads
+    if facing < 0.0:  # transmitted light passes more threads and takes more of their colour
         straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
     total = tint * (key * straight) + own * dimmed(around, own, openness)
     return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)
@@ -203,12 +203,12 @@ def glow(look, color, normal, view, sun, lit, above, openness, behind):
 
     Args:
         look: a code of `look`.
-        color: share of the light that it throws back.
-        normal, view, sun: unit vectors out of the body, to the eye and to the key.
-        lit: share of the key that reaches the side of it that faces the key.
+        color: albedo.
+        normal, view, sun: unit vectors out of the body, to the eye and to the key light.
+        lit: fraction of key light that reaches its lit side.
         above: see `surroundings`.
-        openness: share of its surroundings that it sees, 0 to 1.
-        behind: light from behind the body, where it lets some through.
+        openness: fraction of its surroundings that it sees, 0 to 1.
+        behind: light from behind a transparent body.
     """
     around = surroundings(normal, sun, above)
     key = lighting.SUN * (lit * (0.45 + 0.55 * openness))

@@ -1,4 +1,4 @@
-"""What bodies are made of, to the eye."""
+"""Looks of bodies: matte, jelly, cloth."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from taichi_soft.core.types import Choice
 
 
 class Look(Choice):
-    """How a surface throws light back."""
+    """How a surface reflects light."""
 
-    MATTE = "matte"  # rubber: dull, with a broad faint shine
-    JELLY = "jelly"  # light goes in and comes out beside: soft shades, a bright rim, a sharp shine
-    CLOTH = "cloth"  # thin, seen from both sides: the back is paler, and some light comes through
+    MATTE = "matte"  # rubber: diffuse, with a broad faint highlight
+    JELLY = "jelly"  # translucent: soft shading, a bright rim, a sharp highlight
+    CLOTH = "cloth"  # thin and two-sided: the back is paler, and some light is transmitted
 
 
 LookName: TypeAlias = Literal["matte", "jelly", "cloth"]
 
 MATTE, JELLY, CLOTH, CLOTH_BACK = range(4)
-"""How kernels call the looks of triangles; a cloth has two sides."""
+"""Codes of looks in kernels; a cloth has two sides."""
 
 CODES = {Look.MATTE: MATTE, Look.JELLY: JELLY, Look.CLOTH: CLOTH}
-"""Of the front of a surface."""
+"""Code of a surface's front."""

@@ -1,4 +1,4 @@
-"""Motion blur: a picture as the mean of several within the time that a shutter is open."""
+"""Motion blur: average several subframes while the shutter is open."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from taichi_soft.render.colors import to_linear, to_srgb
 
 SHUTTER = 0.5
-"""Share of a frame during which the shutter is open, as cameras for films have it."""
+"""Fraction of a frame during which the shutter is open, as usual for film cameras."""
 
 _LIGHT = to_linear(np.arange(256, dtype=np.float32) / 255.0)
 
 
 def shutter_times(pictures: int) -> list[float]:
-    """How long after each other the pictures of a frame are taken, in frames. The last ends the frame."""
+    """Intervals between the subframes of a frame [frames]. The last subframe ends the frame."""
     if pictures == 1:
         return [1.0]
     return [1.0 - SHUTTER] + [SHUTTER / (pictures - 1)] * (pictures - 1)
 
 
 def mean_picture(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """The mean of the light of sRGB pictures, uint8 (height, width, 3). One alone is returned as it is."""
+    """Average sRGB images, uint8 (height, width, 3), in linear light. A single image is returned as is."""
     if len(pictures) == 1:
         return pictures[0]
     total: NDArray[np.float32] = _LIGHT[pictures[0]]

@@ -1,4 +1,4 @@
-"""Where bodies and colliders come close they take light from each other: found anew in every picture."""
+"""Screen-space ambient occlusion between bodies and colliders, computed for each frame."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from taichi_soft.render.raster import Raster
 Floats = NDArray[np.float32]
 
 REACH = 0.06
-"""How far what stands in the way takes light [size of the scene]."""
+"""Radius of occlusion [size of the scene]."""
 
 
 class Occlusion:
-    """How much each second pixel that shows a body sees of its surroundings, allocated once.
+    """Ambient occlusion at half resolution; buffers are allocated once.
 
-    What is outside the picture, or behind what is seen in it, takes no light.
+    Surfaces outside the image, or hidden in it, do not occlude.
 
     Attributes:
-        depth: float32 (height / 2, width / 2), 1 / depth of what is seen [1/m].
-        hidden: float32 of the same shape, share of the surroundings that is hidden, 0 to 1. Only what lies in
-            tiles with triangles is up to date.
+        depth: float32 (height / 2, width / 2), 1 / depth of the visible surface [1/m].
+        hidden: float32 of the same shape, occluded fraction of the surroundings, 0 to 1. Only tiles with
+            triangles are up to date.
     """
 
     def __init__(self, raster: Raster, reach: float) -> None:
-        """`reach`: how far what stands in the way takes light [m]."""
+        """`reach`: radius of occlusion [m]."""
         self._raster, self._reach = raster, reach
         shape = (raster.height + 1) // 2, (raster.width + 1) // 2
         self.depth: Floats = np.zeros(shape, dtype=np.float32)
@@ -36,12 +36,12 @@ class Occlusion:
         self._rough: Floats = np.zeros(shape, dtype=np.float32)
 
     def update(self, rays: Floats, lens: Floats, focal: float, backdrop: tuple[float, float, float]) -> None:
-        """Look at the picture that the raster holds.
+        """Compute the occlusion of the image in the raster.
 
         Args:
-            rays: (3, 3), takes (u, v, 1) to the direction through a pixel; `lens` is its inverse.
+            rays: (3, 3), maps (u, v, 1) to the direction through a pixel; `lens` is its inverse.
             focal: pixels per unit of tangent.
-            backdrop: plane of 1 / depth of the floor over the picture.
+            backdrop: plane of the floor's 1 / depth over the image.
         """
         raster = self._raster
         count = len(raster.samples)

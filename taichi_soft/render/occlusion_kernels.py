@@ -1,9 +1,9 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""How much of its surroundings a point of a body sees, from the depths of the picture itself.
+"""Kernels for screen-space ambient occlusion, at half the image's width and height.
 
-All at half the picture's width and height. A plane in space has q = 1 / depth = a u + b v + c over the
-picture, so how high something stands above the plane of a triangle is seen from its q alone.
+A plane in space has q = 1 / depth = a u + b v + c over the image, so q alone gives the height of a point
+above the plane of a triangle.
 """
 
 import numpy as np
@@ -14,31 +14,31 @@ from taichi_soft.render.backdrop_kernels import pixel_ray
 from taichi_soft.render.kernel_types import TILE, ints, reals, rows, vec3
 
 HALF = TILE // 2
-"""Points of a tile along it."""
+"""Points along the edge of a tile."""
 
 TAPS = 10
-"""Places round a point that are looked at."""
+"""Depth samples around a point."""
 
 TURNS = 4
-"""Of so many by so many points each has its taps turned by another angle; then they are averaged."""
+"""Each point of a block of TURNS by TURNS rotates its taps by another angle; the block is then averaged."""
 
 WIDEST = 64.0
-"""Distance of the farthest tap at most [points]."""
+"""Largest distance of a tap [points]."""
 
 BIAS = 0.12
-"""Sine of the angle above a triangle up to which nothing counts: round bodies are made of flat ones."""
+"""Sine of the angle above a triangle below which nothing occludes: curved surfaces have flat triangles."""
 
 STRENGTH = 10.0
-"""Of the darkening; it never gets black."""
+"""Strength of the occlusion, which never reaches black."""
 
 ALIKE = 0.03
-"""Difference of depth, as a share of it, beyond which two points are not of one surface."""
+"""Relative difference of depth above which two points belong to different surfaces."""
 
 
 def spiral_taps() -> NDArray[np.float32]:
-    """Places round a point within a circle of radius 1, float32 (TURNS * TURNS * TAPS, 2).
+    """Offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
-    Those of each of the points that are averaged come after each other: spirals that are denser inside.
+    Each point of a block has one contiguous spiral of taps, denser inside.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
@@ -59,11 +59,11 @@ def gather_depth(
     depth: reals,
     out: rows,
 ):
-    """q of the first sample of every second pixel, that of the floor where there is no triangle.
+    """Gather q of the first sample of every second pixel, and of the floor in tiles without triangles.
 
     Args:
         backdrop: a, b, c of the floor's plane.
-        offset_u, offset_v: place of the first sample, from the middle of the pixel [pixels].
+        offset_u, offset_v: position of the first sample, from the centre of the pixel [pixels].
         out: (height / 2, width / 2).
     """
     tiles_across = (width + TILE - 1) // TILE
@@ -93,18 +93,18 @@ def hidden_share(
     focal,
     taps: ti.template(),
 ):
-    """Share of its surroundings that the point (i, j) of a triangle does not see.
+    """Occluded fraction of the surroundings of point (i, j) on a triangle.
 
     Args:
-        rays: (3, 3), takes (u, v, 1) to the direction through a pixel; `lens` is its inverse.
-        plane: a, b, c of the triangle's q over the picture.
-        reach: distance beyond which nothing is in the way [m].
+        rays: (3, 3), maps (u, v, 1) to the direction through a pixel; `lens` is its inverse.
+        plane: a, b, c of the triangle's q over the image.
+        reach: distance beyond which nothing occludes [m].
         focal: pixels per unit of tangent.
     """
     u, v = 2.0 * i + 0.5 + offset_u, 2.0 * j + 0.5 + offset_v
     q = plane.dot(ti.Vector([u, v, 1.0]))
     here = pixel_ray(rays, u, v) / q  # from the eye [m]
-    # The normal n of the triangle in space, such that n . here = 1.
+    # Normal n of the triangle in space, with n . here = 1.
     normal = ti.Vector(
         [lens[0, k] * plane.x + lens[1, k] * plane.y + lens[2, k] * plane.z for k in ti.static(range(3))]
     )
@@ -120,10 +120,10 @@ def hidden_share(
             u_there, v_there = 2.0 * x + 0.5 + offset_u, 2.0 * y + 0.5 + offset_v
             above = scale * (1.0 - plane.dot(ti.Vector([u_there, v_there, 1.0])) / q_there)
             if above > 0.0:
-                way = pixel_ray(rays, u_there, v_there) / q_there - here
-                far2 = way.dot(way)
+                offset = pixel_ray(rays, u_there, v_there) / q_there - here
+                far2 = offset.dot(offset)
                 near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-                # A thousandth of the reach more, or round-off would hide a pixel from itself.
+                # The added thousandth of the reach keeps round-off from occluding a pixel by itself.
                 total += ti.max(above / ti.sqrt(far2 + 1e-6 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 
@@ -145,13 +145,13 @@ def find_hidden(
     q_map: rows,
     out: rows,
 ):
-    """`hidden_share` of every second pixel that shows a body, in tiles with triangles.
+    """Compute `hidden_share` of every second pixel that shows a body, in tiles with triangles.
 
     Args:
         focal: pixels per unit of tangent.
-        taps: as `spiral_taps` has them.
-        q_map: what `gather_depth` found.
-        out: (height / 2, width / 2); 0 where there is no body.
+        taps: see `spiral_taps`.
+        q_map: result of `gather_depth`.
+        out: (height / 2, width / 2); 0 without a body.
     """
     tiles_across = (width + TILE - 1) // TILE
     for tile in range(tile_begin.shape[0] - 1):
@@ -166,12 +166,12 @@ def find_hidden(
                         hidden = hidden_share(
                             q_map, rays, lens, plane, i, j, offset_u, offset_v, reach, focal, taps
                         )
-                    out[j, i] = ti.select(hidden > 0.0, hidden, 0.0)  # written so that NaN hides nothing
+                    out[j, i] = ti.select(hidden > 0.0, hidden, 0.0)  # NaN becomes 0
 
 
 @ti.kernel
 def spread_hidden(width: ti.i32, tile_begin: ints, q_map: rows, hidden: rows, out: rows):
-    """Average of `TURNS` by `TURNS` points that are about as deep, in tiles with triangles."""
+    """Average blocks of `TURNS` by `TURNS` points of similar depth, in tiles with triangles."""
     tiles_across = (width + TILE - 1) // TILE
     for tile in range(tile_begin.shape[0] - 1):
         left, top = tile % tiles_across * HALF, tile // tiles_across * HALF
@@ -194,10 +194,10 @@ def spread_hidden(width: ti.i32, tile_begin: ints, q_map: rows, hidden: rows, ou
 
 @ti.func
 def openness_at(q_map: ti.template(), hidden: ti.template(), x, y, q):
-    """Share of its surroundings that what is seen at pixel (x, y) sees, 0 to 1, from the points round it.
+    """Unoccluded fraction of the surroundings at pixel (x, y), 0 to 1, interpolated from half resolution.
 
     Args:
-        q: of what is seen there.
+        q: 1 / depth of the surface at the pixel.
     """
     i, j = x // 2, y // 2
     total, weights = 0.0, 1e-6

@@ -1,10 +1,10 @@
-"""OpenCV, which pictures need and bodies do not: the one place that imports it for them."""
+"""Import OpenCV, which only rendering needs. No other module of `render` imports it."""
 
 from __future__ import annotations
 
 from taichi_soft.core.extras import require_extra
 
-require_extra("film", "a picture needs", "cv2")
+require_extra("film", "rendering needs", "cv2")
 
 import cv2  # noqa: E402
 

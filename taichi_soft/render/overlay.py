@@ -1,4 +1,4 @@
-"""Words on a picture: panels in corners, what colours mean, and captions under bodies."""
+"""Draw text on images: panels in corners, legends, colour bars and captions below bodies."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from taichi_soft.render.opencv import cv2
 Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 1 / 26  # height of a line of text [shorter side of the picture]
-CAPTION = 0.8  # of that, for captions: there may be many
-SMALLEST_LINE = 13.0  # pixels; below it letters cannot be read
+LINE = 1 / 26  # height of a line of text [shorter side of the image]
+CAPTION = 0.8  # line height of captions [LINE]; an image may have many
+SMALLEST_LINE = 13.0  # pixels; smaller letters are illegible
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
-GAP = 0.45  # between lines, and round the words [line heights]
-INDENT = " " * 5  # room for a swatch before a line
+GAP = 0.45  # between lines, and around the text [line heights]
+INDENT = " " * 5  # space for a swatch before a line
 BAR = 12  # blanks between the ends of a colour bar
 PANEL, OPACITY, INK = (22, 26, 34), 0.70, (245, 247, 250)
 
 
 class Corner(Choice):
-    """Where a panel lies."""
+    """Corner of the image for a panel."""
 
     TOP_LEFT = "top left"
     TOP_RIGHT = "top right"
@@ -37,14 +37,14 @@ class Corner(Choice):
 
 
 def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = Corner.TOP_LEFT) -> Picture:
-    """The picture with lines of text on a dark panel in a corner; it is changed in place and returned.
+    """Draw lines of text on a dark panel in a corner. The image is changed in place and returned.
 
-    Letters scale with the picture and shrink until the widest line and all lines fit.
+    The font scales with the image and shrinks until all lines fit.
     Args:
         picture: uint8 (height, width, 3).
-        lines: of plain ASCII text; none at all draws nothing.
+        lines: plain ASCII text; an empty list draws nothing.
         corner: "top left", "top right", "bottom left" or "bottom right".
-    Raises: OptionError for another picture, text or corner.
+    Raises: OptionError for an invalid image, text or corner.
     """
     _check(picture, lines)
     place = Corner.parse(corner)
@@ -56,13 +56,13 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
 def draw_legend(
     picture: Picture, entries: Sequence[tuple[Color, str]], *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """The picture with lines of text as `draw_text`, each behind a swatch of its colour.
+    """Draw lines of text as `draw_text` does, each after a swatch of its colour.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
-        entries: sRGB from 0 to 1, and plain ASCII text.
+        entries: pairs of sRGB from 0 to 1 and plain ASCII text.
         corner: "top left", "top right", "bottom left" or "bottom right".
-    Raises: OptionError for another picture, colour, text or corner.
+    Raises: OptionError for an invalid image, colour, text or corner.
     """
     colors = [as_color(color, "color of the legend") for color, _ in entries]
     lines = [INDENT + text for _, text in entries]
@@ -81,13 +81,13 @@ def draw_legend(
 def draw_color_scale(
     picture: Picture, scale: ColorScale, *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """The picture with a bar of the colours of a scale, what they show, and from where to where.
+    """Draw a colour bar with the quantity and the range of a scale.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
-        scale: whose colours, ends and quantity are shown.
+        scale: scale to show.
         corner: "top left", "top right", "bottom left" or "bottom right".
-    Raises: OptionError for another picture, scale or corner.
+    Raises: OptionError for an invalid image, scale or corner.
     """
     if not isinstance(scale, ColorScale):
         raise OptionError(f"scale must be a ColorScale, got {type(scale).__name__}")
@@ -106,14 +106,14 @@ def draw_color_scale(
 
 
 def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> Picture:
-    """The picture with a caption centred below each place; it is changed in place and returned.
+    """Draw a caption centred below each place. The image is changed in place and returned.
 
     Args:
         picture: uint8 (height, width, 3).
-        labels: n captions of plain ASCII text; a line break begins a second line.
-        places: (n, 2) or more columns, pixel right and down, as `Camera.project` gives them. Captions are
-            moved to stay inside the picture; a place that is NaN (behind the camera) gets none.
-    Raises: OptionError for another picture, text or number of places.
+        labels: n captions of plain ASCII text; a line break starts a second line.
+        places: (n, 2) or more columns, pixel right and down, see `Camera.project`. Captions are moved to stay
+            inside the image; a place that is NaN (behind the camera) gets no caption.
+    Raises: OptionError for an invalid image, text or number of places.
     """
     captions = [str(label).split("\n") for label in labels]
     _check(picture, [line for lines in captions for line in lines])
@@ -151,9 +151,9 @@ def _check(picture: Picture, lines: Sequence[str]) -> None:
 def _draw_in_corner(
     picture: Picture, lines: Sequence[str], corner: Corner, widest: str = ""
 ) -> tuple[int, int, float, int]:
-    """A panel there, with room for `widest` in a line.
+    """Draw a panel in a corner, wide enough for the line `widest`.
 
-    Returns: its left and top, the height of its lines, and its padding [pixels].
+    Returns: left and top of the panel, height of its lines, and its padding [pixels].
     """
     height, width = picture.shape[:2]
     margin = round(0.02 * min(height, width))
@@ -176,7 +176,7 @@ def _stroke(line: float) -> int:
 
 
 def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> float:
-    """The line height at which everything fits, at most the usual one."""
+    """Largest line height at which all lines fit, at most the default."""
     line = max(LINE * side, SMALLEST_LINE)
     while line > 2.0:
         _, wide, high = _panel_size(lines, line)
@@ -205,7 +205,7 @@ def _draw_panel(
 
 
 def _baseline(top: int, row: int, line: float) -> int:
-    """Of a line of text below `top` [pixels]."""
+    """Baseline of a line of text below `top` [pixels]."""
     return round(top + row * line * (1.0 + GAP) + 0.86 * line)
 
 

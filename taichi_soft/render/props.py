@@ -1,4 +1,4 @@
-"""What is drawn beside the bodies: colliders, and what goes with a collider or a frame."""
+"""Surfaces of colliders, and of props that move with a collider or a frame."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from taichi_soft.render.colors import Color
 from taichi_soft.world.world import World
 
 SLATE: Color = (0.33, 0.39, 0.50)
-"""Colour of colliders, sRGB from 0 to 1: darker than the floor, and duller than every body."""
+"""Colour of colliders, sRGB from 0 to 1: darker than the floor and less saturated than any body."""
 
 
 @dataclass(frozen=True)
 class Prop:
-    """Something solid that is drawn where a collider or a frame is: a hand, a hook.
+    """A solid object drawn at a collider or a frame, such as a hand or a hook.
 
     Args:
-        surface: what is drawn, in the axes of `place`, as `surface()` of shapes gives it.
-        place: what it goes with.
+        surface: triangles in the axes of `place`, see `surface()` of shapes.
+        place: collider or frame that it moves with.
         color: sRGB from 0 to 1.
     """
 
@@ -38,15 +38,15 @@ class Prop:
 
 
 class Scenery:
-    """All colliders of a world but its floor, and further props, as surfaces to draw.
+    """Surfaces of all colliders of a world except its floor, and of further props.
 
-    As bodies are, they are drawn between the last two steps: tell it before each step.
+    They are interpolated between the last two steps, as bodies are: call `remember` before each step.
     """
 
     def __init__(
         self, world: World, props: Sequence[Prop] = (), colors: Mapping[Collider, Color] | None = None
     ) -> None:
-        """`colors`: sRGB from 0 to 1 of colliders that are to stand out from the others."""
+        """`colors`: sRGB from 0 to 1 of highlighted colliders."""
         given = colors or {}
         seen = [
             Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)
@@ -57,11 +57,11 @@ class Scenery:
         self.remember()
 
     def remember(self) -> None:
-        """Note where everything is, before a step."""
+        """Store all poses, before a step."""
         self._before = [_pose(prop) for prop in self._props]
 
     def at(self, alpha: float) -> list[Surface]:
-        """The surfaces on their way from where they were remembered (0) to where they are (1)."""
+        """Return the surfaces, interpolated from their stored (0) to their current pose (1)."""
         for prop, surface, (start, turn) in zip(self._props, self._surfaces, self._before, strict=True):
             end, last_turn = _pose(prop)
             rotation = matrix_of(turned_by(turn, alpha * rotation_vector(turn, last_turn)))
@@ -77,12 +77,12 @@ def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def is_level(collider: Collider) -> bool:
-    """Whether it is a level plane, as the floor is, which the renderer draws by itself."""
+    """True for a level plane, such as the floor, which the renderer draws itself."""
     return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
 
 
 def drawn_surface(shape: Shape) -> Triangles:
-    """The surface of a shape; ground gets sides, down to its lowest place."""
+    """Return the surface of a shape; ground gets sides down to its lowest point."""
     vertices, triangles = shape.surface()
     if not isinstance(shape, HeightFieldShape):
         return vertices, triangles

@@ -1,4 +1,4 @@
-"""A picture's worth of samples: which triangle is seen where, and how deep."""
+"""Raster of an image: visible triangle and depth of each sample."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from taichi_soft.render.kernel_types import TILE, matrix
 from taichi_soft.render.raster_kernels import rasterize
 from taichi_soft.render.scene import SceneArrays
 
-# Places of samples inside a pixel [pixels]. Four lie on a turned grid: no two in a row or column, which
-# smooths the nearly upright and nearly level edges that the eye sees best.
+# Positions of samples inside a pixel [pixels]. Four samples form a rotated grid: no two share a row or
+# column, which smooths near-vertical and near-horizontal edges best.
 CENTER = np.zeros((1, 2), dtype=np.float32)
 ROTATED_GRID = np.array([(-1, -3), (3, -1), (-3, 1), (1, 3)], dtype=np.float32) / 8.0
 
@@ -21,14 +21,14 @@ NOTHING_BEHIND = (0.0, 0.0, -NO_LIMIT)
 
 
 class Raster:
-    """Buffers of one picture size, allocated once; the lists of triangles grow with the scene.
+    """Buffers of one image size, allocated once; the triangle lists grow with the scene.
 
     Attributes:
-        depth: float32 (height * width * samples,), the q of `project_triangles` seen there.
-        owner: int32, of the same length, index of the triangle seen there or -1.
+        depth: float32 (height * width * samples,), q of the visible triangle, see `project_triangles`.
+        owner: int32 of the same length, index of the visible triangle or -1.
         planes: float32 (m, 12), edges and depth of the triangles of the last `draw`.
-        tile_begin: int32, running sum of triangles per tile; a tile without any is not cleared if
-            `draw` was told to keep it.
+        tile_begin: int32, running sum of triangles per tile. With `keep_empty_tiles`, `draw` does not clear
+            tiles without triangles.
     """
 
     def __init__(self, width: int, height: int, samples: NDArray[np.float32]) -> None:
@@ -51,13 +51,13 @@ class Raster:
         *,
         keep_empty_tiles: bool = False,
     ) -> None:
-        """Find what each sample sees.
+        """Find the visible triangle of each sample.
 
         Args:
             to_picture: (4, 4), see `project_triangles`.
-            near: smallest depth drawn [m]; None without perspective, where every depth is 1.
-            backdrop: plane of q = a u + b v + c that hides what is behind it.
-            keep_empty_tiles: leave the samples of tiles without triangles as they are, to save time.
+            near: smallest depth drawn [m]; None for an orthographic projection, where every depth is 1.
+            backdrop: plane q = a u + b v + c that hides everything behind it.
+            keep_empty_tiles: do not clear tiles without triangles, to save time.
         """
         if len(self.planes) != len(scene.triangles):
             self.planes = np.zeros((len(scene.triangles), PLANE), dtype=np.float32)

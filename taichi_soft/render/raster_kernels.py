@@ -1,9 +1,9 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""The nearest triangle of every sample of a picture.
+"""Find the nearest triangle of every sample of an image.
 
-Tiles are independent, and each goes through its triangles in their order: the result has the same bits
-whatever the number of threads.
+Tiles are independent, and each processes its triangles in order, so the result is bit-identical for any
+number of threads.
 """
 
 from taichi_soft.core.runtime import ti
@@ -12,7 +12,7 @@ from taichi_soft.render.kernel_types import TILE, int_rows, ints, reals, rows, v
 
 @ti.func
 def row_limits(slope, inv_slope, start, low, high):
-    """The part of low to high where slope x + start >= 0."""
+    """Subinterval of [low, high] where slope x + start >= 0."""
     x = -start * inv_slope
     return ti.max(low, ti.select(slope >= 0.0, x, low)), ti.min(high, ti.select(slope < 0.0, x, high))
 
@@ -39,17 +39,17 @@ def rasterize(
     depth: reals,
     owner: ints,
 ):
-    """Nearest triangle of each sample.
+    """Find the nearest triangle of each sample.
 
     Args:
-        samples: (s, 2), places inside a pixel, from its middle [pixels].
-        backdrop: a, b, c of the plane q = a u + b v + c behind which nothing is seen.
+        samples: (s, 2), positions inside a pixel, from its centre [pixels].
+        backdrop: a, b, c of the plane q = a u + b v + c that hides everything behind it.
         nearest: largest q that is drawn.
-        clear_all: 0 leaves tiles without triangles as they are.
-        tile_next: scratch, as long as there are tiles.
-        tile_triangles: scratch, at least as long as `project_triangles` returned.
+        clear_all: 0 does not clear tiles without triangles.
+        tile_next: scratch, one entry per tile.
+        tile_triangles: scratch, at least as long as the result of `project_triangles`.
         depth: out, q of sample s of pixel p = v width + u at p * s_count + s; the largest is the nearest.
-        owner: out, the triangle there, or -1.
+        owner: out, the triangle of each sample, or -1.
     """
     tiles_across = (width + TILE - 1) // TILE
     ti.loop_config(serialize=True)
@@ -82,7 +82,7 @@ def rasterize(
             a1, b1, c1 = planes[t, 3], planes[t, 4], planes[t, 5]
             a2, b2, c2 = planes[t, 6], planes[t, 7], planes[t, 8]
             aq, bq, cq = planes[t, 9], planes[t, 10], planes[t, 11]
-            # Farther outside than half a pixel along an edge's slope, no sample of the pixel is inside.
+            # A pixel more than half a pixel outside along an edge's slope has no sample inside.
             m0 = c0 + 0.5 * (ti.abs(a0) + ti.abs(b0) + a0 + b0)
             m1 = c1 + 0.5 * (ti.abs(a1) + ti.abs(b1) + a1 + b1)
             m2 = c2 + 0.5 * (ti.abs(a2) + ti.abs(b2) + a2 + b2)

@@ -1,4 +1,4 @@
-"""Pictures of soft bodies on the processor: no display, no graphics driver."""
+"""Render soft bodies on the CPU, without a display or a graphics driver."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
 from taichi_soft.render.tone import encode_table, light_table
 
-LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
+LARGEST = 8192  # pixels along an image; beyond it sample indices exceed 32 bits
 
 
 class Renderer:
-    """Draws surfaces in a warm key light and a cool fill, over a checked floor that fades to the horizon.
+    """Draws surfaces with a warm key light and a cool fill, over a checked floor that fades to the horizon.
 
-    Shadows are soft. Where bodies come close they take light from each other. What is too bright for a screen
-    is pressed together, see `tone`.
+    Shadows are soft, nearby surfaces occlude ambient light, and tone mapping compresses bright tones, see
+    `tone`.
 
     Args:
-        width, height: of the picture, 16 to 8192 [pixels].
-        camera: where it is taken from; it may be replaced between frames. The sun stands over its left
-            shoulder at first and stays there in the world.
-        floor: height of the floor [m], or None for bodies in empty air.
-        check: edge of a check of the floor [m]; None takes a round number that suits the camera's distance.
+        width, height: size of the image, 16 to 8192 [pixels].
+        camera: the camera; it can be replaced between frames. The sun starts over the left shoulder of the
+            first camera and stays fixed in the world.
+        floor: height of the floor [m], or None for no floor.
+        check: edge of the floor's checks [m]; None chooses a round number from the camera's distance.
         backdrop: sky and floor, see `Backdrop`.
     Raises: OptionError for arguments out of range.
 
-    Starts Taichi if nothing has started it, as a `World` does; the kernels are made for the processor. The
-    buffers are allocated here, and compiling happens at the first frame; a picture has the same bits on every
-    run and for any number of threads.
+    The constructor starts Taichi on the CPU if it is not running, as a `World` does, and allocates the
+    buffers. Kernels compile at the first frame. An image is bit-identical in every run and for any number of
+    threads.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Renderer:
 
     @property
     def camera(self) -> Camera:
-        """Where the next picture is taken from."""
+        """Camera of the next image."""
         assert self._camera is not None
         return self._camera
 
@@ -127,11 +127,11 @@ class Renderer:
         return direction
 
     def render(self, surfaces: Sequence[Surface]) -> NDArray[np.uint8]:
-        """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.
+        """Render surfaces to a new image, sRGB, uint8 (height, width, 3).
 
-        Through a jelly all is seen that is behind it, other jellies excepted.
+        A jelly shows everything behind it except other jellies.
         Args:
-            surfaces: what is drawn, where their positions are now.
+            surfaces: surfaces at their current positions.
         Raises: OptionError for anything that is not a `Surface`.
         """
         scene = SceneArrays.of(surfaces)
@@ -142,7 +142,7 @@ class Renderer:
         return self._draw(scene, self._draw(SceneArrays.of(opaque), self._plain))
 
     def _draw(self, scene: SceneArrays, opaque: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The picture of a scene in the shadows that were found last; `opaque` is seen through jellies."""
+        """Render a scene with the current shadow maps; `opaque` is the image behind jellies."""
         camera = self.camera
         behind = self._floor_depth()
         self._raster.draw(scene, self._to_picture, camera.near, behind, keep_empty_tiles=True)
@@ -191,7 +191,7 @@ class Renderer:
         return picture
 
     def _floor_depth(self) -> tuple[float, float, float]:
-        """Plane of 1 / depth of the floor over the picture; it hides what has sunk into it."""
+        """Plane of the floor's 1 / depth over the image; it hides surfaces below the floor."""
         if self.floor is None or self.camera.eye[2] <= self.floor:
             return NOTHING_BEHIND
         a, b, c = (float(x) / (self.floor - self.camera.eye[2]) for x in self._rays[2])
@@ -199,6 +199,6 @@ class Renderer:
 
 
 def _round_length(length: float) -> float:
-    """The nearest of 1, 2 and 5 times a power of ten below a length."""
+    """Round a length down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length)

@@ -1,4 +1,4 @@
-"""A recording made again: the same world, the same calls, the same bits; and what broke in it."""
+"""Replay a recording: rebuild the world, repeat its calls, compare the states, and report failures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.failure import Failure
-from taichi_soft.control.drives import push_bodies
+from taichi_soft.control.drives import accelerate_bodies
 from taichi_soft.core.checks import as_count, as_path
 from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
 from taichi_soft.core.handles import Handle, handles_of, is_recorded
@@ -27,25 +27,25 @@ from taichi_soft.world.world import World, context_of_world
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """What a recording showed."""
+    """Result of a replay."""
 
-    world: World  # as it is at the end
-    steps: int  # made again
-    first_difference: int | None  # step count of the world after which a state was another; None for none
-    failures: tuple[Failure, ...]  # of the bodies that are frozen at the end
+    world: World  # in its final state
+    steps: int  # number of replayed steps
+    first_difference: int | None  # step count of the first state that differs from the recording, or None
+    failures: tuple[Failure, ...]  # of bodies that are frozen at the end
     picture: Path | None
-    hash: str  # of the last state, as pages and the C library print it
+    hash: str  # of the last state, as web pages and the C library print it
 
 
 def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayReport:
-    """Make a recording again.
+    """Replay a recording.
 
     Args:
-        path: of a file that `World.save_recording`, a body that froze or a page of the gallery has written.
-        picture: of the end, .png; None draws nothing.
-        steps: to make, at most; None makes all.
-    Raises: SnapshotError for what is damaged, no recording, or from another version of this package;
-        VideoError where the picture cannot be written.
+        path: file written by `World.save_recording`, by a frozen body or by a page of the gallery.
+        picture: path for an image of the final state, .png; None draws nothing.
+        steps: largest number of steps; None replays all.
+    Raises: SnapshotError for a damaged file, a file that is not a recording, or one from another version of
+        this package; VideoError if the image cannot be written.
     """
     target = None if picture is None else as_path(picture)
     most = math.inf if steps is None else as_count(steps, "steps", 0)
@@ -56,7 +56,7 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, TaichiSoftError):
             raise
-        raise SnapshotError(f"this recording is not in order: {error!r}") from None
+        raise SnapshotError(f"this recording is damaged: {error!r}") from None
     world.restore(snapshot)
     made, difference = 0, None
     for entry in entries:
@@ -84,7 +84,7 @@ def _is_state(world: World, expected: str) -> bool:
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
-    """A world of the same structure; its assets and shapes by their digests."""
+    """Build a world of the same structure. Returns: the world, and its assets and shapes by digest."""
     shapes: dict[str, Any] = {name: from_plain(data) for name, data in made_of["shapes"].items()}
     assets = {name: _asset(options) for name, options in made_of["assets"].items()}
     world = World(**made_of["world"])
@@ -107,10 +107,10 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
-    """One of the calls that a recorder notes, and no other."""
+    """Repeat a recorded call. Refuses calls that a recorder does not store."""
     handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
     if handle is None or not is_recorded(handle, name):
-        raise SnapshotError(f"{name!r} of handle {serial} is no call that is recorded")
+        raise SnapshotError(f"{name!r} of handle {serial} is not a call that recordings contain")
     given = [_value(world, parts, each) for each in arguments]
     named = {key: _value(world, parts, each) for key, each in options["options"].items()}
     getattr(handle, name)(*given, **named)
@@ -127,22 +127,22 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
 
 
 def _step(world: World, seconds: float, substeps: int | None, expected: str, pushes: list[Any]) -> str:
-    """Make a step again. Returns the name that the state had."""
+    """Repeat a step. Returns: the recorded hash of the state."""
     rows = []
     for serial, data in pushes:
         body = handles_of(world).find(serial, Body)
         if body is None:
-            raise SnapshotError(f"there is no body with the number {serial}")
+            raise SnapshotError(f"body {serial} does not exist")
         rows.append((body, from_plain(data)))
-    push_bodies(rows)
+    accelerate_bodies(rows)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # the report tells
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the report lists failures
         world.step(seconds, substeps)
     return expected
 
 
 def _draw(world: World, failures: tuple[Failure, ...], path: Path) -> None:
-    """A picture of the world, with what broke marked."""
+    """Draw the world, with the failed parts marked."""
     broken = {failure.body: failure for failure in failures}
     surfaces = []
     for body in world.bodies:
@@ -169,15 +169,15 @@ def _draw(world: World, failures: tuple[Failure, ...], path: Path) -> None:
     draw_text(image, [f"step {world.step_count}, t = {world.time:.3f} s", *map(failure_line, failures)])
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() != ".png" or not cv2.imwrite(str(path), np.ascontiguousarray(image[:, :, ::-1])):
-        raise VideoError(f"cannot write {str(path)!r}: name a .png file in a folder that takes it")
+        raise VideoError(f"cannot write {str(path)!r}: name a .png file in a writable folder")
 
 
 def failure_line(failure: Failure) -> str:
-    """What broke, in one line."""
-    part = "no part that can be named"
+    """Describe a failure in one line."""
+    part = "an unknown part"
     if failure.tetrahedron is not None:
         part = f"tetrahedron {failure.tetrahedron}"
     elif failure.edge is not None:
         part = f"edge {failure.edge[0]}-{failure.edge[1]}"
     where = "" if failure.substep is None else f", substep {failure.substep}"
-    return f"body {failure.body}: {part} broke first, in step {failure.step}{where}"
+    return f"body {failure.body}: {part} failed first, in step {failure.step}{where}"

@@ -1,4 +1,4 @@
-"""All surfaces of one frame as flat arrays."""
+"""Flat arrays of all surfaces of a frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class SceneArrays:
         positions, normals, colors: float32 (n, 3), [m], unit length, linear light.
         triangles: int32 (m, 3), outward counterclockwise.
         looks: int32 (m,), codes of the triangles, see `look`.
-        textures: of vertices and triangles.
+        textures: textures of all surfaces.
     """
 
     positions: NDArray[np.float32]
@@ -34,12 +34,12 @@ class SceneArrays:
 
     @property
     def is_empty(self) -> bool:
-        """True where there is nothing to see."""
+        """True if the scene has no visible triangle."""
         return len(self.triangles) == 1
 
     @classmethod
     def of(cls, surfaces: Sequence[Surface]) -> SceneArrays:
-        """Collect the surfaces; none at all gives one triangle of no area, which nothing can see.
+        """Collect the surfaces. An empty list gives one degenerate triangle, which is invisible.
 
         Raises: OptionError for anything that is not a `Surface`.
         """

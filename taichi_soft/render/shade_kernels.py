@@ -1,6 +1,6 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Samples to colours, every frame: bodies in their light, and shadows on the floor behind them."""
+"""Shade the samples of a frame: lit bodies, and the floor with its shadows."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
@@ -26,7 +26,7 @@ from taichi_soft.render.texture_funcs import texture_light
 
 @ti.func
 def corner_weights(planes: ti.template(), t, u, v):
-    """Shares of the corners of triangle t in what is seen at (u, v), perspective included."""
+    """Perspective-correct barycentric weights of triangle t at (u, v)."""
     w = ti.Vector(
         [planes[t, 3 * i] * u + planes[t, 3 * i + 1] * v + planes[t, 3 * i + 2] for i in ti.static(range(3))]
     )
@@ -35,7 +35,7 @@ def corner_weights(planes: ti.template(), t, u, v):
 
 @ti.func
 def interpolate(vertex_rows: ti.template(), triangles: ti.template(), t, weights):
-    """A quantity of the vertices, (n, 3), inside triangle t."""
+    """Interpolate a vertex quantity, (n, 3), inside triangle t."""
     a, b, c = (
         row_vec3(vertex_rows, triangles[t, 0]),
         row_vec3(vertex_rows, triangles[t, 1]),
@@ -46,7 +46,7 @@ def interpolate(vertex_rows: ti.template(), triangles: ti.template(), t, weights
 
 @ti.func
 def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.template(), t, u, v):
-    """Texture coordinates of the plane of triangle t at (u, v), also beside the triangle."""
+    """Texture coordinates of the plane of triangle t at (u, v), also outside the triangle."""
     weights = corner_weights(planes, t, u, v)
     a, b, c = (
         row_vec2(uvs, triangles[t, 0]),
@@ -58,7 +58,7 @@ def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.te
 
 @ti.func
 def seen_through(opaque: ti.template(), light_of_byte: ti.template(), rays: ti.template(), normal, x, y):
-    """Light of the picture behind pixel (x, y), shifted as a surface with that normal bends it."""
+    """Light of the image behind pixel (x, y), offset by the refraction at a surface with this normal."""
     size = ti.Vector([opaque.shape[1], opaque.shape[0]])
     right = ti.Vector([rays[k, 0] for k in ti.static(range(3))]).normalized()
     down = ti.Vector([rays[k, 1] for k in ti.static(range(3))]).normalized()
@@ -107,21 +107,21 @@ def shade(
     encode: reals,
     out: picture,
 ):
-    """The picture: average of what its samples see, as sRGB.
+    """Shade the image: average the light of each pixel's samples, as sRGB.
 
     Args:
         reach: height [m] up to which the floor darkens what is above it.
-        light, texel, light_depth: the sun's shadow map, as `shadows.ShadowMaps` has them.
-        near_shadow, far_shadow, far_height, contact, contact_place: the floor's shadows, from there too.
-        looks: codes of the triangles, as `look` has them.
-        q_map, hidden: as `occlusion.Occlusion` has them.
-        uvs, first_level, texels, levels: as `texture.SceneTextures` has them; a texture is multiplied by the
-            colours of the vertices.
+        light, texel, light_depth: the sun's shadow map, see `shadows.ShadowMaps`.
+        near_shadow, far_shadow, far_height, contact, contact_place: the floor's shadows, see there.
+        looks: codes of the triangles, see `look`.
+        q_map, hidden: see `occlusion.Occlusion`.
+        uvs, first_level, texels, levels: see `texture.SceneTextures`; a texture is multiplied by the vertex
+            colours.
         decode: linear light of sRGB 0 to 255.
-        tile_shadowed: 0 for tiles whose floor no shadow reaches.
-        backdrop, plain: what `paint_backdrop` painted.
-        opaque: this picture without what lets light through, which is seen through that.
-        light_of_byte: as `tone.light_table` has it.
+        tile_shadowed: 0 for tiles whose floor has no shadow.
+        backdrop, plain: results of `paint_backdrop`.
+        opaque: image of the opaque surfaces, visible through transparent ones.
+        light_of_byte: see `tone.light_table`.
         out: (height, width, 3).
     """
     width = out.shape[1]
@@ -162,7 +162,7 @@ def shade(
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
                             look = looks[t]
-                            # Of a cloth, the other side may be the one that the key shines on.
+                            # The key may shine on the other side of a cloth.
                             outward = n
                             if look >= CLOTH and n.dot(sun) < 0.0:
                                 outward = -n

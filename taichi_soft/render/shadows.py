@@ -1,4 +1,4 @@
-"""Shadows of one frame: what the sun sees, and what the floor sees above it."""
+"""Shadow maps of a frame: seen from the sun, and from the floor upwards."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ from taichi_soft.render.scene import SceneArrays
 
 COARSE = int(COARSE_TEXELS)
 SIZE = 384  # texels along the sun's map
-CONTACT_SIZE = 192  # texels along the map of what lies over the floor
-# In shares of the size of the scene: blur of a shadow cast from right above the floor, and of one cast from
-# `FAR_HEIGHT` or more; blur and fading height of the darkening where a body touches the floor.
+CONTACT_SIZE = 192  # texels along the contact map, seen from the floor
+# In units of the scene's size: blur of a shadow cast from just above the floor, and of one cast from
+# `FAR_HEIGHT` or more; blur and fade height of contact shadows.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
-SUNK = 0.05  # what lies deeper than this under the floor casts no shadow on it [size of the scene]
-# Bodies farther from the camera's target than this many camera distances cast no shadow, so that one that
-# flies away does not take all texels.
+SUNK = 0.05  # surfaces deeper than this below the floor cast no shadow on it [size of the scene]
+# Bodies farther from the camera's target than this many camera distances cast no shadow, so that a body that
+# flies away does not stretch the map.
 WITHIN = 3.0
 
 Floats = NDArray[np.float32]
 
 
 class ShadowMaps:
-    """Maps of the sun and of contact with the floor, allocated once.
+    """Shadow maps of the sun and of contact with the floor, allocated once.
 
-    The sun's map holds surfaces that face away from it: a body then never shadows its own lit side, and what
-    lies behind a body is in its shadow. What faces the sun on the floor is found by blurring that map.
+    The sun's map holds back faces, so that a body never shadows its own lit side. Shadows on the floor are
+    blurred copies of this map.
 
     Attributes:
         sun: unit vector to the sun.
-        matrix: float32 (4, 4), takes (x, y, z, 1) to texel right, texel down, 1 and height to the sun [m].
+        matrix: float32 (4, 4), maps (x, y, z, 1) to texel right, texel down, 1 and height to the sun [m].
         texel: edge of a texel [m].
-        depth: float32 (SIZE * SIZE,), height to the sun of the first surface that faces away from it [m].
-        near_shadow: float32 (SIZE, SIZE), shadow of what lies right above the floor, 0 to 1.
-        far_shadow, far_height: float32 (SIZE / COARSE,) * 2, shadow of what lies high above, and its height
-            over the floor times that shadow, 1 at `FAR_HEIGHT`.
-        contact_matrix, contact: the same looking up from the floor; darkening by what is close, 0 to 1.
+        depth: float32 (SIZE * SIZE,), height to the sun of the first back face [m].
+        near_shadow: float32 (SIZE, SIZE), shadow of occluders just above the floor, 0 to 1.
+        far_shadow, far_height: float32 (SIZE / COARSE,) * 2, shadow of occluders high above the floor, and
+            their height times that shadow, 1 at `FAR_HEIGHT`.
+        contact_matrix, contact: the same seen from the floor upwards; strength of contact shadows, 0 to 1.
     """
 
     def __init__(self, camera: Camera, floor: float | None, scale: float) -> None:
-        """`scale`: size of the scene [m]; softness and darkening are measured by it."""
+        """`scale`: size of the scene [m], the unit of blur and fade heights."""
         self._floor, self._scale = floor, scale
         outward = np.subtract(camera.eye, camera.target)
         azimuth = math.atan2(outward[1], outward[0]) - SUN_AZIMUTH
@@ -68,11 +68,11 @@ class ShadowMaps:
 
     @property
     def depth(self) -> Floats:
-        """See above."""
+        """Depth map of the sun, see the class."""
         return self._raster.depth
 
     def update(self, scene: SceneArrays, camera: Camera) -> None:
-        """Draw the maps for the bodies where they are now."""
+        """Draw the maps of a scene."""
         away = np.abs(scene.positions - np.array(camera.target)).max(axis=1)
         bodies = scene.positions[away < WITHIN * camera.distance]
         if len(bodies) == 0 or scene.is_empty:
@@ -87,8 +87,8 @@ class ShadowMaps:
             self._spread_contact(self._floor, scene, bodies)
 
     def _spread_sun(self, floor: float) -> None:
-        """Blur the sun's map to the floor's shadows."""
-        # Where the light ray of each row of texels meets the floor: along a row the floor is level.
+        """Blur the sun's map to get the floor's shadows."""
+        # Point where the light ray of each row of texels meets the floor: the floor is level along a row.
         down = (np.arange(0.5, SIZE)[:, None] - self.matrix[1, 3]) * self.texel
         height = self._raster.depth.reshape(SIZE, SIZE) - (floor - down * self._axes[1, 2]) / self.sun[2]
         height *= self.sun[2] / (FAR_HEIGHT * self._scale)
@@ -101,7 +101,7 @@ class ShadowMaps:
         self.far_shadow, self.far_height = _blurred(share, blur), _blurred(high, blur)
 
     def _spread_contact(self, floor: float, scene: SceneArrays, bodies: Floats) -> None:
-        """Find how near the lowest surface over each place of the floor is."""
+        """Find the height of the lowest surface above each texel of the floor."""
         blur = CONTACT_BLUR * self._scale
         matrix, texel = _fit(np.diag([1.0, 1.0, -1.0]), bodies, CONTACT_SIZE, blur)
         self._contact_raster.draw(scene, matrix, None)
@@ -112,7 +112,7 @@ class ShadowMaps:
 
     @property
     def extents(self) -> list[tuple[Floats, NDArray[np.bool_]]]:
-        """Where the floor may be dark: pairs of a matrix to texels and the mask of the dark ones."""
+        """Regions of the floor that may be dark: pairs of a matrix to texels and the mask of dark texels."""
         coarse = (self.matrix / np.array([[COARSE], [COARSE], [1.0], [1.0]])).astype(np.float32)
         return [(coarse, self.far_shadow > FAINTEST), (self.contact_matrix, self.contact > FAINTEST)]
 
@@ -120,10 +120,10 @@ class ShadowMaps:
 def _fit(
     axes: NDArray[np.float64], points: NDArray[np.floating], size: int, blur: float
 ) -> tuple[NDArray[np.float64], float]:
-    """(4, 4) that fits points into a (size, size) map seen against the last axis, and its texel [m].
+    """Matrix (4, 4) that fits points into a (size, size) map seen against the last axis, and its texel [m].
 
-    Texel sizes come in steps and texels keep their places in the world, so that shadows do not crawl while a
-    body moves; round the points stays room for a blur.
+    Texel sizes change in steps and texels are fixed in the world, so that shadows do not crawl while a body
+    moves. The map leaves a border of width `blur` around the points.
     """
     seen = points @ axes[:2].T.astype(np.float32)
     low, high = seen.min(axis=0) - 3.0 * blur, seen.max(axis=0) + 3.0 * blur

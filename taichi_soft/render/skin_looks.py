@@ -1,4 +1,4 @@
-"""How an artist's mesh looks: its texture, and a colour of each vertex."""
+"""Texture and vertex colours of an artist's mesh."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats32 = NDArray[np.float32]
 
-UNSAID = np.full(3, 102 / 255, dtype=np.float32)
-"""The grey that trimesh gives a material without a colour."""
+UNSET = np.full(3, 102 / 255, dtype=np.float32)
+"""The grey that trimesh assigns to a material without a colour."""
 
 
 def texture_picture(visual: Any, count: int) -> Any:
-    """Pillow's image that lies on it, or None.
+    """Return the mesh's texture as an image of Pillow, or None.
 
     Args:
-        visual: trimesh's, or None.
-        count: of vertices. Each needs its place on the image.
+        visual: `visual` of a trimesh mesh, or None.
+        count: number of vertices. Each needs texture coordinates.
     """
     if getattr(visual, "kind", None) != "texture":
         return None
@@ -28,12 +28,12 @@ def texture_picture(visual: Any, count: int) -> Any:
 
 
 def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
-    """sRGB from 0 to 1, (count, 3). A texture is multiplied by them.
+    """Return vertex colours, sRGB from 0 to 1, (count, 3). A texture is multiplied by them.
 
     Args:
-        visual: trimesh's, or None.
-        count: of vertices.
-        otherwise: colour (3,) where there is neither a texture nor a colour.
+        visual: `visual` of a trimesh mesh, or None.
+        count: number of vertices.
+        otherwise: colour (3,) of a mesh without texture and colour.
     """
     rows = np.broadcast_to(np.asarray(otherwise, dtype=np.float32), (count, 3)).copy()
     kind = getattr(visual, "kind", None)
@@ -43,7 +43,7 @@ def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
         if own is not None or texture_picture(visual, count) is not None:
             rows[:] = 1.0 if factor is None else _as_colors(factor)[:3]
             rows *= 1.0 if own is None else _as_colors(own)[:, :3]
-        elif factor is not None and not np.array_equal(_as_colors(factor)[:3], UNSAID):
+        elif factor is not None and not np.array_equal(_as_colors(factor)[:3], UNSET):
             rows[:] = _as_colors(factor)[:3]
     elif kind in ("vertex", "face"):
         rows = _as_colors(visual.vertex_colors)[:, :3]
@@ -51,7 +51,7 @@ def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
 
 
 def _as_colors(values: Any) -> Floats32:
-    """From 0 to 1, whether whole numbers up to 255 are given or reals up to 1."""
+    """Scale integers up to 255 to the range 0 to 1; floats are already in it."""
     array = np.asarray(values)
     scale = 255.0 if array.dtype.kind in "iu" else 1.0
     return np.asarray(np.clip(array.astype(np.float32) / scale, 0.0, 1.0), dtype=np.float32)

@@ -22,18 +22,18 @@ from taichi_soft.world.world import World
 
 Paint = Callable[[Body], NDArray[np.float32]]
 
-ROOM = 1.3
-"""Room round the bodies where a stage of a world begins."""
+FIT_MARGIN = 1.3
+"""Size of the default view relative to the bodies."""
 
 
 @dataclass
 class Actor:
-    """A body of a stage, and how it is drawn.
+    """A body of a stage, and its appearance.
 
         Actor(body, (0.9, 0.3, 0.2), look="jelly", label="25 kPa")
 
     A body made by `SoftBodyAsset.from_surface` is drawn as the artist's mesh, in the colours and with the
-    texture of its file where it has any.
+    texture of its file if it has any.
     """
 
     body: Body  # of a built world
@@ -41,34 +41,34 @@ class Actor:
     paint: Paint | None = None  # function that returns colours (n, 3) of all vertices, instead of `color`
     label: str = ""  # caption on the floor in front of the body, plain ASCII
     world: World | None = None  # world of the body; None for the stage's
-    shift: ArrayLike = (0.0, 0.0, 0.0)  # by which the body is drawn away from its place, (3,) [m]
+    shift: ArrayLike = (0.0, 0.0, 0.0)  # offset of the drawn body from its position, (3,) [m]
     look: Look | LookName = Look.MATTE  # "matte", "jelly" or "cloth"
 
 
 @dataclass
 class Stage:
-    """A built world, how it is stepped and how it is seen: what `film` takes.
+    """A built world with its step length, its camera and its looks: the input of `film`.
 
         stage = Stage.of(world, seconds=4.0)
         stage.camera = Orbit(stage.camera, period=8.0)
         film(stage, "balls.mp4")
 
-    Colliders are drawn without being named, and level floors as a chequered plane. All texts are plain ASCII,
-    and short enough for a film of 480 pixels.
+    All colliders are drawn, level floors as a chequered plane. All texts must be plain ASCII. Keep them short
+    enough for a film of 480 pixels.
     """
 
     title: str  # text in the corner
     world: World  # built
-    actors: list[Actor]  # bodies that are drawn; `act` may add some
-    camera: Camera | Orbit | Follow  # fixed, going round a place, or going with a body
+    actors: list[Actor]  # bodies to draw; `act` may add some
+    camera: Camera | Orbit | Follow  # fixed, orbiting a point, or following a body
     step: FixedStep  # length of a step, its substeps, and the most steps of a frame
-    seconds: float  # time of the world that a film shows [s]
-    act: Callable[[World], object] | None = None  # called before every step: to move colliders, grab, throw
-    props: list[Prop] = field(default_factory=list)  # solid things that go with colliders or frames
+    seconds: float  # world time of a film [s]
+    act: Callable[[World], object] | None = None  # called before every step, to move colliders, grab or throw
+    props: list[Prop] = field(default_factory=list)  # solid objects that move with colliders or frames
     caption: Callable[[], str] | None = None  # function that returns a further line of text for each frame
     scale: ColorScale | None = None  # meaning of the colours of bodies, drawn as a bar
-    legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and what they stand for
-    collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of colliders that are to stand out
+    legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and their meaning
+    collider_colors: dict[Collider, Color] = field(default_factory=dict)  # colours of highlighted colliders
     backdrop: Backdrop | BackdropName = Backdrop.DAY  # sky and floor
 
     @classmethod
@@ -81,16 +81,17 @@ class Stage:
         step: FixedStep | None = None,
         act: Callable[[World], object] | None = None,
     ) -> Stage:
-        """A stage of a world as it stands: its bodies in different colours, seen whole.
+        """Make a stage from a world: bodies in different colours, all in view.
 
-        Change what it returns as you like, before a film begins.
+        You can change the returned stage before a film begins.
         Args:
-            world: built. Bodies without triangles, such as ropes, are not drawn.
+            world: a built world. Bodies without triangles, such as ropes, are not drawn.
             title: text in the corner; none by default.
-            seconds: time of the world that a film shows [s].
-            step: length of a step; `FixedStep()`, which has 1/60 s, by default.
+            seconds: world time of a film [s].
+            step: length of a step; `FixedStep()` (1/60 s) by default.
             act: called with the world before every step.
-        Raises: OptionError for what is no world or has no body to draw; StateError before `build`.
+        Raises: OptionError for an argument that is not a world, or a world without bodies to draw; StateError
+            before `build`.
         """
         if not isinstance(world, World):
             raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
@@ -104,5 +105,5 @@ class Stage:
         low, high = rows.min(axis=0), rows.max(axis=0)
         floor = world.settings.floor
         low[2] = low[2] if floor is None else min(low[2], floor)
-        camera = Camera.framing(low, high, aspect=16 / 9, margin=ROOM)
+        camera = Camera.framing(low, high, aspect=16 / 9, margin=FIT_MARGIN)
         return cls(title, world, actors, camera, FixedStep() if step is None else step, seconds, act)

@@ -1,4 +1,4 @@
-"""What is drawn: a surface of triangles whose vertices move and may have colours."""
+"""Surface to draw: triangles whose vertices move and may have colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
-# Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
+# Larger coordinates [m] come from an explosion, and their products overflow in float32.
 FARTHEST = 1e7
 
 
@@ -21,19 +21,19 @@ class Surface:
     """Triangles over the vertices of a body. Set `positions`, and `color` if it changes, before each frame.
 
     Args:
-        positions: (n, 3), all vertices of the body, inner ones too [m]. Where the surface bends by more than
-            60 degrees between two triangles now, it keeps a sharp edge; elsewhere it is shaded as round.
-        triangles: (m, 3) vertex indices, counterclockwise seen from outside. Triangles are seen from
-            outside only, but those of a cloth, and shadows take the surface to be closed.
+        positions: (n, 3), all vertices of the body, inner ones too [m]. Edges between triangles that now meet
+            at more than 60 degrees stay sharp; all others are shaded smooth.
+        triangles: (m, 3) vertex indices, counterclockwise seen from outside. Only a cloth is drawn from both
+            sides. Shadows assume a closed surface.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
-        normals: (n, 3) of unit length to shade by instead; set them with the positions before each frame.
-        texture: a picture on it, which is multiplied by `color`: give that as white, to see it as it is.
-        uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper
-            right; beyond that it repeats.
-        look: what it is made of: "matte", "jelly" or "cloth".
-            Where a cloth has each triangle twice, once from either side, the first of both is its front.
+        normals: (n, 3), unit normals for shading instead; set them with the positions before each frame.
+        texture: texture, multiplied by `color`; use white to leave it unchanged.
+        uv: (n, 2), texture coordinates of the vertices: (0, 0) at the lower left, (1, 1) at the upper right;
+            the texture repeats.
+        look: "matte", "jelly" or "cloth".
+            If a cloth has each triangle twice, once per side, the first one is its front.
     Raises: OptionError for wrong shapes, an unknown look, a texture without `uv` or the reverse, positions
-        that are not finite (a picture of an exploded body shows nothing) or colours out of range; MeshError
+        that are not finite (as after an explosion) or colours out of range; MeshError
         for indices out of range.
     """
 
@@ -62,12 +62,12 @@ class Surface:
         if self.look is Look.CLOTH:
             corners, codes = _both_sides(corners)
         self.looks = codes
-        # Only vertices on the surface are projected and lit, those on sharp edges once per side.
+        # Only vertices on the surface are projected and lit; vertices on sharp edges once per side.
         if normals is None:
             self._used, self.triangles = split_at_creases(first, corners, DEFAULT_CREASE)
         else:
             self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
-            if self.look is Look.CLOTH:  # whose back has vertices of its own, with normals the other way
+            if self.look is Look.CLOTH:  # its back has separate vertices, with opposite normals
                 self._used = np.tile(self._used, 2)
                 self.triangles[codes == CLOTH_BACK] += self.vertex_count
         self.positions = first
@@ -88,7 +88,7 @@ class Surface:
     def of(
         cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0], look: Look | LookName = Look.MATTE
     ) -> Surface:
-        """The surface of a mesh, at rest until its `positions` are set.
+        """Make the surface of a mesh, at rest until its `positions` are set.
 
         Args:
             mesh: a `TetMesh`, or a `ParticleMesh` with triangles.
@@ -104,7 +104,8 @@ class Surface:
 
     @property
     def positions(self) -> NDArray[np.float32]:
-        """The vertices on the surface, float32 (k, 3) [m]; those on sharp edges once per side.
+        """Positions of the vertices on the surface, float32 (k, 3) [m]; vertices on sharp edges once per
+        side.
 
         Set it to all n vertices of the body, (n, 3).
         """
@@ -116,7 +117,7 @@ class Surface:
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
             raise OptionError(f"positions must have shape ({self.vertex_count}, 3), got {rows.shape}")
         outer = rows[self._used].astype(np.float32)
-        if not np.abs(outer).max() < FARTHEST:  # written so that NaN is refused too
+        if not np.abs(outer).max() < FARTHEST:  # also refuses NaN
             bad = int(np.argmin((np.abs(outer) < FARTHEST).all(axis=1)))
             raise OptionError(
                 f"vertex {self._used[bad]} is at {outer[bad].tolist()}: positions must be finite and below "
@@ -126,7 +127,7 @@ class Surface:
 
     @property
     def normals(self) -> NDArray[np.float32] | None:
-        """Normals of `positions` to shade by, float32 (k, 3), or None. Set them to (n, 3)."""
+        """Shading normals of `positions`, float32 (k, 3), or None. Set them as (n, 3)."""
         return self._normals
 
     @normals.setter
@@ -137,7 +138,7 @@ class Surface:
 
     @property
     def color(self) -> NDArray[np.float32]:
-        """Linear light of `positions`, float32 (k, 3). Set it to sRGB, (3,) or (n, 3)."""
+        """Colour of `positions` in linear light, float32 (k, 3). Set it as sRGB, (3,) or (n, 3)."""
         return self._color
 
     @color.setter
@@ -154,9 +155,9 @@ class Surface:
 
 
 def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
-    """The triangles of a sheet from its front and then from its back, and their codes.
+    """List the triangles of a sheet, fronts first and then backs, with their codes.
 
-    What is there twice, from either side, is taken once.
+    A triangle that the sheet has twice, once per side, is used once.
     """
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     front = triangles[np.sort(first)]

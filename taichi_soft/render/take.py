@@ -1,4 +1,4 @@
-"""Steps a stage frame by frame, as a game loop does, with a clock at its side."""
+"""Step a stage frame by frame, as a game loop does, and time it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from taichi_soft.world.world import World
 
 
 class Take:
-    """A stage that goes on, and where its bodies are drawn.
+    """A running stage, and the positions at which its bodies are drawn.
 
     Attributes:
-        adapter: which steps the world.
-        positions, normals: of each actor, float32 (n, 3); those of skins have normals of their own.
-        times: that stepping and reading each frame took [s].
+        adapter: adapter that steps the world.
+        positions, normals: of each actor, float32 (n, 3); skins have separate normals.
+        times: time to step and read each frame [s].
     """
 
     def __init__(self, stage: Stage, scenery: Scenery) -> None:
@@ -40,7 +40,7 @@ class Take:
             self.stage.act(world)
 
     def play(self, seconds: float) -> None:
-        """Go on by some time of the world [s], 0 to stay, and read where everything is."""
+        """Advance by a world time [s], 0 to stay, and read all positions."""
         start = time.perf_counter()
         if seconds > 0.0:
             self.adapter.advance(seconds)
@@ -61,12 +61,12 @@ class Take:
         self._spent += time.perf_counter() - start
 
     def end_frame(self) -> None:
-        """Note what the frame took."""
+        """Record the time of the frame."""
         self.times.append(self._spent)
         self._spent = 0.0
 
     def camera(self) -> Camera:
-        """Where the stage is looked at from now. Raises: OptionError where it follows what is not drawn."""
+        """Return the current camera. Raises: OptionError if it follows a body that is not drawn."""
         camera = self.stage.camera
         return camera if isinstance(camera, Camera) else camera.at(self.adapter.time, self._box_of)
 
@@ -74,14 +74,14 @@ class Take:
         for actor, rows in zip(self.stage.actors, self.positions, strict=True):
             if actor.body is body:
                 return np.array([rows.min(axis=0), rows.max(axis=0)], dtype=np.float64)
-        raise OptionError("the camera follows a body that is no actor of the stage")
+        raise OptionError("the camera follows a body that is not an actor of the stage: add an Actor for it")
 
 
 def skins_of(actor: Actor) -> tuple[SkinMesh, ...]:
-    """What is drawn in place of its body's surface, unless that is painted."""
+    """Skins that are drawn instead of the body's surface, unless the actor has `paint`."""
     return () if actor.paint else actor.body.render_meshes
 
 
 def _vertex_count(actor: Actor) -> int:
-    """Of what is drawn of it."""
+    """Number of vertices that are drawn of an actor."""
     return sum(mesh.vertex_count for mesh in skins_of(actor)) or actor.body.vertex_count

@@ -1,4 +1,4 @@
-"""Pictures on surfaces, and those of a whole scene as flat arrays."""
+"""Textures of surfaces, and flat arrays of the textures of a scene."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.render.colors import to_linear, to_srgb
 
 LARGEST = 16384
-"""Pixels along a texture."""
+"""Largest edge of a texture [pixels]."""
 
 LEVEL = 4
-"""Numbers per level: where its pixels begin, its width, its height, and how many smaller ones follow."""
+"""Numbers per mip level: first texel, width, height, and number of smaller levels that follow."""
 
 
 class Texture:
-    """A picture on a surface, with copies of half its size, a quarter, and so on: what is seen from afar is
-    looked up in those, and does not flicker.
+    """A texture with its mipmap, which prevents flicker at a distance.
 
     Args:
         pixels: sRGB, uint8 (height, width, 3), the first row at the top.
@@ -29,7 +28,7 @@ class Texture:
 
     Attributes:
         texels: uint8 (k, 3), the pixels of all levels, the largest first.
-        levels: int32 (l, 4), see `LEVEL`.
+        levels: int32 (l, 4), mip levels, see `LEVEL`.
     """
 
     def __init__(self, pixels: ArrayLike) -> None:
@@ -55,7 +54,7 @@ class Texture:
 
 
 def _halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Means of two by two pixels, as light; an odd last row or column counts twice."""
+    """Average two by two pixels in linear light; an odd last row or column counts twice."""
     height, width = picture.shape[:2]
     padded = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
     light = to_linear(padded.astype(np.float32) / 255.0)
@@ -65,12 +64,12 @@ def _halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 @dataclass(frozen=True)
 class SceneTextures:
-    """Textures of every surface, one after the other.
+    """Textures of all surfaces, concatenated.
 
     Attributes:
-        uv: float32 (n, 2) of the vertices, from the lower left.
-        first_level: int32 (m,) of the triangles: the largest level of their texture, or -1.
-        texels, levels: as of `Texture`.
+        uv: float32 (n, 2), texture coordinates of the vertices, from the lower left.
+        first_level: int32 (m,), largest mip level of each triangle's texture, or -1.
+        texels, levels: see `Texture`.
     """
 
     uv: NDArray[np.float32]
@@ -86,7 +85,7 @@ class SceneTextures:
         vertex_counts: Sequence[int],
         triangle_counts: Sequence[int],
     ) -> SceneTextures:
-        """Collect them; what several surfaces share is there once."""
+        """Collect the textures; a texture that several surfaces share is stored once."""
         uv = [
             np.zeros((n, 2), dtype=np.float32) if own is None else own
             for own, n in zip(uvs, vertex_counts, strict=True)

@@ -1,6 +1,6 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Looking up textures."""
+"""Sample textures."""
 
 from taichi_soft.core.runtime import ti
 
@@ -13,7 +13,7 @@ def texel_light(texels: ti.template(), decode: ti.template(), i):
 
 @ti.func
 def level_light(texels: ti.template(), levels: ti.template(), decode: ti.template(), level, uv):
-    """Linear light at `uv` in one level, between the middles of its four nearest texels. It repeats."""
+    """Linear light at `uv` in one mip level, bilinear between texel centres; the texture repeats."""
     start, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x = (uv.x - ti.floor(uv.x)) * width - 0.5
     y = (1.0 - (uv.y - ti.floor(uv.y))) * height - 0.5
@@ -21,7 +21,7 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
     across, down = x - ti.floor(x), y - ti.floor(y)
     total = ti.Vector([0.0, 0.0, 0.0])
     for j, i in ti.static(ti.ndrange(2, 2)):
-        # The remainder is in range whatever the number is, that of NaN too.
+        # The remainder is in range for any number, even NaN.
         at = start + (top + j) % height * width + (left + i) % width
         share = (across if i else 1.0 - across) * (down if j else 1.0 - down)
         total += share * texel_light(texels, decode, at)
@@ -32,16 +32,16 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
 def texture_light(
     texels: ti.template(), levels: ti.template(), decode: ti.template(), first, uv, uv_right, uv_below
 ):
-    """Linear light at `uv` of the texture whose largest level is `first`, averaged over about a pixel.
+    """Sample a texture at `uv` with trilinear filtering; `first` is its largest mip level.
 
     Args:
-        uv_right, uv_below: what the next pixels to the right and below see of it.
+        uv_right, uv_below: texture coordinates at the next pixels to the right and below.
     """
     size = ti.Vector([ti.f32(levels[first, 1]), ti.f32(levels[first, 2])])
     right, below = (uv_right - uv) * size, (uv_below - uv) * size
     wide = ti.sqrt(ti.max(right.dot(right), below.dot(below)))  # [texels]
     steps = 0.0
-    if wide > 1.0:  # written so that NaN is the largest level
+    if wide > 1.0:  # NaN takes the largest level
         steps = ti.min(ti.log(wide) / ti.log(2.0), ti.f32(levels[first, 3]))
     finer = ti.math.clamp(ti.i32(steps), 0, levels[first, 3])
     coarser = ti.min(finer + 1, levels[first, 3])

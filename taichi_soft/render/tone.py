@@ -1,4 +1,4 @@
-"""From light without an upper end to what a screen shows: a toe, a straight middle and a shoulder."""
+"""Tone mapping from unbounded linear light to the screen: a toe, a linear middle and a shoulder."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from taichi_soft.render.colors import to_srgb
 Floats = NDArray[np.float32]
 
 WHITE = 4.0
-"""Linear light that a picture shows as full white, and all that is brighter."""
+"""Linear light that an image shows as full white."""
 
 TOE = 0.010
-"""Linear light about which dark tones are deepened."""
+"""Linear light around which dark tones are deepened."""
 
 KNEE = 0.55
-"""Linear light above which bright tones are pressed together; between the toe and it colours are kept."""
+"""Linear light above which bright tones are compressed; colours between toe and knee are unchanged."""
 
 STEPS = 4096
 """Length of the table that kernels read."""
 
 
 def tone_map(light: NDArray[np.floating]) -> Floats:
-    """Linear light of a scene as linear light of a screen, 0 to 1: 0 stays black, `WHITE` becomes white.
+    """Map linear light of a scene to linear light of a screen, 0 to 1; 0 stays black, `WHITE` becomes white.
 
     Args:
-        light: of any shape; it is taken as 0 below 0 and as `WHITE` above it.
+        light: array of any shape, clamped to 0 and `WHITE`.
     """
     x = np.clip(np.asarray(light, dtype=np.float64), 0.0, WHITE)
     deep = x * x / (x + TOE)
@@ -34,19 +34,19 @@ def tone_map(light: NDArray[np.floating]) -> Floats:
 
 
 def _shoulder(x: NDArray[np.float64] | np.float64) -> NDArray[np.float64]:
-    """Straight up to the knee, then ever flatter, without a bend."""
+    """Linear up to the knee, then a smooth exponential shoulder."""
     room = 1.0 - KNEE
     return np.where(x < KNEE, x, 1.0 - room * np.exp(-np.maximum(x - KNEE, 0.0) / room))
 
 
 def encode_table() -> Floats:
-    """sRGB, 0 to 255, of light from 0 to `WHITE`, `STEPS` of them: even steps of its square root, as the eye
-    tells dark tones apart better than bright ones."""
+    """Table of sRGB, 0 to 255, of light from 0 to `WHITE` in `STEPS` even steps of its square root, because
+    the eye distinguishes dark tones better than bright ones."""
     return np.asarray(255.0 * to_srgb(tone_map(_table_light())), dtype=np.float32)
 
 
 def light_table() -> Floats:
-    """Linear light that a picture shows as sRGB 0 to 255, (256,): the inverse of `encode_table`."""
+    """Table of linear light of sRGB 0 to 255, (256,): the inverse of `encode_table`."""
     return np.asarray(np.interp(np.arange(256), encode_table(), _table_light()), dtype=np.float32)
 
 

@@ -1,4 +1,4 @@
-"""Films: frames in, one checked file out."""
+"""Write films and check them."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ CONTAINERS: dict[str, type[Container]] = {".mp4": Stream, ".webm": Stream, ".gif
 
 
 class VideoWriter:
-    """Writes frames to a film, as a context manager; the suffix says of which kind.
+    """Writes frames to a film, as a context manager. The suffix chooses the format.
 
     Args:
-        path: .mp4 (H.264), .webm (VP9), .gif, or .png for numbered pictures: `out/bounce.png` gives
-            `out/bounce_0000.png` and so on. Browsers play all of them. Its folder is made if it is missing.
+        path: .mp4 (H.264), .webm (VP9), .gif, or .png for numbered images: `out/bounce.png` gives
+            `out/bounce_0000.png` and so on. Browsers play all formats. A missing folder is created.
         fps: frames per second, above 0 to 240; at most 50 for .gif.
         size: (width, height) of the frames [pixels], both even for .webm and .mp4.
-    Raises: VideoError for a suffix, size or place that cannot be written; OptionError for other arguments,
-        and where the package that brings ffmpeg is missing (.png does without).
+    Raises: VideoError for a suffix, size or path that cannot be written; OptionError for other arguments,
+        and if the package with ffmpeg is missing (.png does not need it).
 
-    The film is made in a hidden folder beside its place, read back, and moved there only when it holds every
-    frame: after an exception inside the `with`, what was there before is still there. Where the process is
-    killed, the next film in the same place removes that folder. Pictures left over from a longer sequence of
+    The film is written to a hidden folder next to `path`, read back, and moved to `path` only if it has every
+    frame. After an exception inside the `with`, an earlier film at `path` is unchanged. If the process is
+    killed, the next film in the same folder removes the hidden folder. Images left from a longer sequence of
     the same name are removed.
     """
 
@@ -66,7 +66,7 @@ class VideoWriter:
 
         Args:
             frame: sRGB, uint8 (height, width, 3).
-        Raises: VideoError for any other.
+        Raises: VideoError for other shapes or types; StateError after `close`.
         """
         if self._closed:
             raise StateError(f"{self.path} is closed: no frame can be added")
@@ -81,15 +81,15 @@ class VideoWriter:
             raise VideoError(f"frame {self.count} must be uint8 of shape {wanted}, got {what}")
         try:
             self._container.write(frame)
-        except BaseException:  # it may hold half of the frame
+        except BaseException:  # the film may contain half of the frame
             self._give_up()
             raise
         self.count += 1
 
     def close(self) -> None:
-        """Complete the film, check it and move it to its place; once closed, does nothing.
+        """Complete the film, check it and move it to `path`. Further calls do nothing.
 
-        Raises: VideoError, leaving nothing new behind, if there is no frame or a frame is missing.
+        Raises: VideoError if there is no frame or a frame is missing. Then no file is left behind.
         """
         if self._closed:
             return
@@ -123,14 +123,14 @@ class VideoWriter:
             self._give_up()
 
     def _give_up(self) -> None:
-        """Let go of what is not in its place by now; once closed, does nothing."""
+        """Discard unfinished files. Further calls do nothing."""
         if not self._closed:
             self._closed = True
             self._container.abandon()
             self._part.remove()
 
     def _move(self) -> None:
-        """Put the finished film in its place."""
+        """Move the finished film to its path."""
         files = self._container.files
         if self.path.suffix.lower() != ".png":
             files[0].replace(self.path)

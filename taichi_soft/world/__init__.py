@@ -1,1 +1,1 @@
-"""The public face: a world and its bodies."""
+"""Public interface: a world and its bodies."""

@@ -1,4 +1,4 @@
-"""One soft body of a world, as users hold it."""
+"""Public handle to one soft body of a world."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 
 class Body(BodyControl, BodyMeasures):
-    """A handle to one body. Positions and velocities come back in the caller's vertex order."""
+    """A handle to one body. Positions and velocities are in the vertex order of its mesh."""
 
     @property
     def _context(self) -> WorldContext:
@@ -38,7 +38,7 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
-        """What holds it to frames; of a piece that was cut or torn off, what it took along of these."""
+        """Attachments to frames. A piece that was cut or torn off keeps those of its vertices."""
         return tuple(self._context.of(Frames).holding(self))
 
     @recorded
@@ -48,19 +48,19 @@ class Body(BodyControl, BodyMeasures):
         plane: tuple[ArrayLike, ArrayLike] | None = None,
         triangle: ArrayLike | None = None,
     ) -> tuple[Body, ...]:
-        """Cut the body along the faces of tetrahedra next to a plane or a triangle, as it is now.
+        """Cut the body in its current shape, along the faces of tetrahedra next to a plane or a triangle.
 
-        A face opens where the blade passes between the centres of its two tetrahedra. Vertices keep their
-        numbers, copies come behind them; mass, momentum and elastic energy stay. What falls off becomes
-        bodies of the same asset, which take free slots of its pool; the largest part stays this one. In a
-        part, vertices and tetrahedra are counted anew in their order: `vertex_origins` tells what they were.
-        What is attached to a frame stays so in every piece, copies of it as well: see `Attachment`.
+        A face opens if the blade passes between the centres of its two tetrahedra. Vertices keep their
+        indices, and copies are appended. Mass, momentum and elastic energy are conserved. Detached pieces
+        become bodies of the same asset in free slots of its pool; this body keeps the largest piece. Pieces
+        number their vertices and tetrahedra again, in order; `vertex_origins` has the original indices.
+        Attached vertices and their copies stay attached in every piece: see `Attachment`.
         Args:
-            plane: (point (3,) [m], normal (3,)), all through the body.
-            triangle: corners, (3, 3) [m]; the cut ends where it ends.
-        Returns: the bodies that fell off, the largest first; none where nothing does.
+            plane: (point (3,) [m], normal (3,)) of a cut through the whole body.
+            triangle: corners, (3, 3) [m], of a cut that ends at its edges.
+        Returns: the detached bodies, the largest first; empty if the body stays connected.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
-            `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed,
+            `spare_vertices`; StateError if vertices or slots run out, for a body that is frozen, grabbed,
             joined to another or driven by a motor, and before `build`.
             Nothing is changed then.
         Example:
@@ -71,23 +71,24 @@ class Body(BodyControl, BodyMeasures):
         return cast("tuple[Body, ...]", cut(self, plane, triangle))
 
     def render_mesh(self, *, crease: float | None = DEFAULT_CREASE) -> RenderMesh:
-        """What a renderer draws of the body: its surface, with a copy of a vertex per side of a sharp edge.
+        """Make a render mesh of the body's surface, with one vertex per side of a sharp edge.
 
-        `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once a frame. A cut or a
-        tear makes it outdated: see `RenderMesh.is_outdated`.
+        `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once per frame. A cut or a
+        tear invalidates it: see `RenderMesh.is_outdated`.
         Args:
-            crease: angle between neighbouring triangles at rest beyond which their edge is sharp, 0 to 180
-                [degrees]; None: all is shaded as round.
+            crease: angle between adjacent triangles at rest above which their edge is sharp, 0 to 180
+                [degrees]; None shades all edges smooth.
         Raises: OptionError for an angle out of range; MeshError for a body without triangles, such as a rope;
-            StateError for one that was removed.
+            StateError for a removed body.
         """
         return surface_render_mesh(self, crease)
 
     @property
     def render_meshes(self) -> tuple[SkinMesh, ...]:
-        """The artist's meshes that the body carries, in their own order; none where its asset has no skin.
+        """Skins of the body (the artist's meshes), in order; empty if its asset has none.
 
-        They are drawn as a `render_mesh` is, and know trimesh's `visual`: texture coordinates and material.
+        They are drawn like a `render_mesh`, and have trimesh's `visual` with texture coordinates and
+        material.
         """
         return skin_meshes(self)
 
@@ -98,7 +99,7 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def is_asleep(self) -> bool:
-        """True while the body rests and costs nothing (see `World.sleep_speed`)."""
+        """True while the body sleeps and costs no time (see `sleep_speed` of `World`)."""
         simulation = self._context.fields
         return simulation is not None and simulation.is_asleep(self.index)
 
@@ -109,12 +110,12 @@ class Body(BodyControl, BodyMeasures):
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
-        """Put the body into a given state between two steps; a frozen body is active again, and a change of
-        material that is eased in is at its end.
+        """Set positions and velocities between two steps. This activates a frozen body and finishes a change
+        of material.
 
         Args:
             positions: (n, 3) [m].
-            velocities: (n, 3) [m/s], of the same moment.
+            velocities: (n, 3) [m/s], at the same time.
         Raises: OptionError for wrong shapes or numbers that are not finite; StateError before `build`.
         """
         shape = (self.vertex_count, 3)
@@ -125,42 +126,41 @@ class Body(BodyControl, BodyMeasures):
 
     @recorded
     def set_level(self, level: int, *, release: bool = False) -> None:
-        """Go on with more or fewer tetrahedra: a level of detail of the asset, 0 being the finest.
+        """Change the level of detail, and with it the number of tetrahedra; 0 is the finest level.
 
-        Position, velocity, rotation and deformation pass over; centre of mass, momentum and angular momentum
-        are kept to round-off. The vertices nearest to pinned ones are pinned, attachments hold those
-        nearest to what they held, and grabs go on at the same point of the rest shape, with their target and
-        strongest pull. Vertices and tetrahedra are others: `topology_version` counts that. `render_meshes`
-        stay, and are drawn from the new mesh.
+        Position, velocity, rotation and deformation are transferred; centre of mass, momentum and angular
+        momentum are conserved to round-off. Pins and attachments move to the nearest vertices. Grabs continue
+        at the same point of the rest shape, with the same target and largest force. Vertices and tetrahedra
+        change, which `topology_version` counts. `render_meshes` stay valid and follow the new mesh.
         Args:
             level: 0 or more.
-            release: let go of what has no place at the new level, with an event `Released`: joints, motors,
-                and attachments for which it has no vertex. Otherwise these bar the change.
+            release: True releases joints, motors, and attachments that have no vertex at the new level, with
+                an event `Released`. False refuses the change in that case.
         Raises: OptionError for a level that the asset does not have; StateError for a body that is frozen or
-            of a material of its own, for what bars the change, and before `build`. Nothing is changed then.
+            has its own material, for constraints that prevent the change, and before `build`. Then nothing is
+            changed.
         """
         released = set_level(self, level, release)
         clock = self._context.clock
         self._context.built.events.record_released(clock.steps, clock.time, self, released)
 
     def watch_stress(self, threshold: float | None) -> None:
-        """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
+        """Record a `StressExceeded` in every step in which tetrahedra exceed a stress.
 
-        One that stays over it, or has not been below 0.9 of it since, is not named again. The first call in a
-        world compiles, for many seconds with an empty cache, unless `World.warm_up` has done so.
+        A tetrahedron is reported again only after its stress was below 0.9 of the threshold. The first call
+        in a world compiles, for many seconds with an empty cache, unless `World.warm_up` has done so.
         Args:
-            threshold: of `tet_stress` [Pa]; None for no longer.
+            threshold: threshold of `tet_stress` [Pa]; None stops watching.
         Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before
             `build`. The same for `watch_tearing`.
         """
         self._watch(StressExceeded, threshold, "threshold")
 
     def watch_tearing(self, tear_stress: float | None) -> None:
-        """Record a `TearCandidates` in every step in which tetrahedra are pulled harder than they can bear.
+        """Record a `TearCandidates` in every step in which the tension of tetrahedra exceeds a limit.
 
         Args:
-            tear_stress: of the largest principal stress, which pulls, of that of which `tet_stress` is the
-                von Mises stress [Pa]. None for no longer.
+            tear_stress: threshold of the largest principal stress of `stresses` [Pa]; None stops watching.
         """
         self._watch(TearCandidates, tear_stress, "tear_stress")
 

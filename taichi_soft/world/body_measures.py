@@ -1,4 +1,4 @@
-"""What is measured of one body: volume, momentum, energy, strain, stress."""
+"""Measurements of one body: volume, momentum, energy, strain, stress."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ Ints = NDArray[np.int64]
 
 
 class BodyMeasures(SoftBody):
-    """What of a body is computed, in float64 from its float32 state, at the time of the call."""
+    """Quantities of a body, computed at each call in float64 from its float32 state."""
 
     def volumes(self) -> Floats:
-        """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""
+        """Signed volume of each tetrahedron, (m,) [m^3]; negative if it is inverted."""
         return measures.tet_volumes(self)
 
     def volume(self) -> float:
-        """Volume of the body, flipped tetrahedra counted negative [m^3]."""
+        """Volume of the body [m^3]; inverted tetrahedra count negative."""
         return float(self.volumes().sum())
 
     def flipped_count(self) -> int:
-        """Number of tetrahedra that are inside out."""
+        """Number of inverted tetrahedra."""
         return len(self.flipped_tets())
 
     def flipped_tets(self) -> NDArray[np.int64]:
-        """Tetrahedra that are inside out, ascending."""
+        """Inverted tetrahedra, ascending."""
         return np.flatnonzero(self.volumes() < 0)
 
     def pose(self) -> Pose:
-        """The rigid motion of the rest shape that comes nearest to the body, weighted by mass.
+        """Rigid motion of the rest shape that fits the body best, weighted by mass.
 
-        `mesh.vertices @ pose.rotation.T + pose.position` fits the positions best. The rotation never mirrors,
-        also where the body is flat or inside out; about the axis of a straight rope it turns as little as
-        possible.
+        `mesh.vertices @ pose.rotation.T + pose.position` is the best fit to the positions. The rotation never
+        mirrors, even for a flat or inverted body. For a straight rope, the rotation about its axis is
+        minimal.
         """
         return measures.pose(self)
 
@@ -47,31 +47,31 @@ class BodyMeasures(SoftBody):
         return np.asarray(self.masses @ measures.velocities_of(self))
 
     def angular_momentum(self) -> Floats:
-        """About the world's origin, (3,) [kg m^2/s]."""
+        """Angular momentum about the world's origin, (3,) [kg m^2/s]."""
         return measures.angular_momentum(self)
 
     def kinetic_energy(self) -> float:
-        """1/2 sum m v^2 [J]."""
+        """Kinetic energy 1/2 sum m v^2 [J]."""
         return measures.kinetic_energy(self)
 
     def gravitational_energy(self) -> float:
-        """- sum m g.x, zero at the origin [J]."""
+        """Gravitational energy - sum m g.x, zero at the origin [J]."""
         return measures.gravitational_energy(self)
 
     def elastic_energy(self) -> float:
-        """Of springs and the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
+        """Elastic energy [J] of springs and of the laws "st_venant_kirchhoff" and "neo_hookean".
 
-        Of the other laws 1/2 sum V0 sigma : eps of the linear strain: an indicator, not a conserved
-        energy. Their stress is not the derivative of any energy (except of another one at poisson = 1/4), so
-        the total may drift without damping.
+        For the other laws it is 1/2 sum V0 sigma : eps of the linear strain, an indicator that is not
+        conserved. Their stress is not the derivative of an energy (except of another one at poisson = 1/4),
+        so the total energy can drift without damping.
         """
         return measures.elastic_energy(self)
 
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
 
-        Of a body with plasticity the elastic one, against the rest shape as it is now. So are all strains and
-        stresses.
+        For a body with plasticity it is the elastic part, relative to the current rest shape. The same
+        applies to all strains and stresses.
         """
         return measures.deformations(self)
 
@@ -80,28 +80,28 @@ class BodyMeasures(SoftBody):
         return measures.strains(self)
 
     def plastic_strains(self) -> Floats:
-        """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
+        """Permanent equivalent (von Mises) logarithmic strain of each tetrahedron, (m,)."""
         return measures.plastic_strains(self)
 
     def stresses(self) -> Floats:
-        """Stress of each tetrahedron, (m, 3, 3) [Pa], in the axes of the world; above 0 is tension.
+        """Stress of each tetrahedron, (m, 3, 3) [Pa], in world axes; tension is positive.
 
-        The Cauchy stress: force by area as it is now, of the body's own law, without damping. Laws along
-        edges know none: theirs is by Hooke's law and linear strain. Inside out it is finite: that of the
-        mirror image, by law "neo_hookean" that of a negative volume.
+        This is the Cauchy stress of the body's law, force per current area, without damping. Laws along edges
+        have no stress of their own and use Hooke's law with linear strain. For inverted tetrahedra it is
+        finite: that of the mirror image, or for "neo_hookean" that of the negative volume.
         """
         return measures.tet_stresses(self)
 
     def force_across(self, point: ArrayLike, normal: ArrayLike) -> Floats:
         """Elastic force across a plane, (3,) [N].
 
-        The part beyond it, where `normal` points, pulls the other part with this: `stresses` times the areas
-        in which the plane cuts the tetrahedra, as they lie now. In a body at rest it carries what hangs on
-        it, as exactly as the mesh resolves the stress.
+        It is the force of the part on the side of `normal` on the other part: the sum of `stresses` times the
+        areas in which the plane cuts the tetrahedra. In a body at rest it balances the load beyond the
+        plane, as exactly as the mesh resolves the stress.
         Args:
-            point: of the plane, (3,) [m].
-            normal: of the plane, (3,), of any length but zero.
-        Raises: OptionError for a point or normal that is none; MeshError for a body without tetrahedra.
+            point: point of the plane, (3,) [m].
+            normal: normal of the plane, (3,), of any nonzero length.
+        Raises: OptionError for an invalid point or normal; MeshError for a body without tetrahedra.
         """
         return measures.force_across(self, point, normal)
 
@@ -112,14 +112,14 @@ class BodyMeasures(SoftBody):
     def tet_strain(self) -> Floats:
         """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.
 
-        The strain of a pull that keeps the volume; a change of volume alone has none.
+        It is the strain of uniaxial tension at constant volume; a pure change of volume has none.
         """
         return measures.tet_strain(self)
 
     def vertex_stress(self) -> Floats:
-        """`tet_stress` averaged by volume over the tetrahedra round each vertex, (n,) [Pa]."""
+        """Average of `tet_stress` over the tetrahedra around each vertex, weighted by volume, (n,) [Pa]."""
         return measures.vertex_means(self, self.tet_stress())
 
     def vertex_strain(self) -> Floats:
-        """`tet_strain` averaged by volume over the tetrahedra round each vertex, (n,)."""
+        """Average of `tet_strain` over the tetrahedra around each vertex, weighted by volume, (n,)."""
         return measures.vertex_means(self, self.tet_strain())

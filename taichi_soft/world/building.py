@@ -125,9 +125,10 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     settings, contact = context.settings, context.contact
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
+    name = integrator.name.value
     if integrator.only_flat:
         if asked is Schedule.PER_BODY:
-            raise OptionError("integrator 'explicit_euler' runs by schedule 'flat' only: it has no colliders")
+            raise OptionError(f"integrator {name!r} has no colliders: use schedule 'flat' or 'auto'")
         asked = Schedule.FLAT
     for feature, is_asked in {
         "bodies that are cut or have levels of detail": any(
@@ -141,14 +142,15 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     }.items():
         if is_asked and asked is Schedule.FLAT:
             raise OptionError(
-                f"schedule 'flat' takes no {feature}: take 'per_body' or 'auto', and not 'explicit_euler'"
+                f"schedule 'flat' does not support {feature}: use 'per_body' or 'auto', and another integrator "
+                "than 'explicit_euler'"
             )
         if is_asked:
             asked = Schedule.PER_BODY
     if not integrator.has_hulls and _has_hulls(context):
         raise OptionError(
-            "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
-            "without hull"
+            f"integrator {name!r} does not support hulls, because its solves hold vertices: use 'leapfrog', or "
+            "assets without hull"
         )
     return choose_schedule(asked, context.layout, device)
 

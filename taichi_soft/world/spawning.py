@@ -1,4 +1,4 @@
-"""Bodies that come into a world and leave it."""
+"""Add bodies to a world and remove them."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body import Body
 
 MOST_VERTICES = 10_000_000
-"""In a world: the constants of the tetrahedra between more would not be counted in 32 bits."""
+"""Largest number of vertices of a world, for which indices of all element constants fit 32 bits."""
 
 
 def require_open(context: WorldContext) -> None:
-    """Raises: StateError after `World.build`."""
+    """Raise a StateError after `World.build`."""
     if context.fields is not None:
         raise StateError("the world is already built: add_body and reserve come first, then build() once")
 
 
 def require_own(context: WorldContext, body: Any) -> None:
-    """Raises: OptionError for what is no body of this world; StateError for one that was removed."""
+    """Raise an OptionError for a body of another world, and a StateError for a removed one."""
     if not isinstance(body, Body) or not belongs_to(body, context):
-        raise OptionError(f"body must be one that this world made, got {body!r}")
+        raise OptionError(f"body must be a body of this world, got {body!r}")
     require_alive(body)
 
 
@@ -49,7 +49,7 @@ def add_body(
     on_floor: bool,
     overlap: OverlapName,
 ) -> Body:
-    """As `World.add_body`, of an asset made for it; copies share the first one."""
+    """Implement `World.add_body` for a new asset; copies share the first one."""
     rule, key = Overlap.parse(overlap), _content(new)
     asset = context.slots.added.get(key, new)
     place = _place(context, asset, position, rotation, on_floor)
@@ -61,7 +61,7 @@ def add_body(
 
 
 def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
-    """What an asset is made of: the same for copies, as long as one of them is there."""
+    """Key of an asset's content, equal for copies while one of them exists."""
     made_of = asset.description
     return (
         id(asset.mesh),
@@ -78,14 +78,14 @@ def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
 
 
 def reserve(context: WorldContext, asset: SoftBodyAsset, count: int) -> None:
-    """As `World.reserve`."""
+    """Implement `World.reserve`."""
     require_open(context)
     _require_asset(asset)
     number = as_count(count, "count")
     vertices = context.layout.particle_count + number * (len(asset.mesh.vertices) + asset.spare_vertices)
     if vertices > MOST_VERTICES:
         raise OptionError(
-            f"count is {number:,}: the world would hold {vertices:,} vertices, at most {MOST_VERTICES:,}"
+            f"count is {number:,}: the world would have {vertices:,} vertices, at most {MOST_VERTICES:,}"
         )
     for _ in range(number):
         _add_slot(context, asset)
@@ -101,7 +101,7 @@ def spawn(
     on_floor: bool,
     overlap: OverlapName,
 ) -> Body:
-    """As `World.spawn`."""
+    """Implement `World.spawn`."""
     _require_asset(asset)
     rule = Overlap.parse(overlap)
     context.slots.next_slot(asset)
@@ -120,9 +120,10 @@ def _place(
     rotation: ArrayLike | None,
     on_floor: bool,
 ) -> ArrayLike:
-    """Position of the mesh's origin, (3,) [m]; `on_floor` counts its height from where the body stands.
+    """Position of the mesh's origin, (3,) [m]; with `on_floor` its height is relative to standing on the
+    floor.
 
-    Raises: OptionError for bad values, and for `on_floor` in a world without a floor.
+    Raises: OptionError for invalid values, and for `on_floor` in a world without a floor.
     """
     if not as_flag(on_floor, "on_floor"):
         return position
@@ -137,7 +138,7 @@ def _place(
 
 
 def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:
-    """Raises: OptionError where a body that begins as `rows` overlaps others, if `rule` says so."""
+    """Raise an OptionError if a body with the initial state `rows` overlaps others and `rule` forbids it."""
     if rule is Overlap.REFUSE and context.contact.soft:
         mesh, starts = asset.mesh, context.slots.starts
         others = (
@@ -157,20 +158,20 @@ def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, 
 
 
 def despawn(context: WorldContext, body: Body) -> None:
-    """As `World.despawn`."""
+    """Implement `World.despawn`."""
     require_own(context, body)
     simulation = context.fields
     if simulation is not None:
-        _let_go(context, body)
-        simulation.wake_near(*simulation.box_of(body))  # what may have lain on it
+        _release_all(context, body)
+        simulation.wake_near(*simulation.box_of(body))  # wake bodies that may rest on it
     context.slots.leave(body)
     record_of(body).removed_in = context.clock.steps
     if simulation is not None:
         simulation.empty(body.index)
 
 
-def _let_go(context: WorldContext, body: Body) -> None:
-    """Give up what is tied to a body, and what its asset does not say, before its slot is emptied."""
+def _release_all(context: WorldContext, body: Body) -> None:
+    """Release all constraints of a body, and reset its own settings, before its slot is emptied."""
     for each in context.slices:
         each.release_body(body)
     present = present_asset(body)
@@ -191,21 +192,21 @@ def _add_slot(context: WorldContext, asset: SoftBodyAsset) -> None:
 
 
 def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
-    """A new body in the next free slot, which begins as `rows` say."""
+    """Add a body with the initial state `rows` in the next free slot."""
     slot, simulation = context.slots.next_slot(asset), context.fields
     if simulation is None:
         context.slots.starts[slot] = rows
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
-        else:  # a snapshot may have brought along what an earlier body had here, at another level or cut
+        else:  # a snapshot may have restored an earlier body here, cut or at another level
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return make_handle(context, asset)
 
 
 def make_handle(context: WorldContext, asset: SoftBodyAsset) -> Body:
-    """A handle to what is in the next free slot of an asset."""
+    """Make a handle to the next free slot of an asset."""
     body = Body(context, context.slots.next_slot(asset), asset)
     context.handles.enlist(body)
     context.slots.enter(body)

@@ -1,6 +1,6 @@
-"""All that a game may do with a world, done once before the game begins, so that nothing compiles within it.
+"""Call everything that a game can do with a world once, so that nothing compiles during the game.
 
-Taichi compiles a kernel where it is called first: a tenth of a second to one with an empty cache.
+Taichi compiles a kernel at its first call, which takes 0.1 s to 1 s with an empty cache.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
-from taichi_soft.control.drives import push_bodies, set_wind
+from taichi_soft.control.drives import accelerate_bodies, set_wind
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
@@ -29,13 +29,13 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
 
 SHORTEST = 1e-6
-"""Step [s] in which nothing gets anywhere."""
+"""Length of a step in which nothing moves noticeably [s]."""
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def warm_up_step(context: WorldContext) -> None:
-    """Compile what a step needs, and no more. The world stays as it is, to the bit."""
+    """Compile only the kernels of a step. The world's state stays bit-identical."""
     before = take_snapshot(context)
     try:
         context.built.trial_step(SHORTEST)
@@ -45,7 +45,7 @@ def warm_up_step(context: WorldContext) -> None:
 
 
 def warm_up(context: WorldContext) -> None:
-    """As `World.warm_up`."""
+    """Implement `World.warm_up`."""
     before = take_snapshot(context)
     try:
         context.built.trial_step(SHORTEST)
@@ -57,7 +57,7 @@ def warm_up(context: WorldContext) -> None:
             set_wind(context, (1.0, 0.0, 0.0), 1.2, 1.0)
         context.built.skip([body.index for body in bodies])
         context.built.trial_step(SHORTEST)
-        push_bodies([(body, np.ones_like(body.positions())) for body in bodies])
+        accelerate_bodies([(body, np.ones_like(body.positions())) for body in bodies])
         apply_radial_impulse(context, (0.0, 0.0, 0.0), 0.0, 1.0)
         for body in {body.asset: body for body in bodies}.values():
             _control(context, body, next((each for each in bodies if each is not body), None))
@@ -77,13 +77,13 @@ def warm_up(context: WorldContext) -> None:
 
 
 def _find_stable_step(context: WorldContext) -> None:
-    """Which the first step would find, if nobody had."""
+    """Compute the stable step, unless it is known."""
     if context.slots.occupants:
         context.substeps.stable_count(FRAME)
 
 
 def _fill_pools(context: WorldContext) -> None:
-    """Let there be one body of every kind, and two in all, where there are slots for them."""
+    """Spawn bodies until there is one of every kind, and two in total, as far as slots allow."""
     pools = context.slots
     for wanted in (1, 2):
         for asset in pools.kinds:
@@ -96,12 +96,12 @@ def _fill_pools(context: WorldContext) -> None:
 
 
 def _has_drives(context: WorldContext) -> bool:
-    """True if the schedule has a place for forces, wind and damping."""
+    """True if the schedule supports forces, wind and damping."""
     return context.settings.schedule is not Schedule.FLAT
 
 
 def _free(context: WorldContext, body: Body) -> None:
-    """Release a body from whatever holds it; one that is frozen begins anew."""
+    """Release a body from all constraints; restart a frozen one."""
     for each in context.slices:
         each.release_body(body)
     if len(body.pinned):
@@ -111,7 +111,7 @@ def _free(context: WorldContext, body: Body) -> None:
 
 
 def _control(context: WorldContext, body: Body, other: Body | None) -> None:
-    """Push, set, pin and hold a body in every way."""
+    """Call every control of a body."""
     place = body.center_of_mass()
     if _has_drives(context):
         body.apply_force(UP)
@@ -125,7 +125,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
         level, version = body.level, body.topology_version
         for other_level in (1 if level == 0 else 0, level):
             body.set_level(other_level)
-        record_of(body).topology_version = version  # what was drawn of it is as it was
+        record_of(body).topology_version = version  # render meshes stay valid
     body.set_material(body.material)
     give_friction(context.built.state, body, record_of(body).friction)
     body.pin([0])
@@ -134,25 +134,25 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.unpin([0])
     for each in context.slices:
         each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
-    carry([body], np.eye(3), place, place, keep=True)  # as `teleport`, whatever is there
+    carry([body], np.eye(3), place, place, keep=True)  # like `teleport`, without its checks
     body.set_motion(body.positions(), body.velocities())
 
 
 def _measure(context: WorldContext, body: Body) -> None:
-    """Read all there is to read of a body."""
+    """Read all measurements of a body."""
     _ = body.positions(), body.velocities(), body.pinned
     if len(body.tets):
         body.tet_stress()
     if body.asset.plasticity is not None:
-        body.plastic_strains()  # reads what has flowed, as stress does, and a tear within a step
+        body.plastic_strains()  # compiles the kernel that stress and tearing use too
 
 
 def _ask(context: WorldContext) -> None:
-    """Ask every query."""
+    """Call every query."""
     context.built.islands()
     state, slots, far = context.built.state, context.slots.slots, np.array([0.0, 0.0, 1e4])
     cast_ray(state, slots, far, -UP, math.inf, None, True)
-    for count in (1, 1000):  # few are traced by one thread, many by all
+    for count in (1, 1000):  # one thread traces few rays, all threads trace many
         cast_rays(state, slots, np.tile(far, (count, 1)), np.tile(-UP, (count, 1)), math.inf, None, True)
     find_closest_point(state, slots, far, math.inf, None)
     find_in_sphere(state, slots, far, 1.0, None)

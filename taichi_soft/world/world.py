@@ -11,12 +11,12 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import MOST_SAMPLES
-from taichi_soft.control.change import require_substeps
-from taichi_soft.control.drives import ForceField, push_by_field, require_field
+from taichi_soft.control.change import require_per_body
+from taichi_soft.control.drives import ForceField, apply_force_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
-from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, StateError
+from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
@@ -38,45 +38,47 @@ from taichi_soft.world.world_queries import WorldQueries
 from taichi_soft.world.world_states import WorldStates
 
 MOST_RETRIES = 10
-"""A thousand times as many substeps as were asked for."""
+"""Largest `retries`: 1,024 times the requested substeps."""
 
 
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
-    Any thread may call it and its handles, one at a time: a second one gets a StateError that names both, and
-    nothing is changed. So does a process that was forked after Taichi had started.
+    Any thread can call a world and its handles, but only one at a time: a concurrent call raises a StateError
+    that names both threads, and changes nothing. So does a call in a process forked after Taichi started.
 
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 to 1; None leaves bodies their own elasticity. With colliders or contact
-            between bodies in the world it is as in `add_collider`. Without, the floor throws each vertex back
-            by itself: bodies keep their own elasticity at 0 too, which is what None is there, and a damped
-            one may well bounce lower at 1 than at 0.
+        restitution: of the floor, 0 to 1; None leaves bodies their own elasticity. In a world with colliders
+            or soft contact it works as in `add_collider`. Otherwise the floor reflects each vertex
+            separately: at 0, the default there, bodies keep their own elasticity, and a damped body can
+                bounce lower at 1
+            than at 0.
         friction: Coulomb coefficient of the floor, 0 or more.
-        integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
-            at the price of a linear solve in each and of damping that grows with its length. A step in which
-            edges would change by more than half their length is made in 2 to 32 pieces.
+        integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". The last one is stable
+            for every step, but solves a linear system per step and has damping that grows with the step. It
+            divides a step in which edges would change by more than half their length into 2 to 32 parts.
         tolerance: of implicit solves, residual over the load on the body: 1e-6 to 0.5.
-        most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
-            by a `SolverWarning`.
-        schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
-        soft_contact: whether bodies touch each other.
-        sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
-            they may touch, fall asleep, until something comes near or is done to them; 0 for never.
-        collider_room: colliders that may be added after `build`, beside those added before.
-        sample_room: samples of their grids, beside those of colliders added before: a `HeightFieldShape` or
-            `MeshShape` takes `len(shape.samples)`, as long as its collider is there.
-        retries: how often a step that fails for a body is made again, twice as fine each time, and then once
-            more with its vibrations braked; 0 freezes the body at once, to see what a law does at a given
-            step. Implicit Euler cuts its steps by itself.
-        max_substeps: of one step, of 1/60 s when the world is built; a world that needs more refuses to be
-            built, or to make the step. None: it only warns, above 500.
-        record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
-            `save_recording`.
-        record_to: file that it writes when a body freezes, the first time that this happens.
-    Raises: OptionError for a value out of range or a name that is not known.
+        most_iterations: of an implicit solve. A solve that needs more continues with its last iterate, with a
+            `SolverWarning`.
+        schedule: "auto", "per_body" or "flat": loop structure of the computation; no effect on the physics.
+        soft_contact: True for contact between soft bodies.
+        sleep_speed: bodies fall asleep if their particles, and those of bodies that they may touch, were
+            slower than this [m/s] for 0.5 s. They wake when something approaches or acts on them. 0 turns
+            sleep off.
+        collider_room: number of colliders that can be added after `build`.
+        sample_room: grid samples of these colliders: a `HeightFieldShape` or `MeshShape` uses
+            `len(shape.samples)` while its collider exists.
+        retries: how often a step that fails for a body is retried, each time with twice the substeps, and
+            then once more with damped vibrations. 0 freezes the body at once, to study a law at a given step.
+            Implicit Euler divides its steps itself.
+        max_substeps: largest number of substeps of a step, and of 1/60 s at `build`; a world that needs more
+            refuses the build or the step. None only warns above 500.
+        record: number of steps that the flight recorder stores, with all calls between them; 0 turns it off.
+            See `save_recording`.
+        record_to: file that it writes when a body freezes for the first time.
+    Raises: OptionError for a value out of range or an unknown name.
     Example:
         arena = World(floor=0.0)
         cube = arena.add_body(box(), jelly, position=(0, 0, 2))
@@ -119,6 +121,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
+        integrator = INTEGRATORS[settings.integrator]
+        if integrator.takes_solves and settings.schedule is Schedule.FLAT:
+            raise OptionError("schedule 'flat' does not support implicit_euler: use 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
         touching = ContactSettings(
@@ -132,7 +137,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         pools: Pools[SoftBody] = Pools()
         substeps = Substeps(
             pools,
-            has_stable_step=INTEGRATORS[settings.integrator].has_stable_step,
+            has_stable_step=integrator.has_stable_step,
             soft_contact=touching.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
@@ -163,12 +168,12 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def settings(self) -> Settings:
-        """Gravity, floor, integrator and schedule, as they were checked, chosen, or set since."""
+        """Current gravity, floor, integrator and schedule."""
         return self._context.settings
 
     @property
     def step_count(self) -> int:
-        """Fixed steps made so far."""
+        """Number of fixed steps made."""
         return self._context.clock.steps
 
     @property
@@ -178,21 +183,22 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def last_dt(self) -> float:
-        """Length of the last fixed step [s], 0 before the first."""
+        """Length of the last fixed step [s]; 0 before the first."""
         return self._context.clock.last_dt
 
     @property
     def is_built(self) -> bool:
-        """True from `build` on."""
+        """True after `build`."""
         return self._context.fields is not None
 
     def build(self) -> None:
-        """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
+        """Allocate Taichi fields for all bodies and choose the kernels. Starts Taichi if it is not running.
 
-        Warns: SlowStepWarning where 1/60 s takes more than 500 substeps, with what asks for them;
-            TooSoftWarning of bodies that cannot bear their weight.
-        Raises: StateError without bodies or when called twice; OptionError for a body that starts inside a
-            collider, or where 1/60 s takes more substeps than `max_substeps`.
+        Warns: SlowStepWarning with the cause if 1/60 s takes more than 500 substeps; TooSoftWarning for
+        bodies
+            that collapse under their weight.
+        Raises: StateError without bodies or for a second call; OptionError for a body that starts inside a
+            collider, or if 1/60 s takes more substeps than `max_substeps`.
         """
         if self.is_built:
             raise StateError("the world is already built")
@@ -202,13 +208,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._handles.recorder = self._recorder = Recorder(self._context, self._record, self._record_to)
 
     def stable_substeps(self, dt: float) -> int:
-        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
+        """Number of substeps that a fixed step of `dt` [s] needs for the stiffest asset, with a margin.
 
-        Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
-        motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
-        count with an estimate of their own after each change, which takes some 35 ms for 5,000 tetrahedra and
-        several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
-        which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
+        It includes all assets with slots, even empty ones, so that spawning changes neither the time of a
+        frame nor the motion of other bodies. After a cut or a change of material, the stable step of that
+        body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with `damping`); give
+        `substeps` to avoid this. For implicit Euler it is 1, or with `soft_contact` the number of substeps
+        of at most 1/240 s.
         Args:
             dt: length of the fixed step [s], above 0.
         """
@@ -217,24 +223,24 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
 
-        A body that goes non-finite is put back to where it was before the step and frozen, with a
-        `FrozenBodyWarning` and `body.failure`; the other bodies go on. Before, it and what it may touch make
-        the step again with up to eight times the substeps, by `World(retries=3)`.
-        Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
-        world is as before that step.
+        If a body becomes non-finite, the step is retried for it and the bodies that it may touch, with up to
+        eight times the substeps (`World(retries=3)`). If that fails, the body is frozen in its state before
+        the step, with a `FrozenBodyWarning` and `body.failure`; other bodies continue.
+        On Ctrl-C, a step of less than about 0.03 s is completed. A longer step stops within a second, and the
+        state before it is restored.
         Args:
             dt: length of the fixed step [s], above 0.
-            substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
+            substeps: number of equal substeps, 1 or more; None uses `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once in a world; SolverWarning of inexact solves by implicit
-            Euler, and once of a body that has had tetrahedra inside out for 120 steps.
-        Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
-            there are more than `max_substeps`; StateError before `build`.
+            asset; SlowStepWarning as `build`, once per world; SolverWarning for inexact solves of implicit
+            Euler, and once for a body with inverted tetrahedra for 120 steps.
+        Raises: OptionError if dt is not a positive number or substeps is not a positive integer, or for more
+            than `max_substeps`; StateError before `build`.
         Example:
-            world.step(1 / 60)  # as many substeps as stability needs
+            world.step(1 / 60)  # the stable number of substeps
             world.step(1 / 60, substeps=10)  # the same cost in every frame
         """
-        simulation = self._context.fields or self._built  # which raises
+        simulation = self._context.fields or self._built  # raises
         seconds, count, h = self._context.substeps.choose(dt, substeps)
         if count > simulation.long_from:
             reports = self._make_long_step(simulation, seconds, count, h)
@@ -253,9 +259,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             simulation.check_solves()
 
     def _push(self) -> None:
-        """Let the force field act in the coming step, if there is one."""
+        """Apply the force field to the next step, if there is one."""
         if self._force_field is not None:
-            rows = push_by_field(self._context, self._force_field)
+            rows = apply_force_field(self._context, self._force_field)
             if self._recorder is not None:
                 self._recorder.field_accelerations = [
                     (serial_of(body), accelerations) for body, accelerations in rows
@@ -272,7 +278,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._recorder.rewind(self._context, data)
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
-        """One that Ctrl-C may end, and then all is as before."""
+        """Make an interruptible step; on Ctrl-C, restore the state before it."""
         before = take_snapshot(self._context)
         try:
             self._push()
@@ -283,42 +289,43 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @recorded
     def warm_up(self) -> None:
-        """Compile all that a game may call, behind its loading screen, so that nothing stops it later.
+        """Compile all kernels that a game can call, for example behind a loading screen, to avoid pauses
+        later.
 
-        Without it each kind of call compiles where it is made first: for 0.1 to 1 s with an empty cache, for
-        less in a later process; a first step with contact and a first `Body.watch_stress`, for many seconds.
-        A terminal is told what is being compiled. The world stays as it is, to the bit. `Body.failure` of a
-        body that froze is left out: every start would pay for what hardly any body needs.
+        Without it each kind of call compiles at its first use: 0.1 s to 1 s with an empty cache, less in
+        later processes; the first step with contact and the first `Body.watch_stress` take many seconds. A
+        terminal shows the progress. The world's state stays bit-identical. `Body.failure` is not compiled,
+        because it is rarely needed.
         Raises: StateError before `build`.
         """
         warm_up(self._context)
 
     @recorded
     def wake(self) -> None:
-        """Wake all bodies that sleep."""
+        """Wake all sleeping bodies."""
         if self._context.fields is not None:
             self._context.fields.wake_all()
 
     def set_force_field(self, function: ForceField | None) -> None:
-        """Accelerate all bodies by a function of place and time, from now on; None ends it.
+        """Accelerate all bodies by a function of position and time; None removes it.
 
         Args:
             function: (positions float32 (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2], called once
-                per step and body that is not frozen; they act throughout the step. If it raises, or returns
-                something else, `step` raises and the step is not made.
-        Raises: OptionError for what cannot be called; StateError under schedule "flat".
+                per step for each body that is not frozen. They act during the whole step. If it raises or
+                returns an invalid result, `step` raises and makes no step.
+        Raises: OptionError for an argument that is not callable; StateError with schedule "flat".
         """
         field = require_field(function)
         _ = self._built
-        require_substeps(self._context, "force field")
+        require_per_body(self._context, "force field")
         self._force_field = field
 
 
 def context_of_world(world: World) -> WorldContext:
-    """What is behind its public face, for what the library builds upon it."""
+    """Internal context of a world, for other modules of the library."""
     return world._context
 
 
 def force_field_of(world: World) -> ForceField | None:
-    """What `set_force_field` was given last."""
+    """Current force field of a world."""
     return world._force_field

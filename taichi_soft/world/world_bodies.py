@@ -1,4 +1,4 @@
-"""The bodies of a world: added, spawned, removed, read."""
+"""Bodies of a world: add, spawn, remove and read."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldBodies(WorldParts):
-    """What of a world is about its bodies."""
+    """Methods of a world for its bodies."""
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
+        """All bodies, by slot; bodies of `add_body` in the order of adding."""
         return cast("tuple[Body, ...]", self._context.slots.occupants)
 
     @property
     def slot_count(self) -> int:
-        """Slots for bodies, empty ones among them."""
+        """Number of slots for bodies, including empty ones."""
         return len(self._context.slots.slots)
 
     def add_body(
@@ -68,33 +68,34 @@ class WorldBodies(WorldParts):
         tearing: Tearing | None = None,
         overlap: OverlapName = Overlap.PART,
     ) -> Body:
-        """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
+        """Add a body before `build`, with its own asset and slot.
 
-        Copies, of the same mesh and material with the same options, share the asset.
+        Bodies with the same mesh, material and options share an asset.
         Args:
             mesh: rest shape [m], or a `SoftBodyAsset`, which has all options of a kind of body: then give
-                `position`, `rotation`, `velocity`, `on_floor` and `overlap` only.
+                only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
             material: constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a mesh.
-            law: how strain becomes force, a key of `LAWS`; None takes "neo_hookean", or what the material
-                and the options below ask for.
-            strain: "linear" or "exact", for laws that take it; None takes the default of the law.
-            flips: what an inverted tetrahedron does: "tolerant", "recover" or "off"; None takes the default
-                of the law.
+            law: force law, a key of `LAWS`; None takes "neo_hookean", or the law that the material and the
+                options below require.
+            strain: "linear" or "exact", for laws that support both; None takes the default of the law.
+            flips: treatment of inverted tetrahedra: "tolerant", "recover" or "off"; None takes the default of
+                the law.
             damping_model: "edge" damps along edges, "tet_mean" towards the mean of each tetrahedron.
-            position: where the origin of the mesh goes, (3,) [m]. Built-in shapes have it in their centre,
-                an artist's mesh where its file has it.
-            rotation: about the origin of the mesh, matrix (3, 3) or quaternion (x, y, z, w); None for none.
-            velocity: of all vertices that are not pinned, (3,) [m/s].
+            position: position of the mesh's origin, (3,) [m]. Built-in shapes have it at their centre, an
+                artist's mesh as in its file.
+            rotation: rotation about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w); None for
+                none.
+            velocity: velocity of all vertices that are not pinned, (3,) [m/s].
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
             overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
                 from it in the first steps, or it is refused.
-            pinned: numbers of the vertices that stay where they are.
+            pinned: vertices that stay fixed.
             contact: friction, thickness and groups of its surface.
-            plasticity: how it is bent for good; None for never.
-            spare_vertices: room for the vertices that `Body.cut` adds, about n^(2/3) for a cut through n
-                vertices; 0 for a body that is not cut.
-            tearing: where it tears by itself, into its spare vertices; None for nowhere.
+            plasticity: permanent deformation; None for none.
+            spare_vertices: capacity for the vertices that `Body.cut` adds, about n^(2/3) for a cut through n
+                vertices; 0 for a body that cannot be cut.
+            tearing: tearing by stress, into the spare vertices; None for none.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         Example:
@@ -124,14 +125,13 @@ class WorldBodies(WorldParts):
         return add_body(self._context, asset, position, rotation, velocity, on_floor, overlap)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
-        """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
+        """Reserve slots for `count` more bodies of an asset before `build`, for `spawn`.
 
         Empty slots take memory, and no time in a step.
         Args:
             asset: kind of body.
             count: number of bodies, 1 or more.
-        Raises: OptionError for what is no asset or no count;
-            StateError after `build`.
+        Raises: OptionError for wrong arguments; StateError after `build`.
         """
         reserve(self._context, asset, count)
 
@@ -147,23 +147,23 @@ class WorldBodies(WorldParts):
         on_floor: bool = False,
         overlap: OverlapName = Overlap.PART,
     ) -> Body:
-        """Put a body into the lowest free slot of its asset, before `build` or between two steps.
+        """Spawn a body in the lowest free slot of its asset, before `build` or between two steps.
 
         Args:
-            asset: one that `reserve` made room for, or the `asset` of a body that was added.
+            asset: asset with reserved slots, or the `asset` of an added body.
             position: where the origin of the mesh goes, (3,) [m]. Built-in shapes have it in their centre,
                 an artist's mesh where its file has it.
             rotation: about the origin of the mesh, matrix (3, 3) or quaternion (x, y, z, w); None for none.
-            velocity: of the centre of mass, (3,) [m/s].
-            angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
+            velocity: velocity of the centre of mass, (3,) [m/s].
+            angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices are at rest.
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
             overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
                 from it over the next steps, or it is refused.
         Returns: a new handle.
-        Raises: OptionError for a value out of range, or a place out of reach, below the floor, inside a
-            collider or, with "refuse", inside another body; StateError for an asset without a pool in this
-            world, or whose pool is full.
+        Raises: OptionError for a value or a position out of range, a position below the floor, inside a
+            collider or, with "refuse", inside another body; StateError for an asset without slots in this
+            world, or without a free one.
         Example:
             shot = world.spawn(ball, position=(-2, 0, 1), velocity=(6, 0, 1))
             world.step(1 / 60)
@@ -173,26 +173,26 @@ class WorldBodies(WorldParts):
 
     @recorded
     def despawn(self, body: Body) -> None:
-        """Take a body out of the world: its slot is free, and its handle dead.
+        """Remove a body from the world. This frees its slot and invalidates its handle.
 
         Args:
-            body: of this world.
-        Raises: OptionError for what is no body of this world; StateError for one that was removed before.
+            body: body of this world.
+        Raises: OptionError for a body of another world; StateError for a removed body.
         """
         despawn(self._context, body)
 
     @recorded
     def skip_step(self, bodies: Sequence[Body]) -> None:
-        """Let bodies stand still in the coming step, for what is far away and costs too much.
+        """Skip the next step of bodies, to save time for distant ones.
 
-        They keep their velocities and go on with them in the step after: who skips every other step moves at
-        half its speed. Neither gravity nor a force field acts meanwhile, and what impulses give counts in the
-        step after. A body makes the step after all where one that may touch it or is joined to it makes it
-        (see `islands`), where it is attached, where a moving collider is near, and where `apply_force` pushes
-        it or targets of its pins move. One that sleeps or is frozen stays so. Further calls add bodies.
+        They keep their velocities and continue in the step after: a body that skips every other step moves at
+        half its speed. Gravity and force fields do not act on a skipping body; impulses take effect in the
+        step after. A body does not skip if a body of its island (see `islands`) makes the step, if it is
+        attached, near a moving collider, pushed by `apply_force`, or has moving targets. Sleeping and frozen
+        bodies are unaffected. Further calls add bodies.
         Args:
-            bodies: of this world.
-        Raises: OptionError for what is no list of bodies of this world; StateError for one that was removed,
+            bodies: bodies of this world.
+        Raises: OptionError if `bodies` is not a list of this world's bodies; StateError for a removed body,
             and before `build`.
         """
         simulation = self._built
@@ -204,23 +204,24 @@ class WorldBodies(WorldParts):
 
     @property
     def islands(self) -> list[tuple[Body, ...]]:
-        """Bodies that came near each other in the last step or are joined, directly or through others.
+        """Groups of bodies that came near each other in the last step or are joined, directly or through
+        others.
 
-        Each is in one island, by slot. Without `soft_contact` only joints make islands. A body that came
-        since the last step is alone.
+        Each body is in one island, by slot. Without `soft_contact` only joints form islands. A body spawned
+        since the last step forms its own island.
         Raises: StateError before `build`.
         """
         return cast("list[tuple[Body, ...]]", self._built.islands())
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
+        """Estimate the largest stable substep of a body; bodies of one asset share it until they are cut.
 
         Args:
-            body: made by a world.
-        Raises: OptionError for what is no body.
+            body: body of any world.
+        Raises: OptionError if it is not a body.
         """
         if not isinstance(body, Body):
-            raise OptionError(f"body must be one that a world made, got {body!r}")
+            raise OptionError(f"body must be a body of a world, got {body!r}")
         return self._context.substeps.stable_step(body)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
@@ -229,8 +230,8 @@ class WorldBodies(WorldParts):
         The first read after a step copies all bodies at once; further bodies at the same alpha come from
         that copy, because calling a kernel costs more than copying a thousand vertices.
         Args:
-            body: of this world.
-            alpha: from 0 to 1.
+            body: body of this world.
+            alpha: interpolation factor, 0 to 1.
             out: C-contiguous float32 array (n, 3) to fill and return; None makes a new one.
         Raises: OptionError for a body of another world, an alpha out of range or an `out` that does not
             fit; StateError before `build`.
@@ -248,17 +249,18 @@ class WorldBodies(WorldParts):
         positions: Floats32 | None = None,
         normals: Floats32 | None = None,
     ) -> tuple[Floats32, Floats32]:
-        """What a renderer draws, between the previous step (alpha 0) and the last one (alpha 1).
+        """Positions and normals of a render mesh between the previous step (alpha 0) and the last one (alpha
+        1).
 
-        A normal is the mean of those of the triangles round its vertex, as they are now, each weighted by its
-        area. So a triangle that is crushed to a line counts for nothing, and films are shaded the same way.
-        Where all of them have no area it is (0, 0, 1). One call is one kernel.
+        A normal is the mean of the normals of the triangles around its vertex, weighted by area. So
+        degenerate triangles do not contribute, as in films. If all of them are degenerate, it is (0, 0, 1).
+        One call is one kernel.
         Args:
-            mesh: of a body of this world, see `Body.render_mesh`; a body stands for the first of its
-                `render_meshes`.
+            mesh: render mesh of a body of this world, see `Body.render_mesh`; a body stands for the first of
+                its `render_meshes`.
             positions, normals: C-contiguous float32 arrays (k, 3) to fill; None makes a new one.
-            alpha: from 0 to 1.
-        Returns: both: positions of the render vertices [m], and their normals of unit length, outward.
+            alpha: interpolation factor, 0 to 1.
+        Returns: positions [m] and outward unit normals of the render vertices.
         Raises: OptionError for a body of another world, an alpha out of range or a buffer that does not
             fit; StateError for a body that was removed, or cut since the mesh was made, and before `build`.
         """
@@ -268,7 +270,9 @@ class WorldBodies(WorldParts):
         if not isinstance(mesh, RenderMesh):
             raise OptionError(f"mesh must be a RenderMesh, made by body.render_mesh(), got {mesh!r}")
         if not belongs_to(mesh.body, self._context):
-            raise OptionError(f"mesh must be of a body of this world, got one of {mesh.body!r} of another")
+            raise OptionError(
+                f"mesh must belong to a body of this world, got one of {mesh.body!r} of another"
+            )
         require_current(mesh)
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
@@ -276,9 +280,11 @@ class WorldBodies(WorldParts):
 
 
 def _require_defaults(material: AnyMaterial | None, options: dict[str, Any]) -> None:
-    """Raises: OptionError for what an asset says already."""
+    """Raise an OptionError for options that an asset already has."""
     defaults = {field.name: field.default for field in fields(SoftBodyAsset)}
     given = [name for name, value in options.items() if value is not defaults[name]]
     if material is not None or given:
         name = "material" if material is not None else given[0]
-        raise OptionError(f"{name} was given with an asset, which has its own: give it to SoftBodyAsset")
+        raise OptionError(
+            f"{name} was given together with an asset, which has its own: pass it to SoftBodyAsset"
+        )

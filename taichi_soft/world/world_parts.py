@@ -1,4 +1,4 @@
-"""What all parts of a world's public face have in common."""
+"""Base of all parts of `World`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from taichi_soft.solver.simulation import Simulation
 
 
 class WorldParts(Handle):
-    """A world, as each of the classes that `World` is made of sees it."""
+    """Base class of the mixins of `World`."""
 
     _context: WorldContext
     _recorder: Recorder | None
@@ -17,5 +17,5 @@ class WorldParts(Handle):
 
     @property
     def _built(self) -> Simulation:
-        """Raises: StateError before `build`."""
+        """The simulation. Raises: StateError before `build`."""
         return self._context.built

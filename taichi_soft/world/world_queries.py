@@ -1,4 +1,4 @@
-"""Questions to a world: what a ray hits, what is near."""
+"""Queries of a world: raycasts, closest points, overlaps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldQueries(WorldParts):
-    """What of a world answers questions."""
+    """Methods of a world for queries."""
 
     def raycast(
         self,
@@ -34,17 +34,16 @@ class WorldQueries(WorldParts):
         bodies: Iterable[Body] | None = None,
         cull_back: bool = True,
     ) -> RayHit | None:
-        """The first hit of a ray on the deformed surfaces, as they are after the last step.
+        """Find the first hit of a ray on the deformed surfaces after the last step.
 
-        Ropes and other bodies without triangles cannot be hit. Of equally near triangles the one of the first
-        body, and there the first, counts. Frozen bodies are asked too; this goes for all queries.
+        Bodies without triangles, such as ropes, cannot be hit. Between equally near triangles, the first one
+        of the first body wins. All queries include frozen bodies.
         Args:
             origin: (3,) [m].
-            direction: (3,), of any length but zero.
-            max_distance: a hit farther than this [m] is none; infinity for no limit.
-            bodies: that can be hit; None for all.
-            cull_back: pass through triangles seen from behind, so that a ray from inside a body leaves it
-                unhindered.
+            direction: (3,), of any nonzero length.
+            max_distance: largest distance of a hit [m]; infinity for no limit.
+            bodies: bodies to test; None for all.
+            cull_back: ignore back faces, so that a ray from inside a body leaves it.
         Returns: the hit, or None.
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
@@ -65,12 +64,12 @@ class WorldQueries(WorldParts):
         bodies: Iterable[Body] | None = None,
         cull_back: bool = True,
     ) -> RayHits:
-        """The first hits of many rays in one go, on all threads.
+        """Find the first hits of many rays in one call, on all threads.
 
         Args:
             origins, directions: (n, 3) each.
-            max_distance, bodies, cull_back: as in `raycast`, for all rays.
-        Returns: arrays with a row for each ray, the same as `raycast` finds.
+            max_distance, bodies, cull_back: see `raycast`; for all rays.
+        Returns: arrays with one row per ray, with the results of `raycast`.
         Raises: as `raycast`.
         """
         state, slots = self._built.state, self._context.slots.slots
@@ -79,14 +78,14 @@ class WorldQueries(WorldParts):
     def closest_point(
         self, point: ArrayLike, *, max_distance: float = math.inf, bodies: Iterable[Body] | None = None
     ) -> ClosestPoint | None:
-        """The point of all surfaces that is nearest to `point`, from outside or from inside.
+        """Find the closest point of all surfaces to `point`, from outside or inside.
 
-        Of a body without triangles (a rope) its vertices are asked.
+        For a body without triangles (a rope) the closest vertex counts.
         Args:
             point: (3,) [m].
-            max_distance: what is farther [m] does not count; infinity for no limit.
-            bodies: to ask; None for all.
-        Returns: the nearest point, or None where nothing is near enough.
+            max_distance: largest distance [m]; infinity for no limit.
+            bodies: bodies to test; None for all.
+        Returns: the closest point, or None if none is in range.
         Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
             another world; StateError before `build`.
         """
@@ -95,12 +94,12 @@ class WorldQueries(WorldParts):
     def overlap_sphere(
         self, center: ArrayLike, radius: float, *, bodies: Iterable[Body] | None = None
     ) -> tuple[Overlap, ...]:
-        """Bodies that touch a sphere or enclose it; of a body without triangles its vertices count.
+        """Find the bodies that touch or enclose a sphere; for a body without triangles its vertices count.
 
         Args:
             center: (3,) [m].
             radius: above 0 [m].
-            bodies: to ask; None for all.
+            bodies: bodies to test; None for all.
         Returns: the bodies, in the world's order, each with its vertices in the sphere.
         Raises: OptionError for numbers that are not finite, a radius not above 0 or a body of another world;
             StateError before `build`.
@@ -115,15 +114,15 @@ class WorldQueries(WorldParts):
         *,
         bodies: Iterable[Body] | None = None,
     ) -> tuple[Overlap, ...]:
-        """Bodies that touch a box or enclose it; of a body without triangles its vertices count.
+        """Find the bodies that touch or enclose a box; for a body without triangles its vertices count.
 
         Args:
             center: (3,) [m].
             size: (3,) lengths of its edges, above 0 [m].
             rotation: about its centre, matrix (3, 3) or quaternion (x, y, z, w).
-            bodies: to ask; None for all.
+            bodies: bodies to test; None for all.
         Returns: the bodies, in the world's order, each with its vertices in the box.
-        Raises: OptionError for numbers that are not finite, a size not above 0, what is no rotation or a body
+        Raises: OptionError for numbers that are not finite, a size not above 0, an invalid rotation or a body
             of another world; StateError before `build`.
         """
         return find_in_box(self._built.state, self._context.slots.slots, center, size, rotation, bodies)

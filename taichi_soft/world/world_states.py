@@ -1,4 +1,4 @@
-"""The state of a world, taken and put back, and its recording."""
+"""Snapshots, hashes and recordings of a world."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldStates(WorldParts):
-    """What of a world keeps its states."""
+    """Methods of a world for its state."""
 
     def snapshot(self) -> bytes:
-        """The whole state between two steps, to `restore` it here or in a world that was built alike.
+        """Return the complete state between two steps, for `restore` in this world or one that was built
+        equally.
 
-        Bodies, colliders, frames, grabs, attachments and joints, gravity, the wind, materials and frictions
-        that were set, and all that is going to act in the coming step are in it; a force field is not. Of the
-        events recorded it has what goes on, such as contacts. It holds numbers only, no code. The first call
-        compiles, some seconds at most.
+        It contains bodies, colliders, frames, grabs, attachments and joints, gravity, wind, changed
+        materials and frictions, all forces of the next step, and running contacts of recorded events; but no
+        force field. It contains only numbers, no code. The first call compiles, for a few seconds at most.
         Raises: StateError before `build`.
         Example:
             before = world.snapshot()  # bytes: keep them in a file, or send them
@@ -31,17 +31,17 @@ class WorldStates(WorldParts):
         return data
 
     def restore(self, data: bytes) -> None:
-        """Go back to a state of `snapshot`: what follows is the same, bit for bit, given the same calls.
+        """Restore a state of `snapshot`. With the same calls, the following steps are bit-identical.
 
-        Handles of what the state has stay valid, or become so again; handles of what it has not are dead, as
-        if that had been removed. For what it has and nobody holds a handle to, `bodies` and `colliders` have
-        new ones. A force field stays as it is. Those who listen to events go on to; watched stress is as it
-        was, and what else is watched now stays so. Events of undone steps that wait are dropped: when the
-        steps are made again, they come again, and so do those that were drained before.
+        Handles of objects in the state stay valid, or become valid again; other handles become invalid, as
+        after a removal. `bodies` and `colliders` provide new handles for objects that have none. The force
+        field and listeners do not change. Watched stress is restored, and bodies that are watched only now
+        stay watched. Waiting events of undone steps are dropped; repeating the steps records them again, even
+        those that were drained before.
         Args:
-            data: made by `snapshot`, of this world or one that was built of the same things.
-        Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
-            first that differs; OptionError for what is not bytes; StateError before `build`.
+            data: result of `snapshot`, from this world or one that was built equally.
+        Raises: SnapshotError for damaged data, or for a world that was built differently, with the first
+            difference; OptionError for data that is not bytes; StateError before `build`.
         """
         restore_snapshot(self._context, data)
         self._restore_count += 1
@@ -50,14 +50,14 @@ class WorldStates(WorldParts):
 
     @property
     def restore_count(self) -> int:
-        """How often `restore` was called: whoever keeps earlier states sees that they are of another past."""
+        """Number of `restore` calls, for detecting that stored earlier states belong to another history."""
         return self._restore_count
 
     def state_hash(self) -> str:
-        """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
+        """Hash of the state, 16 hexadecimal digits, equal in two synchronised worlds.
 
-        Made of step count, gravity, positions, velocities, pins, who lives, sleeps or is frozen, colliders,
-        frames, grabs and joints; the same for any number of threads.
+        It covers step count, gravity, positions, velocities, pins, the status of bodies, colliders, frames,
+        grabs and joints, and does not depend on the number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self._context)
@@ -66,25 +66,25 @@ class WorldStates(WorldParts):
         """Hash of the state of all bodies, 16 hexadecimal digits: the same as in the exported world.
 
         There it is `ts_world_hash` in C and `world.hash()` in JavaScript. It covers positions, velocities,
-        pins, and who is asleep or frozen. `state_hash`, which exported worlds do not have, covers step count,
-        gravity, colliders, frames, grabs and joints too.
+        pins, and the status of bodies. `state_hash`, which exported worlds do not have, also covers step
+        count, gravity, colliders, frames, grabs and joints.
         Raises: StateError before `build`.
         """
         return bodies_hash(self._context)
 
     def save_recording(self, path: str | Path) -> Path:
-        """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.
+        """Write the calls of at least the last `record` steps, and the snapshot before them, to a file.
 
-        Steps that `restore` has undone are not in it, and do not count; where it went to a state that was
-        not kept here, the recording begins again there.
-        `taichi-soft replay FILE` makes it again anywhere, bit by bit on a machine like this one. The file
-        holds the assets and shapes as well, and the accelerations that a force field gave, but no code.
+        It excludes steps that `restore` has undone. After a `restore` of a state that is not stored here, the
+        recording starts again from that state.
+        `taichi-soft replay FILE` replays it anywhere, bit by bit on the same kind of machine. The file also
+        contains the assets and shapes, and the accelerations of a force field, but no code.
         Args:
-            path: of the file to write.
+            path: path of the file.
         Returns: the path.
-        Raises: StateError without `record` or before `build`; SnapshotError where the file cannot be written.
+        Raises: StateError without `record` or before `build`; SnapshotError if the file cannot be written.
         """
         _ = self._built
         if self._recorder is None:
-            raise StateError("this world records nothing: make it with World(record=240)")
+            raise StateError("this world has no recorder: make it with World(record=240)")
         return self._recorder.save(self._context, path)

@@ -321,7 +321,7 @@ def test_what_is_no_mesh_of_this_world_and_no_alpha_is_refused(zoo):
         with pytest.raises(OptionError, match="mesh must be a RenderMesh, made by body"):
             world.read_render_mesh(bad, 1.0)
     stranger = World(floor=None).add_body(CUBE, JELLY)
-    with pytest.raises(OptionError, match="mesh must be of a body of this world"):
+    with pytest.raises(OptionError, match="mesh must belong to a body of this world"):
         world.read_render_mesh(stranger.render_mesh(), 1.0)
     for alpha in (-0.1, 1.1, float("nan"), None, "now"):
         with pytest.raises(OptionError, match="alpha must be a number from 0 to 1"):

@@ -81,7 +81,7 @@ def test_an_adapter_makes_its_own_steps_with_what_comes_before_them(folder):
 def test_what_has_no_triangles_is_left_out_and_named(folder):
     done = bake(folder, "scene.py:with_a_rope", "--out", "a.npz", "--seconds", "0.1")
     assert done.returncode == 0, done.stderr
-    assert "body 1 has no triangles, and was left out" in done.stdout
+    assert "body 1 has no triangles and was skipped" in done.stdout
     assert np.load(folder / "a.npz")["names"].tolist() == ["body_0"]
 
 

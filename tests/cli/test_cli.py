@@ -111,7 +111,7 @@ def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
     capture = cv2.VideoCapture(str(film))
     assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 20
     assert "x real time" in done.stdout.replace("\n", " ")
-    assert "a picture of 128x96 took" in done.stdout
+    assert "a frame of 128x96 took" in done.stdout
     assert done.stderr == ""
 
 

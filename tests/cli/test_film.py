@@ -70,7 +70,7 @@ def test_a_mesh_file_is_filmed_as_it_falls_onto_the_floor_and_stays_in_the_pictu
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     lines = done.stdout.splitlines()
-    assert lines[0].startswith("box.obj is 40 m long in its file, and is filmed as 1 m long: --length ")
+    assert lines[0].startswith("box.obj is 40 m long in its file and is scaled to 1 m: --length ")
     assert lines[1] == "filming box"
     assert lines[2] == "wrote box.png: 20 frames, 1.0 s"
     pictures = [cv2.imread(str(file)) for file in sorted(folder.glob("box_*.png"))]
@@ -108,11 +108,11 @@ def test_a_world_or_a_stage_of_a_script_or_function_is_filmed(folder, scene, nam
         (("duck",), "name a mesh file (.stl, .obj"),
         (("nowhere.glb",), "nowhere.glb: cannot be read (no such file)"),
         (("nowhere.py",), "cannot read nowhere.py: No such file"),
-        (("two.py",), "two.py must make one World or one Stage, in a variable of its own, and has 2"),
-        (("scenes.py",), "and has 0"),
+        (("two.py",), "two.py must have exactly one global World or Stage, found 2"),
+        (("scenes.py",), "found 0"),
         (("scenes.py:nothing",), "scenes.py:nothing must return a World or a Stage, got None"),
         (("world.py", "--material", "foam"), "--material is for mesh files, and world.py is a scene"),
-        (("scenes.py:make_moving_stage", "--orbit"), "--orbit needs a camera that stays"),
+        (("scenes.py:make_moving_stage", "--orbit"), "--orbit needs a fixed camera"),
         (("box.obj", "--material", "jam"), "unknown material 'jam'"),
         (("box.obj", "--length", "0"), "length must be a number above 0 m"),
         (("box.obj", "--seconds", "0", "--orbit"), "seconds must be a number above 0 s"),

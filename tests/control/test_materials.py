@@ -166,11 +166,11 @@ def test_the_number_of_substeps_follows_at_once():
 @pytest.mark.parametrize(
     ("name", "wrong", "text"),
     [
-        ("virial", SpringMaterial(1.0), "is made of a Material and stays so"),
+        ("virial", SpringMaterial(1.0), "has a Material, and its type cannot change"),
         (
             "springs",
             Material(1e5, 0.2, 1000.0, damping_ratio=0.0),
-            "is made of a SpringMaterial and stays so",
+            "has a SpringMaterial, and its type cannot change",
         ),
         ("virial", AnisotropicMaterial(WOOD, 1000.0, damping_ratio=0.0), "stays so"),
         ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0, damping_ratio=0.0), "7 values for a mesh of 40"),

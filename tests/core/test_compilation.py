@@ -27,7 +27,7 @@ def test_a_second_of_compiling_goes_by_before_anything_is_said(told):
     assert said == []
     compile_in(0.5)
     compile_in(0.5, "find_gaps")
-    assert said == ["compiling find_gaps (2 kernels in 1 s; a later start finds them in a cache)", ""]
+    assert said == ["compiling find_gaps (2 kernels in 1 s; later starts load them from the cache)", ""]
 
 
 def test_after_a_pause_counting_begins_anew(told):

@@ -50,9 +50,9 @@ def play(folder, cells=2, has_collider=False, bodies=1, threads=1, version=""):
         check=True,
     )
     lines = [line for line in done.stderr.splitlines() if "compilation:kernel" in line]
-    made = [line.split()[1] for line in lines if line.endswith("made from its source")]
+    made = [line.split()[1] for line in lines if line.endswith("compiled")]
     made.remove("set_everywhere")  # in which an address of the process stands
-    known = [line.split()[1] for line in lines if line.endswith("known")]
+    known = [line.split()[1] for line in lines if line.endswith("from the cache")]
     return done.stdout.strip(), made, known
 
 

@@ -50,7 +50,7 @@ def test_thread_counts_that_are_none(threads):
 @binding
 @pytest.mark.parametrize("cores", [[], [0, 0], [-1], [100_000], ["0"], [0.0], "0", 0, [True]])
 def test_cores_that_are_none_to_bind_to(cores):
-    with pytest.raises(OptionError, match="cores must be different ones of"):
+    with pytest.raises(OptionError, match="cores must be distinct numbers from"):
         init("cpu", cores=cores)
 
 

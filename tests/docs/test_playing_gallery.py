@@ -117,7 +117,7 @@ def replayed(file):
     command = [sys.executable, "-m", "taichi_soft", "replay", str(file), "--out", str(picture)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "every state is the same, bit by bit" in done.stdout
+    assert "all states are bit-identical" in done.stdout
     return done.stdout
 
 

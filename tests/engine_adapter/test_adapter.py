@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import engine_adapter
+import taichi_soft
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
     FrozenBodyWarning,
@@ -48,8 +49,15 @@ def snapshot(adapter):
     )
 
 
+@pytest.mark.parametrize("package", [engine_adapter, taichi_soft])
+def test_the_old_name_of_the_budget_status_works_with_a_warning(package):
+    with pytest.warns(DeprecationWarning, match="BudgetStatus") as caught:
+        assert package.GivenUp is engine_adapter.BudgetStatus
+    assert caught[0].filename == __file__
+
+
 def test_public_names():
-    names = ["EngineAdapter", "FixedStep", "GivenUp", "Rollback", "RollbackSession", "SessionError"]
+    names = ["BudgetStatus", "EngineAdapter", "FixedStep", "Rollback", "RollbackSession", "SessionError"]
     assert sorted(engine_adapter.__all__) == names
 
 

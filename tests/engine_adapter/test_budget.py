@@ -87,8 +87,8 @@ def test_twice_the_load_that_fits_comes_inside_the_budget_the_farthest_coarser_f
     found = levels(bodies)
     assert found == sorted(found)
     assert found[0] < found[-1]
-    assert game.given_up.levels == {body: body.level for body in bodies if body.level}
-    assert game.given_up.is_met
+    assert game.budget_status.levels == {body: body.level for body in bodies if body.level}
+    assert game.budget_status.is_met
 
 
 def test_levels_stand_still_once_the_budget_is_met(clock):
@@ -116,7 +116,7 @@ def test_detail_comes_back_the_nearest_first_when_there_is_time(clock):
     assert all(each == sorted(each) for each in seen)
     assert sum(coarse) > 0
     assert seen[-1] == [0] * COUNT
-    assert game.given_up.levels == {}
+    assert game.budget_status.levels == {}
 
 
 def test_what_moves_away_is_lowered_in_place_of_what_came_near(clock):
@@ -133,8 +133,8 @@ def test_a_budget_that_cannot_be_met_is_told(clock):
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2] * COUNT
-    assert not game.given_up.is_met
-    assert game.given_up.step_ms == pytest.approx(1e3 * clock.steps[-1], rel=0.05)
+    assert not game.budget_status.is_met
+    assert game.budget_status.step_ms == pytest.approx(1e3 * clock.steps[-1], rel=0.05)
     assert_moves_at_least_at_a_quarter(clock.skipped)
 
 
@@ -159,8 +159,8 @@ def test_the_farthest_skip_steps_where_all_are_as_coarse_as_can_be(clock, monkey
     assert len(skippers) <= 4
     assert max(clock.steps[40:]) < 1e-3 * budget
     assert_moves_at_least_at_a_quarter(settled)
-    assert game.given_up.skipping == tuple(bodies[i] for i in sorted(skippers, reverse=True))
-    assert game.given_up.is_met
+    assert game.budget_status.skipping == tuple(bodies[i] for i in sorted(skippers, reverse=True))
+    assert game.budget_status.is_met
 
 
 def test_steps_fit_at_once_while_levels_change_one_by_one(clock, monkeypatch):
@@ -174,7 +174,7 @@ def test_steps_fit_at_once_while_levels_change_one_by_one(clock, monkeypatch):
     assert max(clock.steps[1:]) < 1.001e-3 * budget
     assert clock.skipped[1]
     assert not any(clock.skipped[30:])
-    assert game.given_up.skipping == ()
+    assert game.budget_status.skipping == ()
 
 
 def test_skipping_ends_before_any_level_is_raised(clock, monkeypatch):
@@ -216,7 +216,7 @@ def test_what_is_held_keeps_its_level(clock):
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2, 2, 0, 2, 2, 2]
-    assert bodies[2] not in game.given_up.skipping
+    assert bodies[2] not in game.budget_status.skipping
     hold.release()
     for _ in range(10):
         game.step()
@@ -267,9 +267,15 @@ def test_without_a_budget_nothing_changes_and_asking_is_refused(clock):
     for _ in range(10):
         game.step()
     assert levels(bodies) == [0, 0]
-    for ask in (lambda: game.given_up, lambda: game.see_from(EYE)):
+    for ask in (lambda: game.budget_status, lambda: game.see_from(EYE)):
         with pytest.raises(StateError, match="budget_ms"):
             ask()
+
+
+def test_the_old_name_of_the_status_works_with_a_warning(clock):
+    game, _ = row_of(clock, 2, budget_ms=1e6)
+    with pytest.warns(DeprecationWarning, match="budget_status"):
+        assert game.given_up == game.budget_status
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, "4", True])
@@ -301,7 +307,7 @@ def test_frozen_bodies_and_bodies_without_levels_are_left_alone(clock):
         for _ in range(10):
             game.step()
     assert (one.level, other.level) == (0, 0)
-    assert not game.given_up.is_met
+    assert not game.budget_status.is_met
 
 
 def test_changes_that_take_long_are_spread_over_frames(clock, monkeypatch):
@@ -315,7 +321,7 @@ def test_changes_that_take_long_are_spread_over_frames(clock, monkeypatch):
         seen.append(levels(bodies))
     at_once = [sum(abs(np.subtract(one, other))) for one, other in pairwise(seen)]
     assert max(at_once) == 1
-    assert game.given_up.is_met
+    assert game.budget_status.is_met
 
 
 def test_where_nothing_can_be_done_it_is_looked_now_and_then_only(clock, monkeypatch):

@@ -153,7 +153,7 @@ def test_a_solid_without_such_a_shape_is_refused_by_name_with_nothing_added(soli
     world, path = World(), core.NodePath("scene")
     node_with(core.CollisionSphere(0, 0, 0, 1)).reparent_to(path)
     node_with(solid).reparent_to(path)
-    with pytest.raises(OptionError, match=rf"{type(solid).__name__} of node 'n' is none of .*Sphere"):
+    with pytest.raises(OptionError, match=rf"{type(solid).__name__} of node 'n' is not one of .*Sphere"):
         add_colliders(world, path)
     assert len(world.colliders) == 0
 

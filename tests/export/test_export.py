@@ -67,23 +67,23 @@ def flat():
 @pytest.mark.parametrize(
     ("make", "what", "why", "way_out"),
     [
-        (cut, "asset 0 is cut or tears", "Python makes the new mesh", "leave spare_vertices out"),
-        (recording, "it records events", "Python would go on", "ts_world_record_events"),
+        (cut, "asset 0 can be cut or torn", "needs Python", "leave out spare_vertices"),
+        (recording, "it records events", "runs in Python", "ts_world_record_events"),
         (
             watching,
-            "stress is watched by Python",
-            "of each tetrahedron",
-            "leave record_events, on and watches",
+            "watches stress",
+            "runs in Python",
+            "leave out record_events, on and watches",
         ),
         (forced, "it has a force field", "the library cannot call", "set_force_field(None)"),
         (
             changed,
             "body 0 was given another material",
-            "constants of a body from its asset",
-            "make its asset",
+            "uses the material of its asset",
+            "make the asset with that material",
         ),
-        (skipping, "body 0 skips the coming step", "Python alone chooses", "make a step with World.step"),
-        (flat, "schedule 'flat'", "no place for contact", "schedule='per_body'"),
+        (skipping, "body 0 skips the next step", "only Python", "call World.step"),
+        (flat, "schedule 'flat'", "does not support the contact", "schedule='per_body'"),
     ],
 )
 def test_a_refused_export_says_what_why_and_what_to_do_instead(make, what, why, way_out, tmp_path):
@@ -102,7 +102,7 @@ def test_a_world_that_is_not_built_wrong_axes_an_unknown_platform_and_a_path_tha
 ):
     with pytest.raises(StateError, match="not built"):
         export_world(plain(), tmp_path / "a")
-    with pytest.raises(OptionError, match="no platform is called amiga: choose among linux-x64"):
+    with pytest.raises(OptionError, match="unknown platform amiga: choose among linux-x64"):
         export_world(plain(), tmp_path / "a", platforms=["amiga"])
     world = plain()
     world.build()
@@ -110,7 +110,7 @@ def test_a_world_that_is_not_built_wrong_axes_an_unknown_platform_and_a_path_tha
         export_world(world, tmp_path / "a", axes="left")
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "letter.txt").write_text("keep me")
-    with pytest.raises(OptionError, match="no world file"):
+    with pytest.raises(OptionError, match="not a world file"):
         export_world(world, tmp_path / "a")
     (tmp_path / "file").write_text("keep me")
     with pytest.raises(OptionError, match="cannot write"):

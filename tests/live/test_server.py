@@ -57,7 +57,7 @@ FILM = '{"do": "save", "what": "film"}'
 def test_a_film_whose_world_ends_before_it_is_given_keeps_nobody_from_the_next(server):
     first = server.worlds.panes[0] = Runner()
     obey(server, FILM)
-    with pytest.raises(OptionError, match="a film is being drawn"):
+    with pytest.raises(OptionError, match="a film is being rendered"):
         obey(server, FILM)
     first.stop()  # as another law takes its place
     second = server.worlds.panes[0] = Runner()
@@ -67,7 +67,7 @@ def test_a_film_whose_world_ends_before_it_is_given_keeps_nobody_from_the_next(s
 
 def test_a_film_that_a_busy_world_does_not_take_keeps_nobody_from_the_next(server):
     server.worlds.panes[0] = Runner(is_busy=True)
-    with pytest.raises(OptionError, match="busy"):
+    with pytest.raises(OptionError, match="are waiting"):
         obey(server, FILM)
     server.worlds.panes[0].is_busy = False
     obey(server, FILM)
@@ -124,7 +124,7 @@ def test_progress_is_shown_until_the_world_is_there_or_has_failed(server):
         messages = said(server)
         worlds.hear(0, runner, (end, "strain and springs"))
         assert audience.status()["activities"] == []
-        assert ("strain and springs" if end == "failed" else "duck falls in now") in messages[-1]
+        assert ("strain and springs" if end == "failed" else "duck was added") in messages[-1]
 
 
 def test_a_world_that_replaces_another_has_the_values_of_its_sliders_and_a_restarted_one_those_of_the_preset(

@@ -44,7 +44,7 @@ def test_a_notebook_gets_a_line_for_each_body_and_a_bar_for_each_range():
     html = stress_table(stretched(0.02))._repr_html_()
     assert html.count("<tr>") == 3
     assert html.count("<rect") == 24
-    assert re.search(r'aria-label="Volume of material over its stress, from 0 to [\d.]+ Pa"', html)
+    assert re.search(r'aria-label="Histogram of material volume over stress, from 0 to [\d.]+ Pa"', html)
 
 
 def test_a_world_without_tetrahedra_or_not_built_has_no_stress():

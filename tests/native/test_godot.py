@@ -338,14 +338,14 @@ def test_a_refused_level_says_why_and_changes_nothing(levels):
     expected = {
         "below": "level is -1, and asset 1 has 3: give 0 to 2",
         "beyond": "level is 3, and asset 1 has 3: give 0 to 2",
-        "joined": "the body in slot 3 has joints that name its vertices: release or remove them before",
+        "joined": "the body in slot 3 has joints on its vertices: release or remove them before",
     }
     assert levels["refused"].keys() == expected.keys()
     for what, found in levels["refused"].items():
         assert found["error"].startswith(expected[what])
         assert not found["answer"], what
         assert found["are_same"], what
-    assert levels["nobody"] == [False, "body 12345 is not in this world, or was taken out"]
+    assert levels["nobody"] == [False, "body 12345 is not in this world, or was removed"]
 
 
 def test_release_lets_a_joint_go_with_the_change(levels):
@@ -457,35 +457,35 @@ def test_the_script_of_the_page_runs(run, project):
 
 REFUSED = [
     "cannot read no/such/folder/world.tsw",
-    "there is no world 0",
+    "world 0 does not exist",
     "body 12345 is not in this world",
-    "argument 1 is no whole number",
-    "takes 2 arguments, and got 1",
+    "argument 1 is not a whole number",
+    "takes 2 arguments, got 1",
     "seconds is -1",
     "seconds is -?nan",
     "asset is 99: there are 2",
     "position has -?nan in it",
     "argument 2 is a Transform that mirrors",
     "argument 2 is a Transform without size",
-    "there is no frame 7",
-    "nothing of that kind is called nobody",
-    "argument 1 is 9: kinds are 0 to 4",
+    "frame 7 does not exist",
+    "unknown name nobody",
+    "argument 1 is 9: give a kind from 0 to 4",
     "there is no mesh 77: there are 2",
-    "3 bytes are no snapshot",
+    "3 bytes are not a snapshot",
     "bytes is null",
     "body 1099511627776 is not in this world",
     "argument 1 is 1099511627776: too large",
     "kinds is -1",
     "direction has zero length",
     "radius is -1",
-    "argument 1 is no Transform",
-    "weights must be 0 or more and add up to 1",
+    "argument 1 is not a Transform",
+    "weights must be 0 or more and have the sum 1",
     "grab 7 is not in this world, or was released",
     "argument 1 is a Transform without size",
-    "argument 2 is no PoolIntArray",
-    "there is no frame 0",
+    "argument 2 is not a PoolIntArray",
+    "frame 0 does not exist",
     "there is no vertex 1073741824",
-    "there is no frame 0",
+    "frame 0 does not exist",
     "body 0 is not in this world",
 ]
 

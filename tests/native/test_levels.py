@@ -69,7 +69,7 @@ WANTED = {
     "joined": (STATE, "has joints that name its vertices"),
     "joined from the other side": (STATE, "release of 1"),
     "positions": (-6, "give room for 162"),
-    "mesh": (STATE, "mesh 1 draws level 0, and the body is at level 1"),
+    "mesh": (STATE, "mesh 1 is for level 0, the body is at level 1"),
     "homeless": (STATE, "would hold nothing at level 2"),
     "frozen": (STATE, "is frozen"),
 }

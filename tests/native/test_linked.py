@@ -77,5 +77,5 @@ def test_two_worlds_are_linked_into_a_game_and_move_as_those_that_are_opened(
     done = subprocess.run([program, worlds["heap"] / "world.tsw"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     refused, hash_of_linked = done.stdout.splitlines()
-    assert refused == "-4 the kernels are not those of this world file: export it again, with both"
+    assert refused == "-4 the kernels belong to another export: export the world again, and ship both"
     assert int(hash_of_linked) == in_process(native, OPENED, export("heap"))

@@ -351,7 +351,7 @@ def test_three_players_agree_and_a_ring_goes_back_as_in_python(arena, tmp_path):
     steps, back, refusals = found["ring"]
     assert steps == [301, 302, 303]
     assert back == [True, [301, 302]]
-    assert refusals[0] == "step 300 is not kept (kept: 301 to 303): save more ticks, or rewind less far"
+    assert refusals[0] == "step 300 is not stored (stored: 301 to 303): use more ticks, or rewind less"
     assert "the world was restored since" in refusals[1]
 
 

@@ -26,7 +26,7 @@ def test_the_sample_is_built_and_played_with_what_is_shipped_alone(native, expor
     done = subprocess.run([program, folder], capture_output=True, text=True, cwd="/")
     assert done.returncode == 1
     # It reads the file, of another game.
-    assert done.stderr.startswith("error: nothing of that kind is called ball: give one of ")
+    assert done.stderr.startswith("error: unknown name ball: give one of ")
 
 
 def blocks(page, heading):

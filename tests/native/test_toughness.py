@@ -134,8 +134,8 @@ print(json.dumps(found))
 def test_a_wrong_name_is_refused_with_those_that_there_are(native, heap):
     among_bodies, among_frames = in_process(native, NAMED, heap)
     names = ", ".join(f"body{i}" for i in range(10))
-    assert among_bodies == f"nothing of that kind is called nobody: give one of {names}"
-    assert among_frames == "nothing of that kind is called nobody: the world file has none of that kind"
+    assert among_bodies == f"unknown name nobody: give one of {names}"
+    assert among_frames == "unknown name nobody: the world file has none of that kind"
 
 
 GROWTH = """

@@ -226,16 +226,16 @@ def test_mistakes_of_a_game_are_refused_and_nothing_leaks(node, export, tmp_path
 
 WANTED = {
     "cut off": ("FILE", "the world file is damaged"),
-    "another world": ("FILE", "the kernels are not those of this world file"),
+    "another world": ("FILE", "the kernels belong to another export"),
     "damaged": ("FILE", ""),
     "damaged modules": ("FILE", ""),
-    "half a module": ("FILE", "not those of this world file, or damaged"),
+    "half a module": ("FILE", "another export, or are damaged"),
     "no world": ("ARGUMENT", "world is undefined: give a typed array"),
     "elsewhere": ("FILE", "cannot read http://127.0.0.1:9/nothing/kernels/web.wasm"),
-    "no module": ("FILE", "the code is no module"),
+    "no module": ("FILE", "the code is not a WebAssembly module"),
     "time": ("ARGUMENT", "dt is -1 s"),
-    "name": ("ARGUMENT", "no body is called nobody"),
-    "snapshot": ("SNAPSHOT", "cut off|no snapshot|40 bytes"),
+    "name": ("ARGUMENT", "unknown body nobody"),
+    "snapshot": ("SNAPSHOT", "cut off|not a snapshot|40 bytes"),
     "vector": ("ARGUMENT", "has -?nan in it"),
     "listener": ("Error", "of the game"),
     "state": ("true", ""),
@@ -337,7 +337,7 @@ def test_the_sample_says_why_it_does_not_play(sample):
         page.route("https://cdn.jsdelivr.net/**", of_this_machine)
         page.route("**/world.tsw", lambda route: route.fulfill(body="no world"))
         page.goto(f"{address}/index.html")
-        page.get_by_text("world is no world file: give a folder that `taichi-soft export` wrote").wait_for()
+        page.get_by_text("world is not a world file: give a folder from `taichi-soft export`").wait_for()
         assert page.locator("p").count() == 1
 
 

@@ -95,7 +95,7 @@ def test_the_command_tells_what_broke_and_draws_it(broken, tmp_path, capsys):
     assert ended.value.code in (0, None)
     out = capsys.readouterr().out
     assert "every state is the same" in out
-    assert f"tetrahedron {failure.tetrahedron} broke first" in out
+    assert f"tetrahedron {failure.tetrahedron} failed first" in out
     assert picture.exists()
 
 
@@ -237,7 +237,7 @@ def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
         made_of["entries"] = [["call", serial, name, [str(tmp_path / "evil")], {"options": {}}]]
         bad = tmp_path / "bad.recording"
         bad.write_bytes(seal(MARK, VERSION, [zlib.compress(to_json(made_of)), snapshot]))
-        with pytest.raises(SnapshotError, match="no call that is recorded"):
+        with pytest.raises(SnapshotError, match="is not a call that recordings contain"):
             replay(bad)
     assert not (tmp_path / "evil").exists()
 

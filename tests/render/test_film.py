@@ -248,7 +248,7 @@ def test_a_camera_that_follows_keeps_a_falling_body_in_the_picture(monkeypatch, 
 def test_a_camera_that_follows_what_is_not_drawn_is_refused_before_anything_moves(tmp_path):
     stage, other = falling_box(), falling_box()
     stage.camera = Follow(other.actors[0].body, stage.camera)
-    with pytest.raises(OptionError, match="no actor"):
+    with pytest.raises(OptionError, match="not an actor"):
         film(stage, tmp_path / "f.png", seconds=0.1)
     assert stage.world.step_count == 0
     assert not list(tmp_path.iterdir())

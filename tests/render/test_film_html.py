@@ -68,10 +68,10 @@ def test_figures_stand_beneath_the_film_as_its_report_has_them(tmp_path):
 def test_a_film_that_is_too_large_or_gone_is_named_in_its_place(tmp_path, monkeypatch):
     path = written(tmp_path / "<a>.gif")
     monkeypatch.setattr(film_html, "LARGEST", path.stat().st_size - 1)
-    for expected in ("too large", "not there"):
+    for expected in ("too large", "no longer exists"):
         page = Elements(report_of(path)._repr_html_())
         assert "img" not in page.found
         assert expected in page.text[0]
         assert "<a>.gif" in page.text[0]
         path.unlink(missing_ok=True)
-    assert "pictures" in Elements(report_of(tmp_path / "a.png")._repr_html_()).text[0]
+    assert "images" in Elements(report_of(tmp_path / "a.png")._repr_html_()).text[0]

@@ -406,5 +406,5 @@ except taichi_soft.OptionError as error:
         env=dict(os.environ, PYTHONPATH=str(Path(__file__).parents[2])),
     )
     assert done.stdout == (
-        "a picture needs opencv-python-headless, not installed here: run pip install 'taichi-soft[film]'\n"
+        "rendering needs opencv-python-headless, not installed here: run pip install 'taichi-soft[film]'\n"
     ), done.stderr

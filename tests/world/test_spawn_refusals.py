@@ -94,7 +94,7 @@ def test_only_bodies_that_live_here_can_be_removed(empty):
     world.despawn(gone)
     before = state_of(world)
     for value in (stranger, None, 0, kind):
-        with pytest.raises(OptionError, match="body must be one that this world made"):
+        with pytest.raises(OptionError, match="body must be a body of this world"):
             world.despawn(value)
     with pytest.raises(StateError, match="body 1 was removed"):
         world.despawn(gone)
@@ -114,7 +114,7 @@ def test_a_count_that_is_none_is_refused_before_anything_is_reserved(count):
 
 
 def test_more_than_fits_into_a_world_is_refused():
-    with pytest.raises(OptionError, match="the world would hold 27,000,000 vertices, at most 10,000,000"):
+    with pytest.raises(OptionError, match="the world would have 27,000,000 vertices, at most 10,000,000"):
         World(floor=None).reserve(cube(), 1_000_000)
 
 

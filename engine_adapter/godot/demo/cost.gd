@@ -1,4 +1,4 @@
-# What it costs to draw the elephant of the demo: godot3-server --path FOLDER --fixed-fps 60 -s cost.gd
+# Measures the cost of drawing the demo's elephant: godot3-server --path FOLDER --fixed-fps 60 -s cost.gd
 extends SceneTree
 
 const TIMES := 200
@@ -34,7 +34,7 @@ func _measure(world: Spatial, drawn: MeshInstance) -> void:
     for each in [reading, drawing]:
         each.sort()
     print(
-        "%d vertices: to read them %d us, to read and to draw them %d us, least of %d (median %d and %d)"
+        "%d vertices: reading %d us, reading and drawing %d us, least of %d (median %d and %d)"
         % [
             drawn.mesh.surface_get_array_len(0),
             reading[0],

@@ -1,10 +1,10 @@
-# Looks of the demo, an elephant more at each press of space, and a hand: the mouse pulls soft bodies about.
+# Materials of the demo. The space key drops another elephant, and the mouse grabs soft bodies.
 extends Spatial
 
-const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
+const ELEPHANT := "res://elephant.glb"  # copy of assets/elephant.glb, the source of the bodies in world.py
 
 var _hand := 0  # a grab
-var _depth := 0.0  # how far in front of the camera it was taken
+var _depth := 0.0  # distance of the grab from the camera
 var _plush := _colored(Color(0.72, 0.72, 0.78))
 var _dropped := 0
 
@@ -23,7 +23,7 @@ func _ready() -> void:
 
 func _unhandled_key_input(event: InputEventKey) -> void:
     if event.pressed and not event.echo and event.scancode == KEY_SPACE:
-        # Beside the one before: it may still be there.
+        # Next to the previous one, which may still be there.
         if drop(Transform(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
             _dropped += 1
 
@@ -32,17 +32,17 @@ func _unhandled_input(event: InputEvent) -> void:
     var button := event as InputEventMouseButton
     if button != null and button.button_index == BUTTON_LEFT:
         if button.pressed:
-            take_hold(button.position)
+            grab_at(button.position)
         else:
-            let_go()
+            release_grab()
     elif event is InputEventMouseMotion and _hand != 0:
         if not $World.move_grab(_hand, $Camera.project_position(event.position, _depth)):
-            _hand = 0  # the body was taken out
+            _hand = 0  # the body was removed
 
 
-# Of the soft body that is seen at a place of the window.
-func take_hold(place: Vector2) -> void:
-    let_go()
+# Grab the soft body at a point of the window.
+func grab_at(place: Vector2) -> void:
+    release_grab()
     var camera: Camera = $Camera
     var hit: Dictionary = $World.raycast(
         camera.project_ray_origin(place), camera.project_ray_normal(place)
@@ -52,13 +52,13 @@ func take_hold(place: Vector2) -> void:
         _depth = -camera.to_local(hit.point).z
 
 
-func let_go() -> void:
+func release_grab() -> void:
     if _hand != 0:
         $World.release_grab(_hand)
     _hand = 0
 
 
-# One elephant more, while there is room; returns what draws it, or null.
+# Drop another elephant. Returns its node, or null if no slot is free.
 func drop(place: Transform) -> TaichiSoftBody:
     var body: int = $World.spawn("elephant", place)
     if body == 0:
@@ -76,7 +76,7 @@ func _colored(color: Color) -> SpatialMaterial:
     return material
 
 
-# The first picture in a .glb: that has a head of 12 bytes, a part in JSON, and one with the bytes.
+# Return the first image in a .glb, which has a header of 12 bytes, a JSON chunk and a binary chunk.
 func _texture_of(path: String) -> ImageTexture:
     var file := File.new()
     file.open(path, File.READ)

@@ -1,9 +1,8 @@
-"""The world of the demo for Godot: toy elephants, and a soft block under a crate. See docs/godot.md.
+"""World of the Godot demo: toy elephants, and a soft block under a crate. See docs/godot.md.
 
     taichi-soft export world.py --axes y-up --out demo.softworld
 
-Here z is up, as always in Python; in Godot it is y, and Python's y is -z. Ground, platform and crate are
-Godot's.
+In Python z is up; in Godot y is up, and Python's y is -z. Ground, platform and crate are nodes of Godot.
 """
 
 from pathlib import Path

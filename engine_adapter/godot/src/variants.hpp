@@ -1,7 +1,7 @@
-// Values of Godot to those of the library and back. What does not fit is thrown as an error with a text.
+// Converts values of Godot to those of the library and back. Throws Refused for invalid values.
 //
-// This is all that world_native.cpp knows of Godot. The type Variant and the functions below the line are written
-// once for each engine: src/godot3 and src/godot4.
+// world_native.cpp uses Godot only through this file. The type Variant and the functions below the line are implemented
+// for each version in src/godot3 and src/godot4.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Refused : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-const char* const kClass = "SoftWorldNative";  // its name in scripts
+const char* const kClass = "SoftWorldNative";  // class name in scripts
 
 enum class Type { whole, real, text, vector, transform, bytes, whole_numbers, other };
 
@@ -29,11 +29,11 @@ class Arguments {
   explicit Arguments(const Variant* const* values) : values_(values) {}
 
   int64_t whole(int which) const;
-  int32_t small(int which) const;  // a whole number of 32 bits
+  int32_t small(int which) const;  // a 32-bit integer
   double real(int which) const;
   std::string text(int which) const;
   void vector(int which, double out[3]) const;
-  ts_pose pose(int which) const;  // of a Transform; its scale is left out
+  ts_pose pose(int which) const;  // from a Transform, without its scale
   std::vector<uint8_t> bytes(int which) const;
   std::vector<int32_t> whole_numbers(int which) const;
 
@@ -43,12 +43,12 @@ class Arguments {
   const Variant* const* values_;
 };
 
-// ---- of each engine ----
+// ---- implemented for each version of Godot ----
 
 Type type_of(const Variant& value);
-const char* type_name(Type type);  // as its scripts call it
+const char* type_name(Type type);  // name of the type in scripts
 
-// Of a value whose type was looked at before.
+// Values whose type was checked before.
 int64_t whole_of(const Variant& value);
 double real_of(const Variant& value);
 std::string text_of(const Variant& value);
@@ -63,13 +63,13 @@ Variant of(int64_t value);
 Variant of(double value);
 Variant of(const std::string& value);
 Variant of_vector(const double vector[3]);
-Variant of_transform(const float numbers[12]);  // as read_transform has them
+Variant of_transform(const float numbers[12]);  // in the order of read_transform
 Variant of_bytes(const std::vector<uint8_t>& bytes);
 Variant of_whole_numbers(const std::vector<int32_t>& numbers);
 Variant of_pairs(const std::vector<float>& numbers);    // an array of Vector2
 Variant of_triples(const std::vector<float>& numbers);  // an array of Vector3
-Variant of_list(std::vector<Variant> values);           // an Array; takes the values over
+Variant of_list(std::vector<Variant> values);           // an Array that takes ownership of the values
 
-void show_error(const char* text, const char* method);  // among the engine's errors
+void show_error(const char* text, const char* method);  // in the engine's error output
 
 }  // namespace taichi_soft_godot

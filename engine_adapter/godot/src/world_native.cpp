@@ -44,7 +44,7 @@ Variant load(Self self, In in) {
   check(ts_scene_load(in.text(0).c_str(), &self.scene));
   const ts_result created = ts_world_create(self.scene, &self.world);
   if (created != TS_OK) {
-    const taichi_soft::Error error(created);  // before `clear`, which makes calls of its own
+    const taichi_soft::Error error(created);  // before `clear`, whose calls may replace the last error
     self.clear();
     throw error;
   }
@@ -60,7 +60,7 @@ Variant count(Self self, In in) {
   const ts_scene_info info = info_of(self);
   const int32_t kind = in.small(0);
   const int32_t counts[] = {info.slot_count, info.asset_count, info.collider_count, info.frame_count, info.mesh_count};
-  if (kind < 0 || kind > TS_MESH) throw Refused("argument 1 is " + std::to_string(kind) + ": kinds are 0 to 4");
+  if (kind < 0 || kind > TS_MESH) throw Refused("argument 1 is " + std::to_string(kind) + ": give a kind from 0 to 4");
   return of(int64_t(counts[kind]));
 }
 
@@ -76,7 +76,7 @@ Variant name_of(Self self, In in) {
   return of(std::string(name));
 }
 
-// Asset, vertices, triangles, whether it has texture coordinates, and its level of detail: -1 for a skin.
+// Returns asset, vertices, triangles, has texture coordinates, and level of detail (-1 for a skin).
 Variant mesh_info(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
   int32_t level = 0;
@@ -87,7 +87,7 @@ Variant mesh_info(Self self, In in) {
 Variant triangles(Self self, In in) {
   std::vector<uint32_t> found(3 * size_t(mesh_of(self, in.small(0)).triangle_count));
   check(ts_mesh_get_triangles(self.scene, in.small(0), found.data(), found.size()));
-  // Godot's fronts are clockwise.
+  // Front faces are clockwise in Godot.
   std::vector<int32_t> clockwise(found.size());
   for (size_t i = 0; i + 2 < found.size(); i += 3) {
     clockwise[i] = int32_t(found[i]), clockwise[i + 1] = int32_t(found[i + 2]), clockwise[i + 2] = int32_t(found[i + 1]);
@@ -99,7 +99,7 @@ Variant uvs(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
   std::vector<float> found(info.has_uv != 0 ? 2 * size_t(info.vertex_count) : 0);
   if (!found.empty()) check(ts_mesh_get_uv(self.scene, in.small(0), found.data(), found.size()));
-  for (size_t i = 1; i < found.size(); i += 2) found[i] = 1.0f - found[i];  // Godot's v goes down
+  for (size_t i = 1; i < found.size(); i += 2) found[i] = 1.0f - found[i];  // Godot's v points down
   return of_pairs(found);
 }
 
@@ -238,7 +238,7 @@ Variant get_level(Self self, In in) {
   return of(int64_t(level));
 }
 
-// Number of levels of detail of an asset.
+// Returns the number of levels of detail of an asset.
 Variant level_count(Self self, In in) {
   int32_t found = 0;
   check(ts_asset_get_level_count(self.scene, in.small(0), &found));
@@ -251,14 +251,15 @@ Variant vertex_count(Self self, In in) {
   return of(int64_t(found));
 }
 
-// ---- what happened ----
+// ---- events ----
 
 Variant record_events(Self self, In in) {
   check(ts_world_record_events(self.world, in.small(0)));
   return of(true);
 }
 
-// All that wait, eight values each in a row: kind, body, other body, collider, impulse, duration, step, time.
+// Returns all waiting events, eight consecutive values each: kind, body, other body, collider, impulse, duration, step,
+// time.
 Variant drain_events(Self self, In) {
   constexpr size_t kAtOnce = 256;
   size_t count = 0, got = kAtOnce;
@@ -288,9 +289,9 @@ Variant dropped_events(Self self, In) {
   return of(found);
 }
 
-// ---- questions ----
+// ---- queries ----
 
-// Body, triangle, distance, point, normal, weights and vertices of the triangle; an empty Array where there is nothing.
+// Returns body, triangle, distance, point, normal, weights and vertices of the triangle; or an empty Array.
 Variant raycast(Self self, In in) {
   double origin[3], direction[3];
   in.vector(0, origin);
@@ -346,7 +347,7 @@ Variant grab(Self self, In in) {
   return of(int64_t(made));
 }
 
-// By its number, from 0 to 15.
+// Grab by its index, 0 to 15.
 Variant grab_of(Self self, In in) {
   ts_grab found = 0;
   check(ts_world_get_grab(self.world, in.small(0), &found));
@@ -399,14 +400,14 @@ Variant set_collider_friction(Self self, In in) {
 
 Variant join(Self self, In in) {
   const std::vector<int32_t> vertices = in.whole_numbers(1), onto = in.whole_numbers(3);
-  if (!onto.empty() && onto.size() != vertices.size()) throw Refused("argument 4 names a vertex for each of argument 2");
+  if (!onto.empty() && onto.size() != vertices.size()) throw Refused("argument 4 must have one vertex per vertex of argument 2");
   ts_joint made = 0;
   check(ts_body_join(self.world, body_of(in), vertices.data(), vertices.size(), ts_body(in.whole(2)),
                      onto.empty() ? nullptr : onto.data(), &made));
   return of(int64_t(made));
 }
 
-// By its number, from 0 to 63.
+// Joint by its index, 0 to 63.
 Variant joint_of(Self self, In in) {
   ts_joint found = 0;
   check(ts_world_get_joint(self.world, in.small(0), &found));
@@ -453,7 +454,7 @@ Variant set_motor_limit(Self self, In in) {
   return of(true);
 }
 
-// Its speed, and torque or force.
+// Returns its speed, and its torque or force.
 Variant motor_state(Self self, In in) {
   double speed = 0.0, effort = 0.0;
   check(ts_motor_get_speed(self.world, ts_motor(in.whole(0)), &speed));
@@ -556,7 +557,7 @@ Variant detach(Self self, In in) {
   return of(true);
 }
 
-// `load` is what reads the world file.
+// Named frame_load because `load` reads the world file.
 Variant frame_load(Self self, In in) {
   double force[3], torque[3];
   check(ts_body_get_load(self.world, body_of(in), in.small(1), force, torque));
@@ -641,7 +642,7 @@ const std::vector<Method> methods = {
 Variant call(WorldNative& self, const Method& method, int count, const Variant* const* values) {
   try {
     if (count != method.argument_count) {
-      throw Refused("takes " + std::to_string(method.argument_count) + " arguments, and got " + std::to_string(count));
+      throw Refused("takes " + std::to_string(method.argument_count) + " arguments, got " + std::to_string(count));
     }
     return method.call(self, Arguments(values));
   } catch (const std::exception& error) {

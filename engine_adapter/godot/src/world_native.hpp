@@ -1,4 +1,4 @@
-// The class SoftWorldNative of scripts: a world file and one world of it.
+// The script class SoftWorldNative: a world file and one world.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ struct WorldNative {
   ts_scene scene = 0;  // 0 until `load`
   ts_world world = 0;
   std::string last_error;
-  std::vector<float> positions, normals;  // kept, so that a frame allocates less
+  std::vector<float> positions, normals;  // reused between frames to avoid allocations
   std::vector<ts_event> events;           // likewise
 
   WorldNative() = default;
@@ -30,7 +30,7 @@ struct Method {
 
 extern const std::vector<Method> methods;
 
-// A refused call returns null, shows its text among Godot's errors, and keeps it for `last_error`.
+// A refused call returns null, prints its text to Godot's error output, and stores it for `last_error`.
 Variant call(WorldNative& self, const Method& method, int count, const Variant* const* values);
 
 }  // namespace taichi_soft_godot

@@ -1,17 +1,17 @@
-// A stand-in for Godot 4: loads the library as Godot does, and calls its class as it is told.
+// A stand-in for Godot 4: loads the library as Godot does, and calls its class as the input says.
 //
 //     fake_host libtaichi_soft_godot4.so [--without NAME] [--double] [--old]
 //
-// It has what the library asks Godot for, by Godot's own header, and nothing else: a name that is not here gives null.
-// So it shows what the library does with Godot's interface, and not what Godot does. It is strict: a value that is
-// read as another type, used after its end or never ended is a fault, and counted or said.
+// It implements only the functions that the library uses, with the signatures of Godot's header; other names return
+// null. It tests how the library uses Godot's interface, not Godot. It is strict: it reports values that are read as
+// another type, used after destruction or never destroyed.
 //
-// Lines of the input, a value each beginning with a letter for its type:
+// Lines of the input; each value begins with a letter for its type:
 //
 //     new                      an instance; its number is printed
 //     call 0 status i12345     a method as scripts call it; `ptrcall` as other libraries may
 //     free 0
-//     end                      takes the library out, and prints how many values were left
+//     end                      unloads the library, and prints the number of remaining values
 #include <dlfcn.h>
 #include <gdextension_interface.h>
 
@@ -49,7 +49,7 @@ bool is_double = false;
 
 struct Shared;
 
-// Godot's Variant: 24 bytes that may be moved.
+// Godot's Variant: 24 bytes, trivially movable.
 struct Value {
   int32_t type;
   int32_t padding;
@@ -66,7 +66,7 @@ static_assert(sizeof(Value) == 24);
 
 constexpr uint32_t kAlive = 0x600dca5e, kDead = 0xdeadbeef;
 
-// What strings, arrays and Transforms hold, and all their copies share.
+// Shared content of strings, arrays and Transforms and their copies.
 struct Shared {
   uint32_t state;
   int holders;
@@ -77,7 +77,7 @@ struct Shared {
 };
 
 int alive = 0;
-auto& dead = *new std::vector<Shared*>;  // kept to the end, so that a later use is seen
+auto& dead = *new std::vector<Shared*>;  // kept to detect use after destruction
 
 Shared* made(Type type) {
   ++alive;
@@ -118,7 +118,7 @@ size_t size_of_one(Type type) {
   }
 }
 
-// Strings and Arrays are a pointer; packed arrays are one behind another.
+// Strings and Arrays are a pointer; packed arrays are a pointer after another word.
 Shared*& held(Type type, const void* memory) {
   const size_t offset = type >= kBytes ? sizeof(void*) : 0;
   return *reinterpret_cast<Shared**>(static_cast<char*>(const_cast<void*>(memory)) + offset);
@@ -228,7 +228,7 @@ GDExtensionPtrDestructor variant_get_ptr_destructor(Type type) {
   return nullptr;
 }
 
-// An array that is written to is a copy of its own; an Array is the same for all.
+// Copy on write for packed arrays; an Array is shared.
 Shared* own(Type type, void* memory) {
   Shared*& shared = held(type, memory);
   if (looked_at(shared, type)->holders > 1 && type != kArray) {
@@ -334,7 +334,7 @@ GDExtensionVariantPtr array_operator_index(GDExtensionTypePtr array, GDExtension
   return reinterpret_cast<GDExtensionVariantPtr>(&shared->items[size_t(index)]);
 }
 
-// ---- texts of the input and the output ----
+// ---- text of input and output ----
 
 std::string in_hex(const std::string& bytes) {
   std::string found;
@@ -536,7 +536,7 @@ GDExtensionInterfaceFunctionPtr get_proc_address(const char* name) {
   return nullptr;
 }
 
-// ---- what is told by the input ----
+// ---- commands of the input ----
 
 std::vector<Object*> objects;
 

@@ -1,4 +1,4 @@
-// What tests/native/test_csharp.py asks of the wrapper: Checks FOLDER WHAT. It prints what it finds, or throws.
+// Checks of the wrapper for tests/native/test_csharp.py: Checks FOLDER WHAT. Prints results, or throws.
 using System;
 using System.Diagnostics;
 using System.Runtime.CompilerServices;
@@ -15,7 +15,7 @@ namespace TaichiSoft
             if (!isTrue) throw new Exception(text);
         }
 
-        // Prints the code and text of what a call throws.
+        // Prints code and text of the exception of a call.
         private static void Refused(string what, Action call)
         {
             try
@@ -94,7 +94,7 @@ namespace TaichiSoft
                 Console.WriteLine("callback: " + exception.Message);
             }
             world.BeforeStep = null;
-            world.Advance(Frame); // goes on
+            world.Advance(Frame); // continues
 
             world.BeforeStep = each =>
             {
@@ -128,7 +128,7 @@ namespace TaichiSoft
                 Grab held = world.GetBody(1).Grab(new Pull(0, new Vector3d(1, 0, 0), origin));
                 world.GetBody(5).Attach(some, hand, feels: true);
                 world.RecordEvents(EventKinds.All);
-                var state = new byte[world.SnapshotSize() + 10000]; // contacts that are recorded take room
+                var state = new byte[world.SnapshotSize() + 10000]; // recorded contacts need space
                 int calls = 0, frame = 0;
                 var none = new Vector3d();
                 world.SetFixedStep(Frame);
@@ -174,7 +174,7 @@ namespace TaichiSoft
                 Console.WriteLine("collections: {0}", GC.CollectionCount(0) - collections);
                 Console.WriteLine("allocated: {0}", allocated);
                 before = GC.GetAllocatedBytesForCurrentThread();
-                for (int i = 0; i < 1000; ++i) GC.KeepAlive(new object()); // that it counts at all
+                for (int i = 0; i < 1000; ++i) GC.KeepAlive(new object()); // proves that allocations are counted
                 Console.WriteLine("allocated by 1000 objects: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
             }
         }
@@ -194,7 +194,7 @@ namespace TaichiSoft
             return new WeakReference(new Scene(folder));
         }
 
-        // Stack from before does not count as a reference.
+        // Collects garbage without references from the old stack.
         private static void Collect()
         {
             for (int i = 0; i < 3; ++i)
@@ -208,8 +208,7 @@ namespace TaichiSoft
         {
             using (var scene = new Scene(folder))
             {
-                // Each in a thread of its own, whose stack ends with it: Mono takes what looks like a reference
-                // for one.
+                // Each in a separate thread, because Mono scans stacks conservatively.
                 ulong first = 0;
                 long before = 0;
                 for (int i = 0; i < 100; ++i)
@@ -229,14 +228,14 @@ namespace TaichiSoft
                 second.Advance(Frame);
                 Require(second.Hash() == first, "a world beside another differs");
                 scene.Dispose();
-                world.Advance(Frame); // goes on without its scene
+                world.Advance(Frame); // continues without its scene
                 Require(world.Hash() == first, "a world without its scene differs");
             }
             var forgetting = new Thread(() => ForgottenScene(folder));
             forgetting.Start();
             forgetting.Join();
             Collect();
-            Console.WriteLine("done: yes"); // and worlds that nobody has disposed of end with the process
+            Console.WriteLine("done: yes"); // worlds without Dispose end with the process
         }
 
         private static void Threads(string folder)

@@ -1,4 +1,4 @@
-// What calls cost from C#: Cost FOLDER. Of the world's first body, after a second of play.
+// Measures the cost of calls from C#: Cost FOLDER. Uses the world's first body, after one second.
 using System;
 using System.Diagnostics;
 
@@ -21,8 +21,8 @@ namespace TaichiSoft
                 Action step = () => world.Step(1.0 / 60);
                 for (int i = 0; i < 60; ++i) step();
                 Say("a step", step, step);
-                Say("to read " + count / 3 + " vertices and normals", step, () => body.ReadMesh(mesh, rows, normals));
-                Say("a call that does next to nothing", step, () => body.GetStatus());
+                Say("reading " + count / 3 + " vertices and normals", step, () => body.ReadMesh(mesh, rows, normals));
+                Say("a trivial call", step, () => body.GetStatus());
             }
         }
 
@@ -37,7 +37,7 @@ namespace TaichiSoft
                 times[i] = (Stopwatch.GetTimestamp() - start) * 1e6 / Stopwatch.Frequency;
             }
             Array.Sort(times);
-            Console.WriteLine("{0}: {1:0.0} us at the least, {2:0.0} at the median", what, times[0], times[Times / 2]);
+            Console.WriteLine("{0}: {1:0.0} us at least, median {2:0.0} us", what, times[0], times[Times / 2]);
         }
     }
 }

@@ -1,4 +1,4 @@
-// Plays a recorded game on a world file: Play FOLDER < GAME. It prints what ../tests/play.c prints.
+// Plays a recorded game on a world file: Play FOLDER < GAME. The output equals that of ../tests/play.c.
 using System;
 using System.Collections.Generic;
 using System.Globalization;
@@ -14,7 +14,7 @@ namespace TaichiSoft
         private static int at;
         private static byte[] kept;
         private static Body[] bodies;
-        private static readonly SoftEvent[] events = new SoftEvent[10000]; // as many as the library keeps
+        private static readonly SoftEvent[] events = new SoftEvent[10000]; // the library's limit
         private static TextWriter output;
 
         private static double Number()

@@ -1,6 +1,6 @@
-// A component for Unity that draws a body of the world of a SoftWorldBehaviour.
+// Unity component that draws a body of a SoftWorldBehaviour's world.
 //
-// No Unity has run this file. Mono's compiler has compiled it against stubs/UnityEngine.cs, and a test has run it so.
+// Not tested in Unity: tests compile it with Mono against stubs/UnityEngine.cs and run it.
 using System;
 using System.Runtime.InteropServices;
 using UnityEngine;
@@ -8,26 +8,26 @@ using UnityEngine.Rendering;
 
 namespace TaichiSoft
 {
-    /// <summary>Fills the mesh of this game object with a body, once a frame.</summary>
+    /// <summary>Updates the mesh of this game object from a body, once per frame.</summary>
     [RequireComponent(typeof(MeshFilter))]
     public sealed class SoftBodyBehaviour : MonoBehaviour
     {
-        [SerializeField, Tooltip("Where the body lives")]
+        [SerializeField, Tooltip("World of the body")]
         private SoftWorldBehaviour world = null;
 
-        [SerializeField, Tooltip("The body's name in the world file")]
+        [SerializeField, Tooltip("Name of the body in the world file")]
         private string body = "body0";
 
-        [SerializeField, Tooltip("The mesh's name in the world file; empty for the first one of the body's asset")]
+        [SerializeField, Tooltip("Name of the mesh in the world file; empty takes the first mesh of the body's asset")]
         private string mesh = "";
 
-        // A mesh of the scene, and the memory into which the library writes it.
+        // A Unity mesh, and the memory that the library writes to.
         private sealed class Drawing
         {
             public readonly Mesh Mesh;
             private readonly int number;
             private readonly Vector3[] vertices, normals;
-            private GCHandle vertexMemory, normalMemory; // pinned: the library writes there without a copy
+            private GCHandle vertexMemory, normalMemory; // pinned: the library writes to it directly
 
             public Drawing(Scene scene, int number, string name)
             {
@@ -65,7 +65,7 @@ namespace TaichiSoft
 
             public void Clear()
             {
-                Array.Clear(vertices, 0, vertices.Length); // triangles without a size: nothing is seen
+                Array.Clear(vertices, 0, vertices.Length); // degenerate triangles are invisible
                 Fill();
             }
 
@@ -85,13 +85,13 @@ namespace TaichiSoft
         }
 
         private int slot;
-        // By level of detail, so that a change of level allocates nothing. A skin draws every level, and is alone.
+        // By level of detail, so that a change of level allocates nothing. A skin is used for all levels.
         private Drawing[] drawings = new Drawing[0];
         private Drawing shown;
         private MeshFilter filter;
         private bool isSomebody = true;
 
-        /// <summary>The body; ask IsSomebody of it, for a slot may be empty.</summary>
+        /// <summary>The body. Check IsSomebody, because the slot can be empty.</summary>
         public Body Body
         {
             get { return world.World.GetBody(slot); }
@@ -112,7 +112,7 @@ namespace TaichiSoft
             }
             filter = GetComponent<MeshFilter>();
             Show(drawings[0]);
-            // The library says places in the world, and a mesh has them in the game object.
+            // The library uses world coordinates, a mesh those of its game object.
             transform.SetPositionAndRotation(Vector3.zero, Quaternion.identity);
         }
 
@@ -138,17 +138,17 @@ namespace TaichiSoft
             Body found = Body;
             if (!found.IsSomebody)
             {
-                throw new SoftException(ErrorCode.State, "nobody lives in " + body + " at first: name the mesh");
+                throw new SoftException(ErrorCode.State, "slot " + body + " is empty at the start: set the mesh's name");
             }
             int asset = found.GetAsset(), count = scene.GetInfo().MeshCount;
             for (int i = 0; i < count; ++i)
             {
                 if (scene.GetMeshInfo(i).Asset == asset) return i;
             }
-            throw new SoftException(ErrorCode.Argument, "nothing is drawn of " + body);
+            throw new SoftException(ErrorCode.Argument, "there is no mesh of " + body);
         }
 
-        // After SoftWorldBehaviour.Update, which says how far the picture is.
+        // After SoftWorldBehaviour.Update, which sets alpha.
         private void LateUpdate()
         {
             if (shown == null || world.World == null) return;

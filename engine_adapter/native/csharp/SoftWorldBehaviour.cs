@@ -1,24 +1,24 @@
-// A component for Unity that steps a world file. SoftBodyBehaviour.cs draws the bodies.
+// Unity component that steps a world file. SoftBodyBehaviour.cs draws the bodies.
 //
-// No Unity has run this file. Mono's compiler has compiled it against stubs/UnityEngine.cs, and a test has run it so.
+// Not tested in Unity: tests compile it with Mono against stubs/UnityEngine.cs and run it.
 using System;
 using System.IO;
 using UnityEngine;
 
 namespace TaichiSoft
 {
-    /// <summary>A world file of StreamingAssets, exported with `--axes unity`, that moves while this is enabled.</summary>
-    // Before others, which may use World in their Start, and the impulses of a step in their FixedUpdate.
+    /// <summary>Steps a world file in StreamingAssets, exported with `--axes unity`, while enabled.</summary>
+    // Runs before other scripts, which can use World in Start and the impulses of a step in FixedUpdate.
     [DefaultExecutionOrder(-100)]
     public sealed class SoftWorldBehaviour : MonoBehaviour
     {
-        /// <summary>A collider or frame of the world file, and what it follows.</summary>
+        /// <summary>A collider or frame of the world file that follows a transform.</summary>
         [Serializable]
         public struct Follower
         {
-            /// <summary>Its name in the world file.</summary>
+            /// <summary>Name in the world file.</summary>
             public string name;
-            /// <summary>What it follows.</summary>
+            /// <summary>Transform to follow.</summary>
             public Transform target;
         }
 
@@ -31,41 +31,41 @@ namespace TaichiSoft
         [SerializeField, Tooltip("Frames that follow game objects")]
         private Follower[] frames = new Follower[0];
 
-        private readonly SoftEvent[] events = new SoftEvent[64]; // those from `toldCount` on are not told yet
+        private readonly SoftEvent[] events = new SoftEvent[64]; // events from `toldCount` on are not delivered yet
         private EventKinds recorded;
         private int eventCount, toldCount;
         private int[] colliderNumbers, frameNumbers;
         private float fixedStep;
-        private double ahead; // of the last step, put in by Update [s]
+        private double ahead; // time after the last step that Update has added [s]
 
-        /// <summary>What is in the file. Null before Awake and after OnDestroy.</summary>
+        /// <summary>The world file. Null before Awake and after OnDestroy.</summary>
         public Scene Scene { get; private set; }
 
-        /// <summary>What moves. Null before Awake and after OnDestroy.</summary>
+        /// <summary>The world. Null before Awake and after OnDestroy.</summary>
         public World World { get; private set; }
 
-        /// <summary>Its time after the last call.</summary>
+        /// <summary>Clock after the last Advance.</summary>
         public Clock Clock { get; private set; }
 
-        /// <summary>A body touches a collider or another body. Told in Update, as all events are.</summary>
-        /// <remarks>Kinds to which nobody listens are not recorded: listen in Start, before the first step.</remarks>
+        /// <summary>A body touches a collider or another body. All events are delivered in Update.</summary>
+        /// <remarks>Kinds without listeners are not recorded: subscribe in Start, before the first step.</remarks>
         public event Action<SoftEvent> ContactBegan;
 
-        /// <summary>They touch no longer. Impulse is that of the whole contact, Duration how long it was.</summary>
+        /// <summary>A contact ended. Impulse and Duration are those of the whole contact.</summary>
         public event Action<SoftEvent> ContactEnded;
 
-        /// <summary>A body lies still, and costs nothing.</summary>
+        /// <summary>A body fell asleep and costs no time.</summary>
         public event Action<SoftEvent> FellAsleep;
 
-        /// <summary>It moves again.</summary>
+        /// <summary>A sleeping body woke.</summary>
         public event Action<SoftEvent> Woke;
 
-        /// <summary>It could not be computed any further, and stays where it was.</summary>
+        /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         public event Action<SoftEvent> Froze;
 
         private void Awake()
         {
-            Scene = new Scene(Path.Combine(Application.streamingAssetsPath, folder)); // compiles kernels: seconds
+            Scene = new Scene(Path.Combine(Application.streamingAssetsPath, folder));
             World = new World(Scene);
             colliderNumbers = NumbersOf(NameKind.Collider, colliders);
             frameNumbers = NumbersOf(NameKind.Frame, frames);
@@ -78,14 +78,14 @@ namespace TaichiSoft
             return numbers;
         }
 
-        // Unity calls this once a step, and Update once a frame. Update puts in the part of a step that the picture
-        // is ahead of the last one, and this the rest: so each call of this makes one step, and alpha is right.
+        // Unity calls FixedUpdate once per step and Update once per frame. Update adds the time since the last step,
+        // and FixedUpdate adds the rest. So each FixedUpdate makes one step, and alpha is correct.
         private void FixedUpdate()
         {
             if (fixedStep != Time.fixedDeltaTime)
             {
                 fixedStep = Time.fixedDeltaTime;
-                World.SetFixedStep(fixedStep); // forgets what Update has put in
+                World.SetFixedStep(fixedStep); // discards the time that Update has added
                 ahead = 0;
             }
             Record();
@@ -122,14 +122,14 @@ namespace TaichiSoft
             if (Woke != null) wanted |= EventKinds.Woke;
             if (Froze != null) wanted |= EventKinds.Froze;
             if (wanted == recorded) return;
-            recorded = wanted; // what throws here does so once, and the world goes on
+            recorded = wanted; // set first: an exception below is thrown only once
             World.RecordEvents(wanted);
         }
 
-        // A listener may throw: then the rest is told in the next frame.
+        // If a listener throws, the remaining events are delivered in the next frame.
         private void TellEvents()
         {
-            while (World != null) // a listener may end it
+            while (World != null) // a listener can destroy it
             {
                 if (toldCount == eventCount)
                 {

@@ -1,4 +1,4 @@
-// taichi-soft in C#: worlds that `taichi-soft export` wrote, stepped by the native library.
+// taichi-soft for C#: steps worlds from `taichi-soft export` with the native library.
 //
 //     using (var scene = new Scene("game.softworld"))
 //     using (var world = new World(scene))
@@ -11,12 +11,12 @@
 //         }
 //     }
 //
-// Every call throws a SoftException with the library's code and text where the library refuses it. A world takes
-// calls of one thread at a time. Nothing is allocated after loading, but by what returns an array or a string, and
-// by exceptions. Places, turns and impulses are in the axes and the unit of length for which the world was exported.
+// A refused call throws a SoftException with the library's code and text. Only one thread at a time can call a world.
+// After loading, only methods that return an array or a string, and exceptions, allocate memory. All quantities use
+// the axes and the unit of length for which the world was exported.
 //
-// One file of C# 7 without unsafe code, for .NET, Mono and Unity. Structs are passed by value: Mono's compiler makes
-// zeros of an `in` parameter that goes on to the library.
+// One file of C# 7 without unsafe code, for .NET, Mono and Unity. Structs are passed by value, because Mono's compiler
+// passes zeros for an `in` parameter that is forwarded to the library.
 using System;
 using System.Runtime.CompilerServices;
 using System.Runtime.ExceptionServices;
@@ -25,80 +25,80 @@ using System.Text;
 
 namespace TaichiSoft
 {
-    /// <summary>Why the library refused a call.</summary>
+    /// <summary>Reason for refusing a call.</summary>
     public enum ErrorCode
     {
         /// <summary>A value out of range, not finite, or null.</summary>
         Argument = -1,
-        /// <summary>No such scene, world or body, or no more.</summary>
+        /// <summary>An unknown or destroyed scene, world or body.</summary>
         Handle = -2,
         /// <summary>Another thread is in a call of this world.</summary>
         Busy = -3,
-        /// <summary>A world file that is not there, not whole or damaged.</summary>
+        /// <summary>A world file that is missing, incomplete or damaged.</summary>
         File = -4,
         /// <summary>A world file or a library of another version.</summary>
         Version = -5,
-        /// <summary>An array that does not fit.</summary>
+        /// <summary>An array of the wrong size.</summary>
         Size = -6,
-        /// <summary>What the world cannot do now: a full pool, an attached body.</summary>
+        /// <summary>A call that the current state does not allow: a full pool, an attached body.</summary>
         State = -7,
-        /// <summary>Bytes that are no snapshot of this world.</summary>
+        /// <summary>Bytes that are not a snapshot of this world.</summary>
         Snapshot = -8,
-        /// <summary>Taichi, or the system, has failed.</summary>
+        /// <summary>A failure of the system: memory, threads.</summary>
         Runtime = -9
     }
 
-    /// <summary>What has a name in a scene.</summary>
+    /// <summary>Kinds of named objects in a scene.</summary>
     public enum NameKind
     {
-        /// <summary>A slot in which a body lives.</summary>
+        /// <summary>A slot for a body.</summary>
         Body = 0,
-        /// <summary>What bodies are made of.</summary>
+        /// <summary>Template of bodies.</summary>
         Asset = 1,
         /// <summary>A rigid shape that the game moves.</summary>
         Collider = 2,
-        /// <summary>What attached vertices follow.</summary>
+        /// <summary>A pose that attached vertices follow.</summary>
         Frame = 3,
-        /// <summary>What is drawn of an asset.</summary>
+        /// <summary>Render mesh of an asset.</summary>
         Mesh = 4,
-        /// <summary>What holds two bodies together.</summary>
+        /// <summary>Connection of two bodies.</summary>
         Joint = 5,
-        /// <summary>What drives a part of a body.</summary>
+        /// <summary>Drive of a part of a body.</summary>
         Motor = 6
     }
 
-    /// <summary>How a body fares.</summary>
+    /// <summary>Status of a body.</summary>
     public enum BodyStatus
     {
-        /// <summary>It moves.</summary>
+        /// <summary>The body moves.</summary>
         Active = 0,
-        /// <summary>It failed, and stays where it last was in order.</summary>
+        /// <summary>The body became invalid and stays in its last valid state.</summary>
         Frozen = 1,
-        /// <summary>It lies still, and costs nothing.</summary>
+        /// <summary>The body rests and costs no time.</summary>
         Asleep = 2
     }
 
-    /// <summary>A refused call: the library's code and text.</summary>
+    /// <summary>Exception of a refused call, with the library's code and text.</summary>
     public sealed class SoftException : Exception
     {
-        /// <summary>Why.</summary>
+        /// <summary>Reason.</summary>
         public ErrorCode Code { get; private set; }
 
-        /// <summary>One with a code and a text.</summary>
+        /// <summary>Creates an exception with a code and a text.</summary>
         public SoftException(ErrorCode code, string message) : base(message)
         {
             Code = code;
         }
     }
 
-    /// <summary>A place [unit of length], or what has its axes: velocity [/s], impulse [kg, /s], spin [rad/s].</summary>
+    /// <summary>A vector: position [unit of length], velocity [/s], impulse [kg, /s] or spin [rad/s].</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Vector3d
     {
-        /// <summary>Along the axes.</summary>
+        /// <summary>Components along the axes.</summary>
         public double X, Y, Z;
 
-        /// <summary>From its three numbers.</summary>
+        /// <summary>Creates a vector from its components.</summary>
         public Vector3d(double x, double y, double z)
         {
             X = x;
@@ -107,14 +107,14 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>A turn, of length 1.</summary>
+    /// <summary>A rotation as a unit quaternion.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Quaterniond
     {
         /// <summary>Axis times sine, and cosine, of half the angle.</summary>
         public double X, Y, Z, W;
 
-        /// <summary>From its four numbers.</summary>
+        /// <summary>Creates a quaternion from its components.</summary>
         public Quaterniond(double x, double y, double z, double w)
         {
             X = x;
@@ -123,11 +123,11 @@ namespace TaichiSoft
             W = w;
         }
 
-        /// <summary>No turn.</summary>
+        /// <summary>No rotation.</summary>
         public static readonly Quaterniond Identity = new Quaterniond(0, 0, 0, 1);
     }
 
-    /// <summary>Where a collider or a frame is. UnityEngine has a Pose of its own: write TaichiSoft.Pose.</summary>
+    /// <summary>Pose of a collider or a frame. UnityEngine also has a Pose: write TaichiSoft.Pose.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Pose
     {
@@ -136,7 +136,7 @@ namespace TaichiSoft
         /// <summary>Of length 1.</summary>
         public Quaterniond Rotation;
 
-        /// <summary>From a place and a turn.</summary>
+        /// <summary>Creates a pose from a position and a rotation.</summary>
         public Pose(Vector3d position, Quaterniond rotation)
         {
             Position = position;
@@ -144,22 +144,22 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>Where and how a body comes into the world.</summary>
+    /// <summary>Initial state of a spawned body.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Placement
     {
         internal uint structSize;
         private readonly int reserved;
-        /// <summary>Of the mesh's origin [unit of length].</summary>
+        /// <summary>Position of the mesh's origin [unit of length].</summary>
         public Vector3d Position;
         /// <summary>Of length 1.</summary>
         public Quaterniond Rotation;
-        /// <summary>Of the centre of mass [unit of length/s].</summary>
+        /// <summary>Velocity of the centre of mass [unit of length/s].</summary>
         public Vector3d Velocity;
         /// <summary>[rad/s]</summary>
         public Vector3d Spin;
 
-        /// <summary>At a place, turned, at rest.</summary>
+        /// <summary>Creates a placement at rest.</summary>
         public Placement(Vector3d position, Quaterniond rotation) : this()
         {
             Position = position;
@@ -176,31 +176,31 @@ namespace TaichiSoft
         Sphere = 1,
         /// <summary>Size has the edges.</summary>
         Box = 2,
-        /// <summary>Along the axis that is up: Size.X is the radius, Size.Y the length between the centres.</summary>
+        /// <summary>Along the up axis: Size.X is the radius, Size.Y the length between the centres.</summary>
         Capsule = 3
     }
 
-    /// <summary>What a collider is made of, and how its surface feels.</summary>
+    /// <summary>Shape and surface of a collider.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Shape
     {
         internal uint structSize;
-        /// <summary>What Size means.</summary>
+        /// <summary>Kind, which defines the meaning of Size.</summary>
         public ShapeKind Kind;
         /// <summary>[unit of length]</summary>
         public Vector3d Size;
-        /// <summary>Coulomb's.</summary>
+        /// <summary>Coulomb coefficient.</summary>
         public double Friction;
-        /// <summary>0 to 1; below 0 for the bodies' own.</summary>
+        /// <summary>0 to 1; below 0 uses that of the bodies.</summary>
         public double Restitution;
-        /// <summary>How far outside of the shape bodies meet it [unit of length].</summary>
+        /// <summary>Distance outside the shape at which contact begins [unit of length].</summary>
         public double Thickness;
-        /// <summary>Bits: two touch where each one's mask has a bit of the other's group.</summary>
+        /// <summary>Bits: two objects collide if the mask of each has a bit of the other's group.</summary>
         public int Group;
         /// <summary>See Group.</summary>
         public int Mask;
 
-        /// <summary>With the surface that most things have.</summary>
+        /// <summary>Creates a shape with default friction and restitution.</summary>
         public Shape(ShapeKind kind, Vector3d size) : this()
         {
             Kind = kind;
@@ -212,50 +212,50 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>Where a ray meets a surface first, or the point of one that is nearest.</summary>
+    /// <summary>First hit of a ray, or the closest point of a surface.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Hit
     {
         internal uint structSize;
-        /// <summary>Of the body's own surface, not of a mesh that it carries; -1 for a body without any.</summary>
+        /// <summary>Triangle of the body's surface, not of a mesh; -1 for a body without triangles.</summary>
         public readonly int Triangle;
         internal readonly ulong body;
         /// <summary>[unit of length]</summary>
         public readonly double Distance;
-        /// <summary>Of the three vertices; their sum is 1.</summary>
+        /// <summary>Weights of the three vertices, with sum 1.</summary>
         public readonly Vector3d Weights;
         /// <summary>[unit of length]</summary>
         public readonly Vector3d Point;
-        /// <summary>Of length 1, outward.</summary>
+        /// <summary>Outward unit normal.</summary>
         public readonly Vector3d Normal;
         /// <summary>Corners of the triangle.</summary>
         public readonly int Vertex0, Vertex1, Vertex2;
         private readonly int isInside;
 
-        /// <summary>Of the nearest point: whether the point asked for lies in the body.</summary>
+        /// <summary>For Closest: true if the given point is inside the body.</summary>
         public bool IsInside
         {
             get { return isInside != 0; }
         }
     }
 
-    /// <summary>How a body is held: where, with what spring, and where to.</summary>
+    /// <summary>Parameters of a grab: point, spring and target.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Pull
     {
         internal uint structSize;
-        /// <summary>Of the body's own surface: that of a Hit.</summary>
+        /// <summary>Triangle of the body's surface, as in Hit.</summary>
         public int Triangle;
-        /// <summary>Of its vertices; 0 or more, their sum is 1.</summary>
+        /// <summary>Weights of its vertices; 0 or more, with sum 1.</summary>
         public Vector3d Weights;
-        /// <summary>To which it is pulled at first [unit of length].</summary>
+        /// <summary>Initial target [unit of length].</summary>
         public Vector3d Point;
-        /// <summary>Of the spring [Hz]: 5 is a hand.</summary>
+        /// <summary>Frequency of the spring [Hz]; 5 feels like a hand.</summary>
         public double Frequency;
-        /// <summary>Below 0 for ten times the body's weight on Earth.</summary>
+        /// <summary>Largest force; below 0 means ten times the body's weight on Earth.</summary>
         public double MaxForce;
 
-        /// <summary>As a hand does, at a point of a triangle.</summary>
+        /// <summary>Creates a default grab at a point of a triangle.</summary>
         public Pull(int triangle, Vector3d weights, Vector3d point) : this()
         {
             Triangle = triangle;
@@ -265,13 +265,13 @@ namespace TaichiSoft
             MaxForce = -1.0;
         }
 
-        /// <summary>As a hand does, where a ray has hit.</summary>
+        /// <summary>Creates a default grab at a hit.</summary>
         public Pull(Hit hit) : this(hit.Triangle, hit.Weights, hit.Point)
         {
         }
     }
 
-    /// <summary>What a motor does.</summary>
+    /// <summary>Settings of a motor.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Drive
     {
@@ -281,9 +281,9 @@ namespace TaichiSoft
         private int hasPoint;
         private readonly Vector3d axis;
         private Vector3d point;
-        /// <summary>Wanted [rad/s], or [unit of length/s] where it pushes.</summary>
+        /// <summary>Target speed [rad/s], or [unit of length/s] for Push.</summary>
         public double Speed;
-        /// <summary>Of torque, or of force where it pushes.</summary>
+        /// <summary>Limit of the torque, or of the force for Push.</summary>
         public double Limit;
 
         private Drive(bool turns, Vector3d axis, double speed, double limit) : this()
@@ -294,19 +294,19 @@ namespace TaichiSoft
             Limit = limit;
         }
 
-        /// <summary>Turn vertices about an axis through their centre, that turns with them.</summary>
+        /// <summary>Rotates vertices about an axis through their centre that rotates with them.</summary>
         public static Drive Turn(Vector3d axis, double speed, double maxTorque)
         {
             return new Drive(true, axis, speed, maxTorque);
         }
 
-        /// <summary>Push vertices along an axis that turns with them.</summary>
+        /// <summary>Pushes vertices along an axis that rotates with them.</summary>
         public static Drive Push(Vector3d axis, double speed, double maxForce)
         {
             return new Drive(false, axis, speed, maxForce);
         }
 
-        /// <summary>The same about or along an axis that stays as it is in space.</summary>
+        /// <summary>The same with an axis that is fixed in space.</summary>
         public Drive Fixed()
         {
             Drive found = this;
@@ -314,7 +314,7 @@ namespace TaichiSoft
             return found;
         }
 
-        /// <summary>The same about an axis that stays in space and goes through a point.</summary>
+        /// <summary>The same with an axis that is fixed in space and passes through a point.</summary>
         public Drive Through(Vector3d place)
         {
             Drive found = Fixed();
@@ -324,42 +324,42 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>What can happen; bits, to say several at once.</summary>
+    /// <summary>Kinds of events, as bits.</summary>
     [Flags]
     public enum EventKinds
     {
         /// <summary>A body touches a collider or another body.</summary>
         ContactBegan = 1,
-        /// <summary>They have not touched for 0.05 s, or one of them was taken out.</summary>
+        /// <summary>They have not touched for 0.05 s, or one of them was removed.</summary>
         ContactEnded = 2,
-        /// <summary>A body lies still from now on.</summary>
+        /// <summary>A body fell asleep.</summary>
         FellAsleep = 4,
-        /// <summary>It moves again.</summary>
+        /// <summary>A sleeping body woke.</summary>
         Woke = 8,
-        /// <summary>It could not be computed any further, and stays where it was.</summary>
+        /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
         /// <summary>All of them.</summary>
         All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
     }
 
-    /// <summary>Something that happened in a step.</summary>
+    /// <summary>Event of a step.</summary>
     public struct SoftEvent
     {
-        /// <summary>One of the kinds.</summary>
+        /// <summary>Kind of the event.</summary>
         public readonly EventKinds Kind;
-        /// <summary>That the body touches; -1 where it touches a body, or nothing.</summary>
+        /// <summary>Collider that the body touches; -1 for another body or no contact.</summary>
         public readonly int Collider;
-        /// <summary>Of the world, counted from 0.</summary>
+        /// <summary>Step of the world, from 0.</summary>
         public readonly long Step;
-        /// <summary>At the end of that step [s].</summary>
+        /// <summary>Time at the end of that step [s].</summary>
         public readonly double Time;
-        /// <summary>To whom. It may be gone by now: ask IsAlive.</summary>
+        /// <summary>Body of the event. It may have been removed: check IsAlive.</summary>
         public readonly Body Body;
-        /// <summary>That it touches, the one in the higher slot; IsSomebody is false where there is none.</summary>
+        /// <summary>Body that it touches, in the higher slot; IsSomebody is false if there is none.</summary>
         public readonly Body Other;
-        /// <summary>That Body gave: in that step, or from the beginning of the contact to its end.</summary>
+        /// <summary>Impulse that Body exerted: in that step, or during the whole contact if it ended.</summary>
         public readonly Vector3d Impulse;
-        /// <summary>Of a contact that ended [s].</summary>
+        /// <summary>Duration of a contact that ended [s].</summary>
         public readonly double Duration;
 
         internal SoftEvent(World world, ref PlainEvent plain)
@@ -375,7 +375,7 @@ namespace TaichiSoft
         }
     }
 
-    // As the library writes it.
+    // Memory layout of the library.
     [StructLayout(LayoutKind.Sequential)]
     internal struct PlainEvent
     {
@@ -388,62 +388,62 @@ namespace TaichiSoft
         internal readonly double Duration;
     }
 
-    /// <summary>How much there is in a scene.</summary>
+    /// <summary>Numbers of objects in a scene.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct SceneInfo
     {
         internal uint structSize;
-        /// <summary>Bodies that there can be at once.</summary>
+        /// <summary>Largest number of bodies.</summary>
         public int SlotCount;
-        /// <summary>Numbers go from 0 to these.</summary>
+        /// <summary>Counts of objects, whose numbers start at 0.</summary>
         public int AssetCount, ColliderCount, FrameCount, MeshCount;
     }
 
-    /// <summary>What bodies of an asset have in common.</summary>
+    /// <summary>Properties of an asset's bodies.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct AssetInfo
     {
         internal uint structSize;
-        /// <summary>Of a body.</summary>
+        /// <summary>Vertices of a body.</summary>
         public int VertexCount;
-        /// <summary>Bodies of it that there can be at once.</summary>
+        /// <summary>Largest number of its bodies.</summary>
         public int SlotCount;
-        /// <summary>Of each [kg].</summary>
+        /// <summary>Mass of a body [kg].</summary>
         public float Mass;
     }
 
-    /// <summary>What is drawn of the bodies of an asset.</summary>
+    /// <summary>Properties of a render mesh.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct MeshInfo
     {
         internal uint structSize;
-        /// <summary>Its number.</summary>
+        /// <summary>Number of its asset.</summary>
         public int Asset;
-        /// <summary>How much is drawn.</summary>
+        /// <summary>Numbers of vertices and triangles.</summary>
         public int VertexCount, TriangleCount;
         private readonly int hasUv;
 
-        /// <summary>Whether it has texture coordinates.</summary>
+        /// <summary>True if it has texture coordinates.</summary>
         public bool HasUv
         {
             get { return hasUv != 0; }
         }
     }
 
-    /// <summary>The time of a world.</summary>
+    /// <summary>Clock of a world.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Clock
     {
         internal uint structSize;
-        /// <summary>By the last Advance.</summary>
+        /// <summary>Steps of the last Advance.</summary>
         public int StepsMade;
-        /// <summary>So far.</summary>
+        /// <summary>Total number of steps.</summary>
         public long Steps;
-        /// <summary>Simulated [s].</summary>
+        /// <summary>Simulated time [s].</summary>
         public double Time;
-        /// <summary>How far the picture is from the previous step to the last one, 0 to 1.</summary>
+        /// <summary>Interpolation between the previous step and the last one, 0 to 1.</summary>
         public double Alpha;
-        /// <summary>Time dropped so far, where frames were too long [s].</summary>
+        /// <summary>Total time dropped because frames were too long [s].</summary>
         public double Dropped;
     }
 
@@ -456,33 +456,33 @@ namespace TaichiSoft
         internal double dt;
     }
 
-    /// <summary>A world file in memory, with its kernels compiled.</summary>
-    // No SafeHandle: that holds a pointer, and handles of the library are numbers of 64 bits on every machine.
-    // It is not needed, either: the library refuses a number that is no longer valid, and hands none out again.
+    /// <summary>A world file in memory, with its kernels loaded.</summary>
+    // No SafeHandle: it holds a pointer, and the library's handles are 64-bit numbers on every machine. It is not
+    // needed either, because the library refuses invalid handles and does not reuse them.
     public sealed class Scene : IDisposable
     {
         private readonly ulong handle;
         private bool isDisposed;
 
-        /// <summary>Read a folder that `taichi-soft export` wrote. Compiles its kernels: takes seconds.</summary>
+        /// <summary>Reads a folder from `taichi-soft export`, and loads its kernels.</summary>
         public Scene(string folder)
         {
             if (Native.ts_version() != Native.Version)
             {
                 throw new SoftException(
-                    ErrorCode.Version, "the library is of version " + Native.ts_version() + ": give one of version "
+                    ErrorCode.Version, "the library has version " + Native.ts_version() + ": use version "
                     + Native.Version);
             }
             Native.Check(Native.ts_scene_load(Native.Bytes(folder), out handle), this);
         }
 
-        /// <summary>Unloads it, where nobody has.</summary>
+        /// <summary>Unloads the scene if Dispose was not called.</summary>
         ~Scene()
         {
             Release();
         }
 
-        /// <summary>Unload it. Its worlds go on.</summary>
+        /// <summary>Unloads the scene. Existing worlds stay valid.</summary>
         public void Dispose()
         {
             Native.Check(Release(), this);
@@ -501,7 +501,7 @@ namespace TaichiSoft
             get { return handle; }
         }
 
-        /// <summary>How much there is.</summary>
+        /// <summary>Returns the numbers of objects.</summary>
         public SceneInfo GetInfo()
         {
             var info = new SceneInfo { structSize = Size<SceneInfo>.Bytes };
@@ -509,7 +509,7 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>The number of what has a name: of a body, that of its slot.</summary>
+        /// <summary>Returns the number of an object by its name; for a body, its slot.</summary>
         public int Find(NameKind kind, string name)
         {
             int number;
@@ -517,7 +517,7 @@ namespace TaichiSoft
             return number;
         }
 
-        /// <summary>The name of what has a number.</summary>
+        /// <summary>Returns the name of an object.</summary>
         public string GetName(NameKind kind, int number)
         {
             var name = new byte[256];
@@ -531,7 +531,7 @@ namespace TaichiSoft
             return Encoding.UTF8.GetString(name, 0, Array.IndexOf(name, (byte)0));
         }
 
-        /// <summary>What bodies of an asset have in common.</summary>
+        /// <summary>Returns the properties of an asset's bodies.</summary>
         public AssetInfo GetAssetInfo(int asset)
         {
             var info = new AssetInfo { structSize = Size<AssetInfo>.Bytes };
@@ -539,7 +539,7 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>Levels of detail that an asset has; its info is of the finest.</summary>
+        /// <summary>Returns the number of levels of detail; AssetInfo describes the finest.</summary>
         public int GetLevelCount(int asset)
         {
             int count;
@@ -547,7 +547,7 @@ namespace TaichiSoft
             return count;
         }
 
-        /// <summary>The level of detail of bodies that a mesh draws; -1 for every one, as skins do.</summary>
+        /// <summary>Returns the level of detail of a mesh; -1 for a skin, which fits all levels.</summary>
         public int GetMeshLevel(int mesh)
         {
             int level;
@@ -555,7 +555,7 @@ namespace TaichiSoft
             return level;
         }
 
-        /// <summary>How much a mesh draws.</summary>
+        /// <summary>Returns the properties of a mesh.</summary>
         public MeshInfo GetMeshInfo(int mesh)
         {
             var info = new MeshInfo { structSize = Size<MeshInfo>.Bytes };
@@ -563,34 +563,34 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>Triangles, 3 numbers each; clockwise seen from outside in Unity's axes.</summary>
+        /// <summary>Reads triangles, 3 numbers each; clockwise seen from outside in Unity's axes.</summary>
         public void GetTriangles(int mesh, int[] indices)
         {
             Native.Check(Native.ts_mesh_get_triangles(handle, mesh, indices, Native.Length(indices)), this);
         }
 
-        /// <summary>Texture coordinates, 2 numbers each, v upwards.</summary>
+        /// <summary>Reads texture coordinates, 2 numbers each, v upwards.</summary>
         public void GetUv(int mesh, float[] uv)
         {
             Native.Check(Native.ts_mesh_get_uv(handle, mesh, uv, Native.Length(uv)), this);
         }
     }
 
-    /// <summary>A scene that moves.</summary>
+    /// <summary>A running instance of a scene.</summary>
     public sealed class World : IDisposable
     {
-        // The library calls a static method, which is what Unity's IL2CPP can hand out. The delegate is kept here,
-        // or the garbage collector would take it; the world is found through a weak handle, or it would live for ever.
+        // The library calls a static method, because Unity's IL2CPP supports only those. The field keeps the delegate
+        // from being collected. A weak handle refers to the world, so that the world can be collected.
         private static readonly Native.BeforeStep onStep = OnStep;
 
         private readonly ulong handle;
         private readonly PlainEvent[] drained = new PlainEvent[64];
-        private readonly ulong[] found; // room for all bodies
+        private readonly ulong[] found; // buffer for all bodies
         private GCHandle self;
         private bool isDisposed;
         private ExceptionDispatchInfo thrown;
 
-        /// <summary>A world as it was exported.</summary>
+        /// <summary>Creates a world in its exported state.</summary>
         public World(Scene scene)
         {
             found = new ulong[scene.GetInfo().SlotCount];
@@ -599,13 +599,13 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_on_step(handle, onStep, GCHandle.ToIntPtr(self)), this);
         }
 
-        /// <summary>Destroys it, where nobody has.</summary>
+        /// <summary>Destroys the world if Dispose was not called.</summary>
         ~World()
         {
             Release();
         }
 
-        /// <summary>Destroy it. Within BeforeStep Advance then throws.</summary>
+        /// <summary>Destroys the world. If called in BeforeStep, Advance then throws.</summary>
         public void Dispose()
         {
             Native.Check(Release(), this);
@@ -622,8 +622,8 @@ namespace TaichiSoft
             return 0;
         }
 
-        /// <summary>Called before each step of Advance: the place to move colliders and frames, and to push.</summary>
-        /// <remarks>After one that throws, the rest of this Advance goes without; Advance then throws that.</remarks>
+        /// <summary>Called before each step of Advance. Move colliders and frames and apply forces here.</summary>
+        /// <remarks>If it throws, Advance makes its remaining steps without it and then throws the exception.</remarks>
         public Action<World> BeforeStep { get; set; }
 
         [MonoPInvokeCallback(typeof(Native.BeforeStep))]
@@ -637,11 +637,12 @@ namespace TaichiSoft
             }
             catch (Exception exception)
             {
-                world.thrown = ExceptionDispatchInfo.Capture(exception); // it cannot pass through the library
+                world.thrown = ExceptionDispatchInfo.Capture(exception); // must not pass through native code
             }
         }
 
-        /// <summary>How Advance steps: dt [s]; 0 substeps for as many as are stable; time beyond is dropped.</summary>
+        /// <summary>Sets the steps of Advance: dt [s], substeps (0 chooses a stable number), and the largest number of
+        /// steps per call; further time is dropped.</summary>
         public void SetFixedStep(double dt, int substeps = 0, int maxSteps = 8)
         {
             var step = new FixedStep
@@ -651,20 +652,20 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_set_fixed_step(handle, ref step), this);
         }
 
-        /// <summary>Threads of its own that a step may use, with the one that calls it, 1 to 256: by default as many
-        /// as the processor has. What comes out does not depend on it.</summary>
+        /// <summary>Sets the number of threads for a step, including the calling one: 1 to 256, by default the number
+        /// of CPU threads. Results do not depend on it.</summary>
         public void SetThreads(int count)
         {
             Native.Check(Native.ts_world_set_threads(handle, count), this);
         }
 
-        /// <summary>One step of dt [s] in equal parts; 0 chooses as many as are stable.</summary>
+        /// <summary>Makes one step of dt [s] with equal substeps; 0 chooses a stable number.</summary>
         public void Step(double dt, int substeps = 0)
         {
             Native.Check(Native.ts_world_step(handle, dt, substeps), this);
         }
 
-        /// <summary>Put in the time of a frame [s] and make the steps that are due.</summary>
+        /// <summary>Adds the time of a frame [s] and makes the steps that are due.</summary>
         public Clock Advance(double seconds)
         {
             var clock = new Clock { structSize = Size<Clock>.Bytes };
@@ -679,7 +680,7 @@ namespace TaichiSoft
             return clock;
         }
 
-        /// <summary>The time; StepsMade is 0.</summary>
+        /// <summary>Returns the clock; StepsMade is 0.</summary>
         public Clock GetClock()
         {
             var clock = new Clock { structSize = Size<Clock>.Bytes };
@@ -687,7 +688,7 @@ namespace TaichiSoft
             return clock;
         }
 
-        /// <summary>The substeps that a step of dt [s] takes now.</summary>
+        /// <summary>Returns the current stable number of substeps for a step of dt [s].</summary>
         public int StableSubsteps(double dt)
         {
             int substeps;
@@ -695,37 +696,37 @@ namespace TaichiSoft
             return substeps;
         }
 
-        /// <summary>Wake all bodies.</summary>
+        /// <summary>Wakes all bodies.</summary>
         public void Wake()
         {
             Native.Check(Native.ts_world_wake(handle), this);
         }
 
-        /// <summary>Gravity [unit of length/s^2], from the next step on. Who sleeps wakes.</summary>
+        /// <summary>Sets gravity [unit of length/s^2] from the next step on. Sleeping bodies wake.</summary>
         public void SetGravity(Vector3d gravity)
         {
             Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
         }
 
-        /// <summary>Coulomb's coefficient of the floor, from the next step on.</summary>
+        /// <summary>Sets the Coulomb coefficient of the floor from the next step on.</summary>
         public void SetFriction(double friction)
         {
             Native.Check(Native.ts_world_set_friction(handle, friction), this);
         }
 
-        /// <summary>Wind: its velocity, density of the air [kg/m^3], coefficient of drag.</summary>
+        /// <summary>Sets the wind: velocity, air density [kg/m^3] and drag coefficient.</summary>
         public void SetWind(Vector3d velocity, double density, double drag)
         {
             Native.Check(Native.ts_world_set_wind(handle, ref velocity, density, drag), this);
         }
 
-        /// <summary>Push all within a radius away from a place.</summary>
+        /// <summary>Pushes all vertices within a radius away from a point.</summary>
         public void RadialImpulse(Vector3d center, double impulse, double radius)
         {
             Native.Check(Native.ts_world_radial_impulse(handle, ref center, impulse, radius), this);
         }
 
-        /// <summary>A number that tells states apart: that of Python's world in the same state.</summary>
+        /// <summary>Returns the hash of the state, equal to that of Python's world in the same state.</summary>
         public ulong Hash()
         {
             ulong hash;
@@ -733,7 +734,7 @@ namespace TaichiSoft
             return hash;
         }
 
-        /// <summary>Bytes that Snapshot needs now; more with contacts that are recorded, grabs, and what hangs.</summary>
+        /// <summary>Returns the current size of a snapshot [bytes], which depends on contacts, grabs and attachments.</summary>
         public int SnapshotSize()
         {
             UIntPtr size;
@@ -741,7 +742,7 @@ namespace TaichiSoft
             return checked((int)size.ToUInt64());
         }
 
-        /// <summary>Write the state into a buffer of at least SnapshotSize bytes. Returns: how many are used.</summary>
+        /// <summary>Writes the state to a buffer of at least SnapshotSize bytes. Returns: the bytes used.</summary>
         public int Snapshot(byte[] buffer)
         {
             UIntPtr size;
@@ -750,7 +751,7 @@ namespace TaichiSoft
             return checked((int)size.ToUInt64());
         }
 
-        /// <summary>The state as bytes.</summary>
+        /// <summary>Returns the state as bytes.</summary>
         public byte[] Snapshot()
         {
             var buffer = new byte[SnapshotSize()];
@@ -758,27 +759,27 @@ namespace TaichiSoft
             return buffer;
         }
 
-        /// <summary>Back to a state.</summary>
+        /// <summary>Restores a state.</summary>
         public void Restore(byte[] bytes)
         {
             Native.Check(Native.ts_world_restore(handle, bytes, Native.Length(bytes)), this);
         }
 
-        /// <summary>Back to a state, in the first bytes of a buffer.</summary>
+        /// <summary>Restores a state from the first bytes of a buffer.</summary>
         public void Restore(byte[] buffer, int size)
         {
             if (buffer == null || size < 0 || size > buffer.Length) throw new ArgumentOutOfRangeException("size");
             Native.Check(Native.ts_world_restore(handle, buffer, new UIntPtr((uint)size)), this);
         }
 
-        /// <summary>Record events of these kinds, and no others, from the next step on; 0 for none.</summary>
-        /// <remarks>What touches already counts as a contact that begins in that step.</remarks>
+        /// <summary>Records only events of these kinds from the next step on; 0 for none.</summary>
+        /// <remarks>Existing contacts count as beginning in that step.</remarks>
         public void RecordEvents(EventKinds kinds)
         {
             Native.Check(Native.ts_world_record_events(handle, (int)kinds), this);
         }
 
-        /// <summary>Take the oldest that wait, as many as there is room for. Returns: how many.</summary>
+        /// <summary>Removes the oldest waiting events, as many as fit the array. Returns: their number.</summary>
         public int DrainEvents(SoftEvent[] events)
         {
             if (events == null) throw new ArgumentNullException("events");
@@ -799,7 +800,7 @@ namespace TaichiSoft
             return made;
         }
 
-        /// <summary>How many were dropped so far, as too many waited.</summary>
+        /// <summary>Returns the total number of events dropped because too many waited.</summary>
         public long DroppedEvents()
         {
             long count;
@@ -807,7 +808,7 @@ namespace TaichiSoft
             return count;
         }
 
-        /// <summary>Put a body into a free slot of its asset.</summary>
+        /// <summary>Spawns a body in a free slot of its asset.</summary>
         public Body Spawn(int asset, Placement place)
         {
             ulong body;
@@ -816,7 +817,7 @@ namespace TaichiSoft
             return new Body(this, body);
         }
 
-        /// <summary>Who lives in a slot; one that is not there, for nobody.</summary>
+        /// <summary>Returns the body in a slot; IsSomebody is false if the slot is empty.</summary>
         public Body GetBody(int slot)
         {
             ulong body;
@@ -824,7 +825,7 @@ namespace TaichiSoft
             return new Body(this, body);
         }
 
-        /// <summary>The first surface on a ray, back faces left out; false where there is none.</summary>
+        /// <summary>Finds the first surface on a ray, without back faces. Returns: false if there is none.</summary>
         public bool Raycast(Vector3d origin, Vector3d direction, double maxDistance, out Hit hit, out Body body)
         {
             hit = new Hit { structSize = Size<Hit>.Bytes };
@@ -833,7 +834,7 @@ namespace TaichiSoft
             return hit.body != 0;
         }
 
-        /// <summary>The nearest point of all surfaces; false where none is near enough.</summary>
+        /// <summary>Finds the closest point of all surfaces. Returns: false if none is in range.</summary>
         public bool Closest(Vector3d point, double maxDistance, out Hit hit, out Body body)
         {
             hit = new Hit { structSize = Size<Hit>.Bytes };
@@ -842,8 +843,8 @@ namespace TaichiSoft
             return hit.body != 0;
         }
 
-        /// <summary>Bodies that touch a sphere, or enclose it, by slot. Returns: how many.</summary>
-        /// <remarks>Room for as many bodies as there are slots is always enough.</remarks>
+        /// <summary>Finds the bodies that touch or enclose a sphere, by slot. Returns: their number.</summary>
+        /// <remarks>An array of SlotCount bodies is always large enough.</remarks>
         public int OverlapSphere(Vector3d center, double radius, Body[] bodies)
         {
             UIntPtr count;
@@ -852,7 +853,7 @@ namespace TaichiSoft
             return Copy(count, bodies);
         }
 
-        /// <summary>The same for a box with edges of a size.</summary>
+        /// <summary>The same for a box with edges of `size`.</summary>
         public int OverlapBox(Pose pose, Vector3d size, Body[] bodies)
         {
             UIntPtr count;
@@ -874,8 +875,8 @@ namespace TaichiSoft
             return count;
         }
 
-        /// <summary>The grab with a number from 0 to 15; one that is not there, for none.</summary>
-        /// <remarks>Grabs of the exported world are there, too.</remarks>
+        /// <summary>Returns a grab by its index, 0 to 15; IsThere is false if there is none.</summary>
+        /// <remarks>This includes grabs of the exported world.</remarks>
         public Grab GetGrab(int number)
         {
             ulong grab;
@@ -883,7 +884,7 @@ namespace TaichiSoft
             return new Grab(this, grab);
         }
 
-        /// <summary>The joint with a number from 0 to 63; one that is not there, for none.</summary>
+        /// <summary>Returns a joint by its index, 0 to 63; IsThere is false if there is none.</summary>
         public Joint GetJoint(int number)
         {
             ulong joint;
@@ -891,7 +892,7 @@ namespace TaichiSoft
             return new Joint(this, joint);
         }
 
-        /// <summary>The motor with a number from 0 to 63; one that is not there, for none.</summary>
+        /// <summary>Returns a motor by its index, 0 to 63; IsThere is false if there is none.</summary>
         public Motor GetMotor(int number)
         {
             ulong motor;
@@ -899,7 +900,7 @@ namespace TaichiSoft
             return new Motor(this, motor);
         }
 
-        /// <summary>A new one, where the world was made with room for it. Returns its number.</summary>
+        /// <summary>Adds a collider, if the world was exported with collider_room. Returns: its number.</summary>
         public int AddCollider(Shape shape, Pose pose)
         {
             int collider;
@@ -908,37 +909,37 @@ namespace TaichiSoft
             return collider;
         }
 
-        /// <summary>Take it out of the world.</summary>
+        /// <summary>Removes a collider.</summary>
         public void RemoveCollider(int collider)
         {
             Native.Check(Native.ts_collider_remove(handle, collider), this);
         }
 
-        /// <summary>Be there at the end of the coming step, and push who is in the way.</summary>
+        /// <summary>Moves a collider to a pose over the next step, pushing bodies on the way.</summary>
         public void MoveCollider(int collider, Pose pose)
         {
             Native.Check(Native.ts_collider_move_to(handle, collider, ref pose), this);
         }
 
-        /// <summary>Move on by itself: velocity, and spin [rad/s].</summary>
+        /// <summary>Sets a constant velocity and spin [rad/s].</summary>
         public void SetColliderVelocity(int collider, Vector3d linear, Vector3d spin)
         {
             Native.Check(Native.ts_collider_set_velocity(handle, collider, ref linear, ref spin), this);
         }
 
-        /// <summary>Be there at once, and push nobody.</summary>
+        /// <summary>Moves a collider at once, without pushing bodies.</summary>
         public void TeleportCollider(int collider, Pose pose)
         {
             Native.Check(Native.ts_collider_teleport(handle, collider, ref pose), this);
         }
 
-        /// <summary>Coulomb's coefficient of a collider, from the next step on.</summary>
+        /// <summary>Sets the Coulomb coefficient of a collider from the next step on.</summary>
         public void SetColliderFriction(int collider, double friction)
         {
             Native.Check(Native.ts_collider_set_friction(handle, collider, friction), this);
         }
 
-        /// <summary>Where a collider is.</summary>
+        /// <summary>Returns the pose of a collider.</summary>
         public Pose GetColliderPose(int collider)
         {
             Pose pose;
@@ -946,13 +947,14 @@ namespace TaichiSoft
             return pose;
         }
 
-        /// <summary>What bodies gave it in the last step, and the moment of that about its place.</summary>
+        /// <summary>Returns the impulse of bodies on a collider in the last step, and its moment about the collider's
+        /// position.</summary>
         public void GetColliderImpulse(int collider, out Vector3d impulse, out Vector3d moment)
         {
             Native.Check(Native.ts_collider_get_impulse(handle, collider, out impulse, out moment), this);
         }
 
-        /// <summary>A place that moves as the game says: a bone, a vehicle, a hand. Returns its number.</summary>
+        /// <summary>Adds a frame, a pose that the game moves: a bone, a vehicle, a hand. Returns: its number.</summary>
         public int AddFrame(Pose pose)
         {
             int frame;
@@ -960,13 +962,13 @@ namespace TaichiSoft
             return frame;
         }
 
-        /// <summary>Take it out of the world. What hangs from it is let go.</summary>
+        /// <summary>Removes a frame and detaches its vertices.</summary>
         public void RemoveFrame(int frame)
         {
             Native.Check(Native.ts_frame_remove(handle, frame), this);
         }
 
-        /// <summary>Where a frame is.</summary>
+        /// <summary>Returns the pose of a frame.</summary>
         public Pose GetFramePose(int frame)
         {
             Pose pose;
@@ -974,7 +976,7 @@ namespace TaichiSoft
             return pose;
         }
 
-        /// <summary>Be there at the end of the coming step, with what is attached.</summary>
+        /// <summary>Moves a frame and its attached vertices to a pose over the next step.</summary>
         public void MoveFrame(int frame, Pose pose)
         {
             Native.Check(Native.ts_frame_move_to(handle, frame, ref pose), this);
@@ -986,12 +988,12 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>A body of a world. Another one that comes into its slot later is another Body.</summary>
+    /// <summary>A body of a world. A later body in its slot is a different Body.</summary>
     public struct Body
     {
         private readonly World world;
 
-        /// <summary>The library's number; 0 is nobody.</summary>
+        /// <summary>The library's handle; 0 for none.</summary>
         public readonly ulong Id;
 
         internal Body(World world, ulong id)
@@ -1000,13 +1002,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>Whether there was anybody in the slot.</summary>
+        /// <summary>True if the slot had a body.</summary>
         public bool IsSomebody
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Whether it is in the world still.</summary>
+        /// <summary>True if the body is still in the world.</summary>
         public bool IsAlive
         {
             get
@@ -1020,7 +1022,7 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Where it lives.</summary>
+        /// <summary>World of the body.</summary>
         public World World
         {
             get
@@ -1035,13 +1037,13 @@ namespace TaichiSoft
             Native.Check(result, world);
         }
 
-        /// <summary>Take it out of the world.</summary>
+        /// <summary>Removes the body from the world.</summary>
         public void Despawn()
         {
             Check(Native.ts_world_despawn(World.Handle, Id));
         }
 
-        /// <summary>The number of its asset.</summary>
+        /// <summary>Returns the number of its asset.</summary>
         public int GetAsset()
         {
             int asset;
@@ -1049,7 +1051,7 @@ namespace TaichiSoft
             return asset;
         }
 
-        /// <summary>How it fares.</summary>
+        /// <summary>Returns its status.</summary>
         public BodyStatus GetStatus()
         {
             int status;
@@ -1057,7 +1059,7 @@ namespace TaichiSoft
             return (BodyStatus)status;
         }
 
-        /// <summary>Its level of detail, 0 being the finest.</summary>
+        /// <summary>Level of detail; 0 is the finest.</summary>
         public int Level
         {
             get
@@ -1068,7 +1070,7 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Vertices that it has at its level.</summary>
+        /// <summary>Number of vertices at its level.</summary>
         public int VertexCount
         {
             get
@@ -1079,21 +1081,22 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Go on with more or fewer tetrahedra: its vertices and triangles are others then.</summary>
-        /// <remarks>Joints, motors and attachments that have no place there bar that, unless they are released.</remarks>
+        /// <summary>Changes the level of detail, and with it vertices and triangles.</summary>
+        /// <remarks>Fails if joints, motors or attachments cannot be kept, unless `release` is true.</remarks>
         public void SetLevel(int level, bool release = false)
         {
             Check(Native.ts_body_set_level(World.Handle, Id, level, release ? 1 : 0));
         }
 
-        /// <summary>Of its vertices, 3 numbers each; with alpha below 1 on the way from the step before.</summary>
+        /// <summary>Reads the positions of its vertices, 3 numbers each, interpolated from the previous step (0) to the
+        /// last one (1).</summary>
         public void ReadPositions(double alpha, float[] positions)
         {
             Check(Native.ts_body_positions(World.Handle, Id, alpha, positions, Native.Length(positions)));
         }
 
-        /// <summary>What is drawn, Clock.Alpha on the way: places and normals, 3 numbers a vertex each.</summary>
-        /// <remarks>Without normals for null.</remarks>
+        /// <summary>Reads positions and normals, interpolated by Clock.Alpha, 3 numbers per vertex each.</summary>
+        /// <remarks>`normals` can be null.</remarks>
         public void ReadMesh(int mesh, float[] positions, float[] normals)
         {
             if (normals != null && positions != null && normals.Length != positions.Length)
@@ -1105,15 +1108,15 @@ namespace TaichiSoft
             Check(Native.ts_body_mesh(World.Handle, Id, mesh, positions, normals, Native.Length(positions)));
         }
 
-        /// <summary>The same into memory that does not move, such as a pinned Vector3[] of an engine.</summary>
-        /// <remarks>The caller answers for `count` numbers of room at both; without normals for IntPtr.Zero.</remarks>
+        /// <summary>The same for pinned memory, such as a pinned Vector3[] of an engine.</summary>
+        /// <remarks>Both pointers must have room for `count` numbers; `normals` can be IntPtr.Zero.</remarks>
         public void ReadMesh(int mesh, IntPtr positions, IntPtr normals, int count)
         {
             if (count < 0) throw new ArgumentOutOfRangeException("count");
             Check(Native.ts_body_mesh(World.Handle, Id, mesh, positions, normals, new UIntPtr((uint)count)));
         }
 
-        /// <summary>Its centre of mass.</summary>
+        /// <summary>Returns its centre of mass.</summary>
         public Vector3d GetCenter()
         {
             Vector3d center;
@@ -1121,73 +1124,74 @@ namespace TaichiSoft
             return center;
         }
 
-        /// <summary>Of the centre of mass, and spin about it [rad/s].</summary>
+        /// <summary>Sets the velocity of the centre of mass, and the spin about it [rad/s].</summary>
         public void SetVelocity(Vector3d linear, Vector3d spin)
         {
             Check(Native.ts_body_set_velocity(World.Handle, Id, ref linear, ref spin));
         }
 
-        /// <summary>The centre of mass to a place, turned about it, with its velocity or at rest.</summary>
+        /// <summary>Moves the centre of mass to a position and rotates the body about it, with its velocity or at
+        /// rest.</summary>
         public void Teleport(Vector3d center, Quaterniond turn, bool keepsVelocity = false)
         {
             Check(Native.ts_body_teleport(World.Handle, Id, ref center, ref turn, keepsVelocity ? 1 : 0));
         }
 
-        /// <summary>On a list of vertices together; null stands for all.</summary>
+        /// <summary>Applies an impulse to a list of vertices; null means all.</summary>
         public void ApplyImpulse(Vector3d impulse, int[] vertices = null)
         {
             Check(Native.ts_body_apply_impulse(World.Handle, Id, ref impulse, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Throughout the coming step, on a list of vertices together; null stands for all.</summary>
+        /// <summary>Applies a force during the next step to a list of vertices; null means all.</summary>
         public void ApplyForce(Vector3d force, int[] vertices = null)
         {
             Check(Native.ts_body_apply_force(World.Handle, Id, ref force, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>On the vertices within a radius of a place.</summary>
+        /// <summary>Applies an impulse to the vertices within a radius of a point.</summary>
         public void ImpulseAt(Vector3d impulse, Vector3d point, double radius)
         {
             Check(Native.ts_body_impulse_at(World.Handle, Id, ref impulse, ref point, radius));
         }
 
-        /// <summary>1 is the world's gravity, 0 none.</summary>
+        /// <summary>Scales gravity: 1 is the world's gravity, 0 none.</summary>
         public void SetGravityScale(double scale)
         {
             Check(Native.ts_body_set_gravity_scale(World.Handle, Id, scale));
         }
 
-        /// <summary>Coulomb's coefficient against other bodies, in worlds with soft contact.</summary>
+        /// <summary>Sets the Coulomb coefficient against other bodies, in worlds with soft contact.</summary>
         public void SetFriction(double friction)
         {
             Check(Native.ts_body_set_friction(World.Handle, Id, friction));
         }
 
-        /// <summary>How fast it loses its velocity [1/s].</summary>
+        /// <summary>Sets the damping rate of its velocity [1/s].</summary>
         public void SetDamping(double rate)
         {
             Check(Native.ts_body_set_damping(World.Handle, Id, rate));
         }
 
-        /// <summary>Whether it is out of the wind.</summary>
+        /// <summary>Shelters the body from the wind, or exposes it.</summary>
         public void SetSheltered(bool isSheltered)
         {
             Check(Native.ts_body_set_sheltered(World.Handle, Id, isSheltered ? 1 : 0));
         }
 
-        /// <summary>Hold vertices where they are.</summary>
+        /// <summary>Pins vertices at their positions.</summary>
         public void Pin(int[] vertices)
         {
             Check(Native.ts_body_pin(World.Handle, Id, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Let go of vertices; null stands for all.</summary>
+        /// <summary>Releases pinned vertices; null means all.</summary>
         public void Unpin(int[] vertices = null)
         {
             Check(Native.ts_body_unpin(World.Handle, Id, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Where pinned vertices are after the coming step, 3 numbers each.</summary>
+        /// <summary>Sets the positions of pinned vertices after the next step, 3 numbers each.</summary>
         public void SetTargets(int[] vertices, float[] targets)
         {
             int needed = vertices == null ? 0 : 3 * vertices.Length;
@@ -1199,32 +1203,32 @@ namespace TaichiSoft
             Check(Native.ts_body_set_targets(World.Handle, Id, vertices, Native.Count(vertices), targets));
         }
 
-        /// <summary>Let vertices go with a frame, from where both are now.</summary>
-        /// <remarks>`feels`: GetLoad is asked later.</remarks>
+        /// <summary>Attaches vertices to a frame at their current positions.</summary>
+        /// <remarks>Set `feels` to use GetLoad later.</remarks>
         public void Attach(int[] vertices, int frame, bool feels = false)
         {
             Check(Native.ts_body_attach(World.Handle, Id, vertices, Native.Count(vertices), frame, feels ? 1 : 0));
         }
 
-        /// <summary>Let vertices go that hang from a frame, with their velocity; null stands for all that do.</summary>
+        /// <summary>Detaches vertices from frames; they keep their velocity. Null means all.</summary>
         public void Detach(int[] vertices = null)
         {
             Check(Native.ts_body_detach(World.Handle, Id, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Let vertices be held by another body: where they are in it, or each at a vertex of it.</summary>
+        /// <summary>Attaches vertices to another body, at their current positions or each to one of its vertices.</summary>
         public Joint Join(int[] vertices, Body other, int[] onto = null)
         {
             if (onto != null && (vertices == null || onto.Length != vertices.Length))
             {
-                throw new SoftException(ErrorCode.Size, "onto names a vertex for each of vertices");
+                throw new SoftException(ErrorCode.Size, "onto must have as many vertices as vertices");
             }
             ulong joint;
             Check(Native.ts_body_join(World.Handle, Id, vertices, Native.Count(vertices), other.Id, onto, out joint));
             return new Joint(World, joint);
         }
 
-        /// <summary>Turn vertices, or push them.</summary>
+        /// <summary>Adds a motor that rotates or pushes vertices.</summary>
         public Motor AddMotor(int[] vertices, Drive drive)
         {
             ulong motor;
@@ -1234,13 +1238,13 @@ namespace TaichiSoft
             return new Motor(World, motor);
         }
 
-        /// <summary>What it pulled a frame with, mean over the last step, and the torque about its origin.</summary>
+        /// <summary>Returns the force on a frame, mean over the last step, and its torque about the origin.</summary>
         public void GetLoad(int frame, out Vector3d force, out Vector3d torque)
         {
             Check(Native.ts_body_get_load(World.Handle, Id, frame, out force, out torque));
         }
 
-        /// <summary>Take hold of its surface. There can be 16 grabs at a time.</summary>
+        /// <summary>Grabs its surface. A world has at most 16 grabs.</summary>
         public Grab Grab(Pull pull)
         {
             ulong grab;
@@ -1250,12 +1254,12 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>A hand on a body. Another one that comes later is another Grab.</summary>
+    /// <summary>A grab of a body. A later grab at its index is a different Grab.</summary>
     public struct Grab
     {
         private readonly World world;
 
-        /// <summary>The library's number; 0 is none.</summary>
+        /// <summary>The library's handle; 0 for none.</summary>
         public readonly ulong Id;
 
         internal Grab(World world, ulong id)
@@ -1264,13 +1268,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>Whether there was any at that number.</summary>
+        /// <summary>True if the index had a grab.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Where it is.</summary>
+        /// <summary>Its world.</summary>
         public World World
         {
             get
@@ -1285,19 +1289,19 @@ namespace TaichiSoft
             Native.Check(result, world);
         }
 
-        /// <summary>Pull to another place from the coming step on.</summary>
+        /// <summary>Moves the target from the next step on.</summary>
         public void Move(Vector3d point)
         {
             Check(Native.ts_grab_move(World.Handle, Id, ref point));
         }
 
-        /// <summary>Let go.</summary>
+        /// <summary>Releases it.</summary>
         public void Release()
         {
             Check(Native.ts_grab_release(World.Handle, Id));
         }
 
-        /// <summary>With what it pulls, in the last substep.</summary>
+        /// <summary>Returns its force in the last substep.</summary>
         public Vector3d GetForce()
         {
             Vector3d force;
@@ -1306,12 +1310,12 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>What holds a part of a body to another one.</summary>
+    /// <summary>A joint between two bodies.</summary>
     public struct Joint
     {
         private readonly World world;
 
-        /// <summary>The library's number; 0 is none.</summary>
+        /// <summary>The library's handle; 0 for none.</summary>
         public readonly ulong Id;
 
         internal Joint(World world, ulong id)
@@ -1320,13 +1324,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>Whether there was one of its number.</summary>
+        /// <summary>True if the index was in use.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Where it is.</summary>
+        /// <summary>Its world.</summary>
         public World World
         {
             get
@@ -1336,13 +1340,13 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Let go.</summary>
+        /// <summary>Releases it.</summary>
         public void Release()
         {
             Native.Check(Native.ts_joint_release(World.Handle, Id), world);
         }
 
-        /// <summary>With what the other body pulls, mean over the last step.</summary>
+        /// <summary>Returns the force of the other body, mean over the last step.</summary>
         public Vector3d GetForce()
         {
             Vector3d force;
@@ -1351,12 +1355,12 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>What turns a part of a body, or pushes it.</summary>
+    /// <summary>A motor that rotates or pushes a part of a body.</summary>
     public struct Motor
     {
         private readonly World world;
 
-        /// <summary>The library's number; 0 is none.</summary>
+        /// <summary>The library's handle; 0 for none.</summary>
         public readonly ulong Id;
 
         internal Motor(World world, ulong id)
@@ -1365,13 +1369,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>Whether there was one of its number.</summary>
+        /// <summary>True if the index was in use.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Where it is.</summary>
+        /// <summary>Its world.</summary>
         public World World
         {
             get
@@ -1381,19 +1385,19 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Drive towards another speed.</summary>
+        /// <summary>Sets the target speed.</summary>
         public void SetSpeed(double speed)
         {
             Native.Check(Native.ts_motor_set_speed(World.Handle, Id, speed), world);
         }
 
-        /// <summary>Allow another torque or force; with 0 the vertices coast.</summary>
+        /// <summary>Sets the limit of the torque or force; with 0 the vertices coast.</summary>
         public void SetLimit(double limit)
         {
             Native.Check(Native.ts_motor_set_limit(World.Handle, Id, limit), world);
         }
 
-        /// <summary>That its vertices have.</summary>
+        /// <summary>Returns the speed of its vertices.</summary>
         public double GetSpeed()
         {
             double speed;
@@ -1401,7 +1405,7 @@ namespace TaichiSoft
             return speed;
         }
 
-        /// <summary>Torque or force that it gave, mean over the last step.</summary>
+        /// <summary>Returns its torque or force, mean over the last step.</summary>
         public double GetEffort()
         {
             double effort;
@@ -1409,14 +1413,14 @@ namespace TaichiSoft
             return effort;
         }
 
-        /// <summary>Drive no longer.</summary>
+        /// <summary>Removes the motor.</summary>
         public void Remove()
         {
             Native.Check(Native.ts_motor_remove(World.Handle, Id), world);
         }
     }
 
-    // Unity's IL2CPP looks for an attribute of this name; it need not be Unity's own.
+    // Unity's IL2CPP finds this attribute by its name, so it need not be Unity's.
     [AttributeUsage(AttributeTargets.Method)]
     internal sealed class MonoPInvokeCallbackAttribute : Attribute
     {
@@ -1430,8 +1434,8 @@ namespace TaichiSoft
         internal static readonly uint Bytes = (uint)Marshal.SizeOf(typeof(T));
     }
 
-    // The functions of taichi_soft.h, by their names. Texts are UTF-8 with a zero at the end, made by Bytes: what
-    // .NET makes of a string depends on the system.
+    // The functions of taichi_soft.h. Bytes converts strings to zero-terminated UTF-8, because .NET's conversion
+    // depends on the system.
     internal static class Native
     {
         internal const uint Version = 1;
@@ -1444,7 +1448,7 @@ namespace TaichiSoft
         internal static byte[] Bytes(string text)
         {
             if (text == null) return null;
-            if (text.IndexOf('\0') >= 0) throw new SoftException(ErrorCode.Argument, "a zero is in a name or folder");
+            if (text.IndexOf('\0') >= 0) throw new SoftException(ErrorCode.Argument, "a name or folder has a zero");
             return Encoding.UTF8.GetBytes(text + "\0");
         }
 
@@ -1453,7 +1457,7 @@ namespace TaichiSoft
             return array == null ? UIntPtr.Zero : new UIntPtr((uint)array.Length);
         }
 
-        // Of a list of vertices. The library takes an empty one for all, which nobody means who counted to 0.
+        // Length of a list of vertices. An empty list is refused, because the library would take it for all vertices.
         internal static UIntPtr Count(int[] vertices)
         {
             if (vertices != null && vertices.Length == 0)
@@ -1463,7 +1467,7 @@ namespace TaichiSoft
             return Length(vertices);
         }
 
-        // The owner is named so that the garbage collector does not finish it within the call.
+        // The parameter keeps the owner from being finalised during the call.
         [MethodImpl(MethodImplOptions.NoInlining)]
         internal static void Check(int result, object owner)
         {

@@ -1,5 +1,5 @@
-// taichi_soft.h for C++17: handles that end by themselves, and errors as exceptions. What is not here is called in C, with
-// `handle()`.
+// taichi_soft.h for C++17: handles with RAII, and errors as exceptions. For functions that are missing here, call the C
+// function with `handle()`.
 //
 //     auto scene = taichi_soft::Scene("game.softworld");
 //     auto world = scene.create();
@@ -53,13 +53,13 @@ struct Pose {
   }
 };
 
-// A body of a world; a small number, to copy as you like. One that was taken out is refused.
+// A body of a world; a small value that can be copied. Calls with a removed body are refused.
 struct Body {
   ts_body handle = 0;
   explicit operator bool() const { return handle != 0; }
 };
 
-// What holds a part of a body to another one, and what drives a part of one; numbers, to copy as you like.
+// A joint between two bodies, and a motor on a part of a body; small values that can be copied.
 struct Joint {
   ts_joint handle = 0;
   explicit operator bool() const { return handle != 0; }
@@ -69,18 +69,17 @@ struct Motor {
   explicit operator bool() const { return handle != 0; }
 };
 
-// A hand on a body, from `World::grab`; it lets go when it ends, or another is moved into it. Moves, but has no copies.
-// After `World::restore` to before it took hold it is none; as numbers are given again, let it end, or `forget` it, before
-// others take hold.
+// A grab, from `World::grab`. The destructor releases it. It can be moved, but not copied. After a `World::restore` to
+// a time before the grab, its handle can be reused: destroy it, or call `forget`, before making new grabs.
 class Grab {
  public:
   Grab() = default;
-  // Takes over a grab that is there, as of `ts_world_get_grab`.
+  // Takes ownership of an existing grab, for example from `ts_world_get_grab`.
   Grab(ts_world world, ts_grab handle) : world_(world), handle_(handle) {}
   Grab(Grab&& other) noexcept { swap(other); }
   Grab& operator=(Grab&& other) noexcept {
     if (this == &other) return *this;
-    // After a restore the new one may have the number of the old one, and would be let go itself.
+    // After a restore, the new grab can have the same handle as the old one, which must not be released then.
     if (handle_ != other.handle_ || world_ != other.world_) end();
     forget();
     swap(other);
@@ -94,23 +93,23 @@ class Grab {
   explicit operator bool() const { return handle_ != 0; }
 
   void move(const Vector& point) { check(ts_grab_move(world_, handle_, point.data())); }
-  // With what it pulls, in the last substep [N].
+  // Force of the grab in the last substep [N].
   Vector force() const {
     Vector found;
     check(ts_grab_get_force(world_, handle_, found.data()));
     return found;
   }
-  // Let go now.
+  // Releases the grab.
   void release() {
     check(ts_grab_release(world_, handle_));
     handle_ = 0;
   }
-  // Hold on for good, without this object.
+  // Keeps the grab and gives up ownership.
   void forget() { handle_ = 0; }
 
  private:
   void end() noexcept {
-    if (handle_ != 0) ts_grab_release(world_, handle_);  // refused where the world or the body is gone: it is let go
+    if (handle_ != 0) ts_grab_release(world_, handle_);  // an error means that the world or the body was removed
   }
   void swap(Grab& other) noexcept {
     std::swap(world_, other.world_);
@@ -121,7 +120,7 @@ class Grab {
   ts_grab handle_ = 0;
 };
 
-// An instance of a scene. Moves, but has no copies.
+// An instance of a scene. It can be moved, but not copied.
 class World {
  public:
   explicit World(ts_scene scene) {
@@ -154,22 +153,22 @@ class World {
     const ts_fixed_step step{sizeof(ts_fixed_step), substeps, max_steps, dt};
     check(ts_world_set_fixed_step(handle_, &step));
   }
-  // Of its own that a step may use, with the one that calls it.
+  // Number of threads for a step, including the calling one.
   void set_threads(int32_t count) { check(ts_world_set_threads(handle_, count)); }
-  // Called before each step of `advance`. It must not throw, nor call this.
+  // Sets a function that `advance` calls before each step. It must not throw or call `on_step`.
   void on_step(std::function<void()> function) {
     auto next = std::make_unique<std::function<void()>>(std::move(function));
     const ts_before_step call = [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); };
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
-    before_ = std::move(next);  // now that the library knows the other one no more
+    before_ = std::move(next);  // only after the library no longer refers to the old one
   }
-  // Of the floor, of a body against others, of a collider.
+  // Friction of the floor, of a body against other bodies, of a collider.
   void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
   void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
   void set_collider_friction(int32_t collider, double friction) {
     check(ts_collider_set_friction(handle_, collider, friction));
   }
-  // [m/s^2]
+  // Gravity [m/s^2].
   void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {
     uint64_t found = 0;
@@ -185,9 +184,9 @@ class World {
   }
   void restore(const std::vector<char>& bytes) { check(ts_world_restore(handle_, bytes.data(), bytes.size())); }
 
-  // Of these kinds, bits such as TS_CONTACT_BEGAN, from the next step on; 0 for none.
+  // Records events of these kinds, bits such as TS_CONTACT_BEGAN, from the next step on; 0 for none.
   void record_events(int32_t kinds) { check(ts_world_record_events(handle_, kinds)); }
-  // All that wait, instead of what was in `events`. Keep that from frame to frame, and nothing is allocated.
+  // Replaces `events` by all waiting events. Reuse the vector between frames to avoid allocations.
   void drain_events(std::vector<ts_event>& events) {
     std::array<ts_event, 64> some;
     size_t count = some.size();
@@ -232,7 +231,7 @@ class World {
     check(ts_body_center(handle_, body.handle, found.data()));
     return found;
   }
-  // Of detail, 0 being the finest: see ts_body_set_level.
+  // Changes the level of detail; 0 is the finest, see ts_body_set_level.
   void set_level(Body body, int32_t level, bool release = false) {
     check(ts_body_set_level(handle_, body.handle, level, release ? 1 : 0));
   }
@@ -241,13 +240,13 @@ class World {
     check(ts_body_get_level(handle_, body.handle, &found));
     return found;
   }
-  // At its level.
+  // Number of vertices at the body's level.
   int32_t vertex_count(Body body) const {
     int32_t found = 0;
     check(ts_body_get_vertex_count(handle_, body.handle, &found));
     return found;
   }
-  // 3 numbers for each vertex.
+  // Positions, 3 numbers per vertex.
   void positions(Body body, std::vector<float>& out, double alpha = 1.0) const {
     check(ts_body_positions(handle_, body.handle, alpha, out.data(), out.size()));
   }
@@ -258,7 +257,7 @@ class World {
   void set_velocity(Body body, const Vector& linear, const Vector& spin = {}) {
     check(ts_body_set_velocity(handle_, body.handle, linear.data(), spin.data()));
   }
-  // Of all vertices, or of those in a list.
+  // Applies an impulse to all vertices, or to those in a list.
   void apply_impulse(Body body, const Vector& impulse, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_apply_impulse(handle_, body.handle, impulse.data(), vertices.data(), vertices.size()));
   }
@@ -266,21 +265,21 @@ class World {
     check(ts_body_apply_force(handle_, body.handle, force.data(), vertices.data(), vertices.size()));
   }
 
-  // Let vertices go with a frame; `feels` where `load` is asked later.
+  // Attaches vertices to a frame; set `feels` to use `load` later.
   void attach(Body body, const std::vector<int32_t>& vertices, int32_t frame, bool feels = false) {
     check(ts_body_attach(handle_, body.handle, vertices.data(), vertices.size(), frame, feels ? 1 : 0));
   }
-  // All that hang from a frame, or those in a list.
+  // Detaches all attached vertices, or those in a list.
   void detach(Body body, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_detach(handle_, body.handle, vertices.data(), vertices.size()));
   }
-  // Force with which it pulled a frame, mean over the last step [N], and torque about the frame's origin.
+  // Force on a frame, mean over the last step [N], and torque about the frame's origin.
   std::pair<Vector, Vector> load(Body body, int32_t frame) const {
     std::pair<Vector, Vector> found;
     check(ts_body_get_load(handle_, body.handle, frame, found.first.data(), found.second.data()));
     return found;
   }
-  // Take hold of a body where a ray has hit it. A `max_force` below 0 is ten times its weight on Earth.
+  // Grabs a body where a ray hit it. A `max_force` below 0 means ten times the body's weight on Earth.
   Grab grab(const ts_hit& hit, double frequency = 5.0, double max_force = -1.0) {
     ts_pull pull{};
     pull.struct_size = sizeof pull;
@@ -296,7 +295,7 @@ class World {
     return Grab(handle_, found);
   }
 
-  // Let vertices be held by another body: where they are in it, or with `onto` each at one of its vertices.
+  // Attaches vertices to another body: at their current positions in it, or each to one of its vertices in `onto`.
   Joint join(Body body, const std::vector<int32_t>& vertices, Body other, const std::vector<int32_t>& onto = {}) {
     if (!onto.empty() && onto.size() != vertices.size()) throw std::invalid_argument("onto differs in size");
     Joint found;
@@ -305,7 +304,7 @@ class World {
     return found;
   }
   void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
-  // With what the other body pulls, mean over the last step [N].
+  // Force of the other body, mean over the last step [N].
   Vector force(Joint joint) const {
     Vector found;
     check(ts_joint_get_force(handle_, joint.handle, found.data()));
@@ -321,7 +320,7 @@ class World {
   void set_limit(Motor motor, double limit) { check(ts_motor_set_limit(handle_, motor.handle, limit)); }
   void remove(Motor motor) { check(ts_motor_remove(handle_, motor.handle)); }
 
-  // Its body is 0 where nothing is met.
+  // The hit's body is 0 if nothing is hit.
   ts_hit raycast(const Vector& origin, const Vector& direction, double max_distance = HUGE_VAL) const {
     ts_hit found{};
     found.struct_size = sizeof found;
@@ -335,7 +334,7 @@ class World {
     return found;
   }
 
-  // Bodies that touch a sphere or a box with edges of `size`, or enclose it, by slot.
+  // Bodies that touch or enclose a sphere, or a box with edges of `size`, by slot.
   std::vector<Body> overlap_sphere(const Vector& center, double radius) const {
     return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
       return ts_world_overlap_sphere(handle_, center.data(), radius, bodies, capacity, count);
@@ -352,20 +351,20 @@ class World {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
   }
-  // What bodies gave a collider in the last step, and the moment of that about its place.
+  // Impulse of bodies on a collider in the last step, and its moment about the collider's position.
   std::pair<Vector, Vector> collider_impulse(int32_t collider) const {
     std::pair<Vector, Vector> found;
     check(ts_collider_get_impulse(handle_, collider, found.first.data(), found.second.data()));
     return found;
   }
-  // A place that moves as the game says. Returns its number.
+  // Adds a pose that the game moves. Returns: its number.
   int32_t add_frame(const Pose& pose) {
     const ts_pose plain = pose.plain();
     int32_t found = 0;
     check(ts_frame_add(handle_, &plain, &found));
     return found;
   }
-  // What hangs from it is let go.
+  // Removes a frame and detaches its vertices.
   void remove_frame(int32_t frame) { check(ts_frame_remove(handle_, frame)); }
   Pose frame_pose(int32_t frame) const {
     ts_pose plain{};
@@ -395,7 +394,7 @@ class World {
 
   ts_world handle_ = 0;
   int32_t slot_count_ = 0;
-  std::unique_ptr<std::function<void()>> before_;  // stays where it is when the world moves
+  std::unique_ptr<std::function<void()>> before_;  // its address stays valid when the World is moved
 };
 
 // A world file in memory.
@@ -416,7 +415,7 @@ class Scene {
   ts_scene handle() const { return handle_; }
   World create() const { return World(handle_); }
 
-  // The number of what is called so; kinds are TS_BODY and so on.
+  // Number of the object with a name; kinds are TS_BODY and so on.
   int32_t find(int32_t kind, const std::string& name) const {
     int32_t found = 0;
     check(ts_scene_find(handle_, kind, name.c_str(), &found));

@@ -1,4 +1,4 @@
-// A game loop: balls fall onto a lift, one more each second. game FOLDER [SECONDS]
+// A game loop: balls fall onto a lift, one per second. game FOLDER [SECONDS]
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -24,7 +24,7 @@ int main(int count, char** arguments) {
     int touches = 0;
     int64_t step = 0;
     std::vector<Body> balls = {world.body(scene.find(TS_BODY, "first"))};
-    world.on_step([&] {  // at the same moments whatever the frame rate
+    world.on_step([&] {  // at the same times for any frame rate
       const double time = double(step++) / 60.0;
       world.move_collider(lift, {{0.0, 0.0, 0.4 - 0.3 * std::cos(time)}, {0.0, 0.0, 0.0, 1.0}});
       if (step % 60 == 0 && balls.size() < 6) balls.push_back(world.spawn(ball, {{0.05, 0.0, 2.0}, {0, 0, 0, 1}}));

@@ -1,4 +1,4 @@
-// The functions of taichi_soft.h: each checks its arguments, takes the world's turn, and lets no exception out.
+// The functions of taichi_soft.h. Each checks its arguments, locks the world and catches all exceptions.
 
 #include <algorithm>
 #include <cstring>
@@ -26,7 +26,7 @@ Handles<World>& worlds() {
 
 thread_local char last_error[512] = "";
 
-void note(const char* text) {
+void record_error(const char* text) {
   std::strncpy(last_error, text, sizeof last_error - 1);
   last_error[sizeof last_error - 1] = 0;
 }
@@ -42,20 +42,20 @@ ts_result guarded(Function function) noexcept {
     function();
     return TS_OK;
   } catch (const Error& error) {
-    note(error.what());
+    record_error(error.what());
     return error.code;
   } catch (const std::bad_alloc&) {
-    note("there is not enough memory");
+    record_error("there is not enough memory");
   } catch (const std::exception& error) {
-    note(error.what());
+    record_error(error.what());
   } catch (...) {
-    note("unknown error");
+    record_error("unknown error");
   }
   return TS_ERROR_RUNTIME;
 #endif
 }
 
-// Lists the names to give instead of a wrong one: as many as fit into an error's text.
+// Lists valid names, as many as fit into an error's text.
 std::string choice(const std::vector<std::string>& names) {
   if (names.empty()) return "the world file has none of that kind";
   std::string found = "give one of ";
@@ -66,7 +66,7 @@ std::string choice(const std::vector<std::string>& names) {
   return found;
 }
 
-// A world for the time of one call, which no other thread can use meanwhile.
+// Exclusive access to a world during one call.
 class Turn {
  public:
   explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn) {
@@ -79,17 +79,17 @@ class Turn {
   const Axes& axes() const { return world_->scene().axes; }
 
  private:
-  Kept<World> world_;  // before the lock, which is given back first
+  Kept<World> world_;  // declared before the lock, which is released first
   Attempt lock_;
 };
 
-// The steps of one frame. Between them the world is free for its own thread, whose function moves colliders, and
-// for no other. The time of steps that are not made, because one failed, is dropped.
+// The steps of one frame. Between steps the world is unlocked for the same thread only, whose callback can move
+// colliders. If a step fails, the time of the remaining steps is dropped.
 class Frame {
  public:
   Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
     const Turn turn(handle);
-    if (world_->advancing != ThreadId()) fail(TS_ERROR_STATE, "ts_world_advance was called within itself");
+    if (world_->advancing != ThreadId()) fail(TS_ERROR_STATE, "ts_world_advance was called from its own callback");
     due = world_->steps_due(seconds);
     world_->advancing = this_thread();
   }
@@ -147,7 +147,7 @@ Vector place(const Turn& world, const double* host, const char* name) {
   return found;
 }
 
-// Of a velocity or an impulse, which have places' axes and unit.
+// Converts a velocity or an impulse, which have the axes and the unit of positions.
 Vector vector(const Turn& world, const double* host, const char* name) {
   const Vector found = world.axes().place_in(finite(host, 3, name));
   for (double each : found) {
@@ -172,7 +172,7 @@ Quaternion rotation(const Turn& world, const double* host, const char* name) {
 
 Pose pose(const Turn& world, const ts_pose* host) {
   given(host, "pose");
-  // As Python, which takes matrices as well.
+  // The same conversion as in Python, which accepts matrices too.
   const Quaternion turn = quaternion_of(matrix_of(rotation(world, host->rotation, "rotation")));
   return {place(world, host->position, "position"), turn};
 }
@@ -189,7 +189,7 @@ double length(const Turn& world, double host, double least, const char* name) {
   return found;
 }
 
-// What a collider is made of, as taichi_soft/contact/shapes has it.
+// Fills in a collider's shape, the same as taichi_soft/contact/shapes.
 void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   constexpr double kShortest = 1e-6;
   Vector half = {0.0, 0.0, 0.0};
@@ -219,7 +219,7 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
     case kHeightField:
     case kMeshShape:
       fail(TS_ERROR_ARGUMENT,
-           "kind is %d: height fields and meshes have a grid of distances, which Python makes before the export. Export "
+           "kind is %d: height fields and meshes need a distance grid, which Python computes before the export. Export "
            "the world with them, and move them here",
            shape.kind);
     default:
@@ -236,7 +236,7 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->mask = shape.mask;
 }
 
-// A motor that turns has rad/s and a torque, one that pushes has length/s and a force.
+// A rotating motor has rad/s and a torque, a pushing motor has length/s and a force.
 double motor_speed_in(const Turn& world, bool turns, double host) {
   return turns ? host : world.axes().length_in(host);
 }
@@ -248,7 +248,7 @@ double motor_limit_in(const Turn& world, bool turns, double host) {
 
 Vertices list(const int32_t* vertices, size_t count) {
   if (count > 0) given(vertices, "vertices");
-  if (count > 100000000) fail(TS_ERROR_ARGUMENT, "count is %zu: no body has so many vertices", count);
+  if (count > 100000000) fail(TS_ERROR_ARGUMENT, "count is %zu, more than the vertices of any body", count);
   return {vertices, count};
 }
 
@@ -364,7 +364,7 @@ ts_result ts_scene_find(ts_scene scene, int32_t kind, const char* name, int32_t*
     const auto& names = found->names(kind);
     const auto at = std::find(names.begin(), names.end(), given(name, "name"));
     if (at == names.end()) {
-      fail(TS_ERROR_ARGUMENT, "nothing of that kind is called %.100s: %s", name, choice(names).c_str());
+      fail(TS_ERROR_ARGUMENT, "unknown name %.100s: %s", name, choice(names).c_str());
     }
     *number = int32_t(at - names.begin());
   });
@@ -431,7 +431,7 @@ ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices,
     require_size(count, row.triangles.count, "indices");
     std::copy(row.triangles.begin(), row.triangles.end(), indices);
     if (!found->axes.are_left_handed()) return;
-    for (size_t i = 0; i + 3 <= count; i += 3) std::swap(indices[i + 1], indices[i + 2]);  // our faces are mirrored
+    for (size_t i = 0; i + 3 <= count; i += 3) std::swap(indices[i + 1], indices[i + 2]);  // left-handed axes
   });
 }
 
@@ -454,7 +454,7 @@ ts_result ts_world_create(ts_scene scene, ts_world* world) {
 
 ts_result ts_world_destroy(ts_world world) {
   return guarded([&] {
-    const Turn turn(world);  // or it would go while another thread is in a call
+    const Turn turn(world);  // not while another thread is in a call
     worlds().remove(world);
   });
 }
@@ -497,7 +497,7 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
 }
 
 #if defined(__wasm__)
-// What `Frame` does at its end, for one that was left by an exception of JavaScript's.
+// Ends a `Frame` that an exception of JavaScript has left.
 TS_API ts_result ts_web_end_frame(ts_world world) {
   worlds().find(world)->end_frame();
   return TS_OK;
@@ -678,10 +678,10 @@ ts_result ts_body_mesh(ts_world world, ts_body body, int32_t mesh, float* positi
     const int32_t slot = turn->slot_of(body);
     const Mesh& row = mesh_of(turn->scene(), mesh);
     if (row.asset != turn->scene().asset_of_slot[size_t(slot)]) {
-      fail(TS_ERROR_ARGUMENT, "mesh %d is of asset %d, and the body is of another", mesh, row.asset);
+      fail(TS_ERROR_ARGUMENT, "mesh %d belongs to asset %d, and the body to another one", mesh, row.asset);
     }
     if (row.level >= 0 && row.level != turn->level_of(slot)) {
-      fail(TS_ERROR_STATE, "mesh %d draws level %d, and the body is at level %d: draw the mesh of that level, or a skin",
+      fail(TS_ERROR_STATE, "mesh %d is for level %d, the body is at level %d: draw the mesh of that level, or a skin",
            mesh, row.level, turn->level_of(slot));
     }
     require_size(count, 3 * row.vertex_count, "positions");

@@ -14,7 +14,7 @@ constexpr char kMark[] = "TSOFTWLD";
 constexpr uint32_t kVersion = 2;
 constexpr size_t kHead = 32;
 
-constexpr size_t kWidth[] = {0, 1, 4, 8, 4, 8};  // bytes of a number of each type
+constexpr size_t kWidth[] = {0, 1, 4, 8, 4, 8};  // size of a number of each type [bytes]
 
 template <typename Number>
 constexpr uint32_t kType = 0;
@@ -35,7 +35,7 @@ constexpr uint32_t kType<double> = 5;
 
 size_t filled_up(size_t size) { return (size + 7) / 8 * 8; }
 
-// Reads numbers one after the other, and fails where the bytes end.
+// Reads numbers in sequence, and fails at the end of the bytes.
 class Reader {
  public:
   Reader(const char* begin, size_t size) : at_(begin), left_(size) {}
@@ -81,7 +81,7 @@ uint32_t checksum(const char* bytes, size_t size, uint32_t before) {
 
 Archive::Archive(std::vector<char> bytes, const std::string& name) : bytes_(std::move(bytes)) {
   if (bytes_.size() < kHead || std::memcmp(bytes_.data(), kMark, 8) != 0) {
-    fail(TS_ERROR_FILE, "%s is no world file: give a folder that `taichi-soft export` wrote", name.c_str());
+    fail(TS_ERROR_FILE, "%s is not a world file: give a folder from `taichi-soft export`", name.c_str());
   }
   Reader head(bytes_.data() + 8, kHead - 8);
   const uint32_t version = head.number<uint32_t>(), count = head.number<uint32_t>();
@@ -91,14 +91,14 @@ Archive::Archive(std::vector<char> bytes, const std::string& name) : bytes_(std:
     fail(TS_ERROR_VERSION, "the world file has version %u, and this library reads version %u: export it again", version,
          kVersion);
   }
-  if (size != bytes_.size() - kHead) damaged("it has another length than it says");
+  if (size != bytes_.size() - kHead) damaged("its length is wrong");
   if (sum != checksum(bytes_.data() + kHead, size)) damaged("its checksum is wrong");
   Reader reader(bytes_.data() + kHead, size);
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t length = reader.number<uint32_t>(), type = reader.number<uint32_t>();
     const uint32_t dimensions = reader.number<uint32_t>();
     reader.number<uint32_t>();
-    if (type < 1 || type > 5 || dimensions > 4) damaged("an entry is of no known type");
+    if (type < 1 || type > 5 || dimensions > 4) damaged("an entry has an unknown type");
     Entry entry{type, {}, 1, nullptr};
     for (uint32_t k = 0; k < dimensions; ++k) {
       const uint64_t rows = reader.number<uint64_t>();
@@ -130,7 +130,7 @@ template <typename Number>
 Archive::View<Number> Archive::rows(const std::string& name, size_t width) const {
   View<Number> found = get<Number>(name);
   if (found.count != 0 && (found.sizes.size() != 2 || found.sizes[1] != width)) {
-    damaged(name + " has rows of another length");
+    damaged(name + " has rows of the wrong length");
   }
   return found;
 }

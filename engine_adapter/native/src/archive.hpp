@@ -9,13 +9,13 @@
 namespace taichi_soft {
 
 std::vector<char> read_file(const std::string& path);
-uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32, of IEEE 802.3, behind other bytes
+uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32 (IEEE 802.3), continued from `before`
 
 class Archive {
  public:
-  Archive(std::vector<char> bytes, const std::string& name);  // the name is for errors
+  Archive(std::vector<char> bytes, const std::string& name);  // the name is for error messages
 
-  // The numbers of an array, for as long as the archive lives. Fails where there is none of that type.
+  // Numbers of an array, valid while the archive exists. Fails if there is no array of that type.
   template <typename Number>
   struct View {
     const Number* data;
@@ -28,7 +28,7 @@ class Archive {
 
   template <typename Number>
   View<Number> get(const std::string& name) const;
-  // The same with so many numbers in each row, or it fails.
+  // The same, and fails unless each row has `width` numbers.
   template <typename Number>
   View<Number> rows(const std::string& name, size_t width) const;
   std::vector<std::string> texts(const std::string& name) const;

@@ -22,7 +22,7 @@ Axes::Axes(const double* rows) : scale_(0.0) {
       sign_[i] = number > 0 ? 1.0 : -1.0;
       scale_ = size;
     }
-    if (from_[i] < 0 || from_[i] > 2) fail(TS_ERROR_FILE, "the world file's axes are not in order: export it again");
+    if (from_[i] < 0 || from_[i] > 2) fail(TS_ERROR_FILE, "the world file has invalid axes: export it again");
     are_ours_ = are_ours_ && from_[i] == i && sign_[i] > 0;
   }
   const bool is_even = (from_[1] - from_[0] + 3) % 3 == 1;

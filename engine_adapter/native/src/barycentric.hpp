@@ -1,4 +1,4 @@
-// Where points lie in tetrahedra, as taichi_soft/core/math/barycentric.py finds it.
+// Barycentric coordinates of points in tetrahedra, the same as taichi_soft/core/math/barycentric.py.
 #pragma once
 
 #include <array>

@@ -68,7 +68,7 @@ Colliders::Colliders(const Archive& archive) {
   if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
       seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
       bounds.count != 6 * n || skin.count != n) {
-    fail(TS_ERROR_FILE, "the world file is not in order: colliders. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: colliders. Export it again");
   }
   seam = seams[0];
   for (size_t i = 0; i < n; ++i) {

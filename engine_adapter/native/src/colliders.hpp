@@ -1,4 +1,4 @@
-// Where colliders are and how they move: as taichi_soft/contact/colliders.py has it, number by number.
+// Poses and motion of colliders, bit-identical to taichi_soft/contact/colliders.py.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace taichi_soft {
 
-// Kinds of shapes with a grid, as taichi_soft/contact/distances/kinds.py has them, behind TS_PLANE to TS_CAPSULE.
+// Kinds of shapes with a grid, after TS_PLANE to TS_CAPSULE, as in taichi_soft/contact/distances/kinds.py.
 enum { kHeightField = 4, kMeshShape = 5 };
 
 struct Pose {
@@ -27,21 +27,21 @@ struct Collider {
   Pose pose;
   Vector velocity, spin;
   bool has_target;
-  Pose target;   // at the end of the coming step
+  Pose target;   // at the end of the next step
   Box bounds;    // in its own frame
-  double skin;   // its thickness, and what its edges need
+  double skin;   // thickness, plus the margin for edges
   int32_t kind;  // as in taichi_soft/contact/distances/kinds.py
   float parameters[8];
-  double friction, restitution;  // the latter -1 for that of the bodies
+  double friction, restitution;  // a restitution of -1 uses that of the bodies
   int32_t group, mask;
-  uint32_t serial;  // who comes into the row later has another
+  uint32_t serial;  // differs for each collider in the row
 
   bool moves() const;
-  // Round its way through `dt` [s], and its highest speed [m/s].
+  // Box around its path during `dt` [s], and its highest speed [m/s].
   Box way(double dt, double* fastest) const;
 };
 
-struct ColliderMotion {  // what the fields hold of one, for the coming step
+struct ColliderMotion {  // field values of a collider for the next step
   float position[3], rotation[4], velocity[3], spin[3], lower[3], upper[3], speed;
 };
 
@@ -50,15 +50,15 @@ class Colliders {
   Colliders() = default;
   explicit Colliders(const Archive& archive);
 
-  // Whether any may be elsewhere, or move otherwise, than in the step before; then `motion` is filled.
+  // Fills `motion` and returns true if the pose or motion of any collider may differ from the previous step.
   bool prepare(double dt, std::vector<ColliderMotion>* motion);
   void finish(double dt);
 
-  int32_t free_row() const;  // for a new collider: it may be one behind the last
+  int32_t free_row() const;  // for a new collider; can be one after the last row
 
   std::vector<Collider> rows;
-  double seam = 0.0;     // skin of what has flat faces, beside its thickness [m]
-  bool is_dirty = true;  // whether poses or velocities differ from what the fields hold
+  double seam = 0.0;     // additional skin of shapes with flat faces [m]
+  bool is_dirty = true;  // true if poses or velocities differ from the fields
 };
 
 }  // namespace taichi_soft

@@ -1,4 +1,4 @@
-// What a call has against its arguments: caught at the boundary, where it becomes a code and a text.
+// Errors of a call, which abi.cpp catches and converts to a code and a text.
 #pragma once
 
 #include <cstdarg>
@@ -17,7 +17,7 @@ struct Error : std::runtime_error {
 };
 
 #if defined(__wasm__)
-// There are no exceptions there: the host throws one of its own, and puts the stack back.
+// WebAssembly has no exceptions here: the host throws its own and restores the stack.
 extern "C" __attribute__((import_module("taichi_soft"), import_name("fail"))) [[noreturn]] void taichi_soft_fail(
     ts_result code, const char* text);
 #endif

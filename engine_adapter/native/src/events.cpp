@@ -8,7 +8,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr int32_t kActive = 0, kAsleep = 2;  // as taichi_soft/bodies/status.py has them
+constexpr int32_t kActive = 0, kAsleep = 2;  // as in taichi_soft/bodies/status.py
 
 bool are_there(const Contact& contact, const Present& present) {
   const size_t other = size_t(contact.other);
@@ -22,7 +22,7 @@ bool are_there(const Contact& contact, const Present& present) {
 Events::Events(const Archive& archive, size_t slots) : status(slots + 2, 0), sleepers_(slots, 0) {
   const auto limits = archive.get<double>("events/limits");
   if (limits.count != 3 || !(limits[1] >= 1.0 && limits[1] <= 1e9) || !(limits[2] >= 1.0 && limits[2] <= 1e9)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: events. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: events. Export it again");
   }
   pause_ = limits[0];
   most_ = size_t(limits[1]);
@@ -58,7 +58,7 @@ void Events::follow(const std::map<Pair, std::array<float, 3>>& touches, const P
       if (is_moving) {
         contact.pause += dt;
       } else {
-        contact.touched = time;  // they lie as they lay
+        contact.touched = time;  // at rest, so they still touch
       }
     }
     if (contact.pause > pause_ - 1e-9 || !are_there(contact, present)) {
@@ -98,7 +98,7 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches, cons
                        const std::vector<int32_t>& frozen, int64_t step, double time, double dt) {
   if ((kinds_ & kContacts) != 0) follow(touches, present, step, time, dt);
   const auto say = [&](int32_t kind, ts_body body) { tell({kind, -1, step, time, body, 0, {0.0, 0.0, 0.0}, 0.0}); };
-  if (looks()) {  // also where nobody hears of sleep: it may be asked for after a restore
+  if (looks()) {  // even if sleep events are off: a restore may turn them on
     const std::vector<ts_body> now = sleeping(present);
     for (size_t slot = 0; slot < now.size(); ++slot) {
       if (now[slot] != 0 && now[slot] != sleepers_[slot]) say(TS_FELL_ASLEEP, now[slot]);

@@ -1,4 +1,4 @@
-// What happened in steps, for who wants to hear of it: as taichi_soft/events has it, number by number.
+// Events of steps, identical to those of taichi_soft/events.
 #pragma once
 
 #include <array>
@@ -12,21 +12,21 @@
 
 namespace taichi_soft {
 
-using Pair = std::array<int32_t, 3>;  // a slot, what the other one is, and its slot or number
+using Pair = std::array<int32_t, 3>;  // a slot, the kind of the other object, and its slot or number
 enum { kOfCollider = 0, kOfBody = 1 };
-constexpr size_t kPairRows = 32;  // of bodies that touch, for each body: as taichi_soft/contact/fields.py has it
+constexpr size_t kPairRows = 32;  // largest number of touching pairs per body, as in taichi_soft/contact/fields.py
 
-struct Contact {    // that goes on
-  ts_body a, b;     // the latter 0 for a collider
-  uint32_t serial;  // of that collider
+struct Contact {    // current contact
+  ts_body a, b;     // b is 0 for a collider
+  uint32_t serial;  // of the collider
   int32_t slot, kind, other;
-  double began, touched, pause;  // [s]: start of its first step, end of its last, since when nothing was given
+  double began, touched, pause;  // [s]: start of the first step, end of the last one, time since the last impulse
   double impulse[3];
 };
 
-// Who is there after a step.
+// Bodies and colliders that exist after a step.
 struct Present {
-  std::vector<ts_body> bodies;      // in each slot, 0 for nobody
+  std::vector<ts_body> bodies;      // by slot, 0 if empty
   std::vector<uint32_t> colliders;  // serial numbers, 0 for none
 };
 
@@ -40,7 +40,7 @@ class Events {
   static bool looks_for(int32_t kinds) {
     return (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED | TS_FELL_ASLEEP | TS_WOKE)) != 0;
   }
-  // From now on, as it is now: `status` has been read where `looks_for(kinds)`.
+  // Starts recording from the current state. `status` must be up to date if `looks_for(kinds)`.
   void record(int32_t kinds, const Present& present);
   void take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
@@ -48,7 +48,7 @@ class Events {
   size_t drain(ts_event* events, size_t capacity);
   int64_t dropped() const { return dropped_; }
 
-  // What the events of coming steps depend on.
+  // State that later events depend on.
   struct Memory {
     int32_t kinds;
     std::vector<int32_t> status;
@@ -56,12 +56,12 @@ class Events {
     std::vector<Contact> contacts;
   };
   Memory memory() const;
-  // The world was put back to a state of that step count: what waits of later steps never happened.
+  // The world was restored to a step count: drops waiting events of later steps.
   void recall(const Memory& memory, int64_t steps, const Present& present);
   size_t contact_count() const { return (kinds_ & kContacts) != 0 ? going_on_.size() : 0; }
 
-  std::vector<int32_t> status;  // of each slot after the last step, and two numbers: see `read_touches`
-  size_t touch_rows = 0;        // pairs that can touch in a step
+  std::vector<int32_t> status;  // by slot after the last step, and two numbers: see `read_touches`
+  size_t touch_rows = 0;        // largest number of touching pairs in a step
 
  private:
   static constexpr int32_t kContacts = TS_CONTACT_BEGAN | TS_CONTACT_ENDED, kSleep = TS_FELL_ASLEEP | TS_WOKE;
@@ -74,7 +74,7 @@ class Events {
   double pause_ = 0.0;
   size_t most_ = 0;
   std::map<Pair, Contact> going_on_;
-  std::vector<ts_body> sleepers_;  // in each slot, 0 where nobody sleeps
+  std::vector<ts_body> sleepers_;  // by slot, 0 if no body sleeps there
   std::deque<ts_event> waiting_;
   int64_t dropped_ = 0;
 };

@@ -1,4 +1,4 @@
-// What comes from files: world files, and libraries of kernels. Builds for the web have web.cpp in its place.
+// Reads world files and libraries of kernels. Builds for the web use web.cpp instead.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -22,7 +22,7 @@ std::string path_of(const std::string& folder, const char* name) {
   return (std::filesystem::u8path(folder) / name).u8string();
 }
 
-// Names of files that this machine runs, the best first.
+// Names of files that this machine can run, the best first.
 std::vector<std::string> wanted_files() {
 #if defined(_WIN32)
   const std::string platform = "windows", end = ".dll";
@@ -51,7 +51,7 @@ std::string texts(const std::vector<std::string>& names) {
   return found.empty() ? "nothing" : found;
 }
 
-// The best file that was exported for this machine and is there, by its number: a game may ship one of several.
+// Index of the best existing file for this machine; a game can ship only some of the exported files.
 size_t choose(const std::filesystem::path& folder, const std::vector<std::string>& files) {
   const std::vector<std::string> wanted = wanted_files();
   std::filesystem::path missing;
@@ -81,14 +81,14 @@ Kernels::Kernels(const std::string& folder, const std::vector<std::string>& file
   const std::filesystem::path path = std::filesystem::absolute(std::filesystem::u8path(folder) / files[file]);
   const std::vector<char> bytes = read_file(path.u8string());
   if (int64_t(bytes.size()) != sums[2 * file] || int64_t(checksum(bytes.data(), bytes.size())) != sums[2 * file + 1]) {
-    fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s is not what was exported. Export it again",
+    fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s differs from the exported file. Export it again",
          files[file].c_str());
   }
   constexpr char kTable[] = "taichi_soft_kernels";
 #if defined(_WIN32)
   library_ = LoadLibraryW(path.c_str());
   if (library_ == nullptr) {
-    fail(TS_ERROR_FILE, "Windows does not open %s: error %lu", path.u8string().c_str(), GetLastError());
+    fail(TS_ERROR_FILE, "Windows cannot load %s: error %lu", path.u8string().c_str(), GetLastError());
   }
   void* table = reinterpret_cast<void*>(GetProcAddress(static_cast<HMODULE>(library_), kTable));
 #else
@@ -116,7 +116,7 @@ std::vector<char> read_file(const std::string& path) {
   std::ifstream file(std::filesystem::u8path(path), std::ios::binary | std::ios::ate);
   const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
   if (size < 0 || size > (std::streamoff(1) << 40)) {
-    fail(TS_ERROR_FILE, "cannot read %s: give a folder that `taichi-soft export` wrote", path.c_str());
+    fail(TS_ERROR_FILE, "cannot read %s: give a folder from `taichi-soft export`", path.c_str());
   }
   std::vector<char> found(static_cast<size_t>(size));
   file.seekg(0);
@@ -130,7 +130,7 @@ Scene::Scene(const std::string& folder) : Scene(read_file(path_of(folder, "world
   const auto sums = archive.rows<int64_t>("kernels/sums", 2);
   const auto files = archive.texts("kernels/files");
   if (sums.count != 2 * files.size()) {
-    fail(TS_ERROR_FILE, "the world file is not in order: kernels. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: kernels. Export it again");
   }
   take(std::make_unique<Kernels>(path_of(folder, "kernels"), files, std::vector<int64_t>(sums.begin(), sums.end())));
 }

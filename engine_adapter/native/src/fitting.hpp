@@ -1,5 +1,5 @@
-// How a shape has turned: as taichi_soft/levels/fitting.py finds it, and taichi_soft/bodies/pose.py, of which only the
-// digits that a 32-bit float keeps are the same.
+// Best-fitting rotation of a shape: the same as taichi_soft/levels/fitting.py, and equal to taichi_soft/bodies/pose.py
+// in the precision of a 32-bit float.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace taichi_soft {
 
-// Eigenvalues and, in columns, eigenvectors of a symmetric matrix, by rotations of Jacobi.
+// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations.
 template <size_t N>
 struct Eigen {
   std::array<double, N> values;
@@ -50,7 +50,7 @@ struct Eigen {
   }
 };
 
-// The rotation R with the largest trace of R^T m: Horn 1987. No turn for zeros.
+// The rotation R with the largest trace of R^T m (Horn 1987); the identity for a zero matrix.
 inline Matrix nearest_rotation(const Matrix& m) {
   const std::array<std::array<double, 4>, 4> square = {
       {{m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[0][2] + m[2][0], m[2][1] - m[1][2]},
@@ -93,10 +93,10 @@ inline std::vector<Vector> beside(std::vector<Vector> points, const Vector& cent
   return points;
 }
 
-// What a shape has turned by since it lay at rest. `shares` add up to 1.
+// Rigid motion of a shape since its rest state. `shares` have the sum 1.
 struct FittingMotion {
   Matrix turn;
-  Vector place;  // of the origin
+  Vector place;  // position of the origin
 };
 
 inline FittingMotion fitting_motion(const std::vector<Vector>& rest, const std::vector<Vector>& now,
@@ -112,7 +112,7 @@ inline FittingMotion fitting_motion(const std::vector<Vector>& rest, const std::
   return {turn, {center[0] - carried[0], center[1] - carried[1], center[2] - carried[2]}};
 }
 
-// A vector rounded to 32-bit floats, without residue: as `kept` in taichi_soft/core/residue.py.
+// Rounds a vector to 32-bit floats, the same as `kept` in taichi_soft/core/residue.py.
 inline Vector kept(const Vector& vector) {
   constexpr double kResidue = 1e-12;
   double size = 0.0;

@@ -1,4 +1,4 @@
-// Calls compute as IEEE 754 says, subnormal numbers included, whatever the game has its threads do.
+// Calls follow IEEE 754, including subnormal numbers, for any floating-point mode of the game's threads.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace taichi_soft {
 
-// The processor's register of how it rounds, and whether it takes subnormal numbers for zero.
+// CPU register with the rounding mode and flush-to-zero.
 #if defined(__x86_64__) || defined(_M_X64)
 constexpr uint64_t kUsualFloats = 0x1F80;
 inline uint64_t float_control() { return _mm_getcsr(); }
@@ -22,7 +22,7 @@ inline uint64_t float_control() {
 }
 inline void set_float_control(uint64_t control) { asm volatile("msr fpcr, %0" : : "r"(control)); }
 #else
-constexpr uint64_t kUsualFloats = 0;  // others have no such register, or we do not know it
+constexpr uint64_t kUsualFloats = 0;  // other CPUs have no known register
 inline uint64_t float_control() { return 0; }
 inline void set_float_control(uint64_t) {}
 #endif

@@ -1,4 +1,4 @@
-// What handles stand for. A number that is checked, because a pointer that is used once too often cannot be.
+// Maps handles to objects. Handles are numbers, because a dangling pointer could not be detected.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace taichi_soft {
 
-// What a call has of a thing while it lasts. In WebAssembly, where a refused call ends without destructors, it keeps
-// nothing alive that would never be given back; there nobody else can take the thing away meanwhile.
+// Reference to an object during a call. In WebAssembly a refused call runs no destructors, so this is a raw pointer,
+// which is safe with a single thread.
 #if defined(__wasm__)
 template <typename Thing>
 using Kept = Thing*;
@@ -23,7 +23,7 @@ using Kept = std::shared_ptr<Thing>;
 template <typename Thing>
 class Handles {
  public:
-  // Each kind has a number of its own, so that one is not taken for another.
+  // Each kind of object has its own number, so that kinds cannot be confused.
   Handles(const char* name, uint64_t kind) : name_(name), kind_(kind << 56) {}
 
   uint64_t add(std::shared_ptr<Thing> thing) {
@@ -50,7 +50,7 @@ class Handles {
     return row_of(handle).thing;
   }
 
-  // Forget a handle; whoever is in a call keeps the thing until that ends.
+  // Removes a handle; running calls keep the object until they end.
   std::shared_ptr<Thing> remove(uint64_t handle) {
     const Guard lock(mutex_);
     return std::move(row_of(handle).thing);
@@ -66,7 +66,7 @@ class Handles {
     const uint64_t row = (handle & 0xFFFFFFFFu) - 1;
     if (handle == 0 || row >= rows_.size() || !rows_[row].thing ||
         (kind_ | uint64_t(rows_[row].generation) << 32) != (handle & ~uint64_t(0xFFFFFFFFu))) {
-      fail(TS_ERROR_HANDLE, "there is no %s %llu, or no more", name_, static_cast<unsigned long long>(handle));
+      fail(TS_ERROR_HANDLE, "%s %llu does not exist, or was destroyed", name_, static_cast<unsigned long long>(handle));
     }
     return rows_[row];
   }

@@ -1,5 +1,4 @@
-// The machine code of a world, which `taichi-soft export` compiled its kernels to: in a file that is opened here, or
-// linked into the game. And how it is called.
+// Loads and calls the machine code of a world from `taichi-soft export`: from a file, or linked into the game.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +12,9 @@ namespace taichi_soft {
 
 struct Runtime;
 
-// As Taichi 1.7 lays them out in the kernels' code.
+// Memory layout of Taichi 1.7, which the kernels' code relies on.
 struct Context {
-  void* arguments;  // a struct of them, in their order
+  void* arguments;  // struct of the arguments, in order
   Runtime* runtime;
   int32_t thread;
   int64_t* result;
@@ -30,13 +29,13 @@ struct Runtime {
   } chunks[2];
   void* functions[4];
   void* unused;
-  char* roots[512];  // of layouts of fields: a world file has one
+  char* roots[512];  // roots of field layouts; a world file has one
   int64_t root_sizes[512];
   void* pool;
-  // Runs tasks 0 to count - 1, in any threads, begun in this order. How many threads Taichi would take is of no interest.
+  // Runs tasks 0 to count - 1 on any threads, started in this order. Taichi's number of threads is ignored.
   void (*parallel_for)(void* pool, int32_t count, int32_t threads, void* closure, Task task);
   void* lists[3][1024];
-  char* temporaries;  // what one part of a kernel leaves for the next
+  char* temporaries;  // values passed between parts of a kernel
   void* rest[512];
 };
 
@@ -44,16 +43,16 @@ class Kernels {
  public:
   using Kernel = void (*)(Context* context);
 
-  // The file of this platform among those in a folder. Fails where there is none, or where it is not the one that was
-  // exported, whose length and checksum are given for each.
+  // Loads the file for this platform from a folder. Fails if there is none, or if its length and checksum differ from
+  // those of the exported file.
   Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums);
-  // Those that a game is linked with.
+  // Uses kernels that are linked into the game.
   explicit Kernels(const ts_linked_kernel* rows) : rows_(rows) {}
   ~Kernels();
   Kernels(const Kernels&) = delete;
   Kernels& operator=(const Kernels&) = delete;
 
-  // By which the export is known that made them.
+  // Identifies the export that made the kernels.
   const char* stamp() const { return rows_->name; }
   Kernel find(const std::string& name) const;
 
@@ -61,7 +60,7 @@ class Kernels {
   void close();
 
   void* library_ = nullptr;
-  const ts_linked_kernel* rows_ = nullptr;  // the first has the stamp for a name, the last has none
+  const ts_linked_kernel* rows_ = nullptr;  // the name of the first row is the stamp; the last row is null
 };
 
 }  // namespace taichi_soft

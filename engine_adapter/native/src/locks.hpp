@@ -1,4 +1,4 @@
-// What keeps threads apart, where there are any: WebAssembly has one.
+// Locks between threads; WebAssembly has one thread and needs none.
 #pragma once
 
 #if !defined(__wasm__)
@@ -16,7 +16,7 @@ class Guard {
   explicit Guard(Mutex&) {}
 };
 
-class Attempt {  // to lock
+class Attempt {  // tries to lock
  public:
   explicit Attempt(Mutex&) {}
   bool has_succeeded() const { return true; }

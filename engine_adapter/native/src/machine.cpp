@@ -8,8 +8,8 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr size_t kLine = 64;             // of the processor's cache [bytes], by which fields are aligned
-constexpr size_t kTemporaries = 1 << 16;  // more than any kernel takes
+constexpr size_t kLine = 64;             // cache line [bytes], the alignment of fields
+constexpr size_t kTemporaries = 1 << 16;  // more than any kernel needs
 
 void run_on_threads(void* pool, int32_t count, int32_t, void* closure, Task task) {
   static_cast<Threads*>(pool)->run(count, closure, task);
@@ -43,7 +43,7 @@ float Machine::launch(const char* kernel, const std::vector<Argument>& arguments
     if (each.kind == Argument::kWhole) pack(&packed_, each.whole);
     if (each.kind == Argument::kReal) pack(&packed_, each.real);
     if (each.kind == Argument::kArray) {
-      // A struct that begins where a pointer may.
+      // A struct with the alignment of a pointer.
       packed_.resize((packed_.size() + sizeof(void*) - 1) / sizeof(void*) * sizeof(void*));
       pack(&packed_, each.rows);
       if (each.width > 0) pack(&packed_, each.width);

@@ -1,4 +1,4 @@
-// The memory of one world, and calls of its kernels.
+// Memory of one world, and calls of its kernels.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace taichi_soft {
 
 class Scene;
 
-// Memory that kernels are given: it grows.
+// Growing memory for kernel arguments.
 class Buffer {
  public:
   template <typename Number>
@@ -34,16 +34,16 @@ struct Argument {
   int32_t whole;
   float real;
   const void* data;
-  int32_t rows, width;  // the latter 0 in arrays of one dimension
+  int32_t rows, width;  // a width of 0 means one dimension
 };
 
 class Machine {
  public:
   explicit Machine(const Scene& scene);
 
-  char* root() const { return root_; }  // where the fields begin
+  char* root() const { return root_; }  // start of the fields
 
-  // Arguments of kernels, in their order.
+  // Kernel arguments.
   static Argument whole(int32_t value) { return {Argument::kWhole, value, 0.0f, nullptr, 0, 0}; }
   static Argument real(double value) { return {Argument::kReal, 0, float(value), nullptr, 0, 0}; }
   static Argument array(const void* data, uint32_t rows, uint32_t width = 0) {
@@ -52,7 +52,7 @@ class Machine {
   static Argument array(const Buffer& buffer, uint32_t rows, uint32_t width = 0) {
     return array(buffer.data(), rows, width);
   }
-  // Returns: what kernels return that return a number.
+  // Returns: the kernel's return value, if it has one.
   float launch(const char* kernel, const std::vector<Argument>& arguments);
 
   Threads threads;

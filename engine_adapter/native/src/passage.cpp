@@ -14,7 +14,7 @@ using Column = Motion::Column;
 using Points = std::vector<Vector>;
 using Numbers = std::vector<double>;
 
-// Numbers that lie `stride` apart, added as NumPy adds them.
+// Sums numbers `stride` apart, in the same order as NumPy.
 double sum_of(const double* numbers, size_t count, size_t stride) {
   if (count < 8) {
     double total = -0.0;
@@ -83,7 +83,7 @@ Points rigid(Points arms, const Numbers& masses, const Vector& momentum, const V
   return arms;
 }
 
-// Moves places and changes velocities, so that centre, momentum and angular momentum are those of before.
+// Corrects positions and velocities to keep the centre of mass, momentum and angular momentum.
 void keep_momentum(const Motion& before, const Numbers& m, Motion* after, const Numbers& masses, size_t x, size_t v) {
   Points old_x = points_of(before, x), new_x = points_of(*after, x), new_v = points_of(*after, v);
   const Points old_v = points_of(before, v);
@@ -103,7 +103,7 @@ void keep_momentum(const Motion& before, const Numbers& m, Motion* after, const 
   }
 }
 
-// Lets vertices be held as those of the level before are that are nearest to each.
+// Holds vertices like the nearest held vertices of the previous level.
 void hold(const Change& change, const Motion& before, Motion* after) {
   std::vector<int32_t> sources;
   for (size_t i = 0; i < before.count; ++i) {
@@ -137,7 +137,7 @@ void hold(const Change& change, const Motion& before, Motion* after) {
   }
 }
 
-// Each vertex of the target is a sum of some of the source.
+// Interpolates the target's vertices from the source's.
 void pass_over(const Passage& over, const Motion& before, Motion* after) {
   Numbers products;
   for (size_t vertex = 0; vertex < after->count; ++vertex) {
@@ -153,8 +153,8 @@ void pass_over(const Passage& over, const Motion& before, Motion* after) {
   }
 }
 
-// The first of some vertices that is nearest to a place, at rest.
-int32_t nearest_one(const Asset& asset, const std::vector<int32_t>& among, const Vector& place) {
+// Vertex of a list that is nearest to a rest position; the first one of equals.
+int32_t nearest_vertex(const Asset& asset, const std::vector<int32_t>& among, const Vector& place) {
   double least = std::numeric_limits<double>::infinity();
   int32_t found = among[0];
   for (int32_t vertex : among) {
@@ -170,7 +170,7 @@ int32_t nearest_one(const Asset& asset, const std::vector<int32_t>& among, const
 std::vector<int32_t> nearest_of_each(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target) {
   std::vector<int32_t> all(target.vertex_count()), found;
   for (size_t i = 0; i < all.size(); ++i) all[i] = int32_t(i);
-  for (int32_t vertex : vertices) found.push_back(nearest_one(target, all, rest_place(source, vertex)));
+  for (int32_t vertex : vertices) found.push_back(nearest_vertex(target, all, rest_place(source, vertex)));
   return found;
 }
 
@@ -184,7 +184,7 @@ std::vector<int32_t> nearest_vertices(const Asset& source, const std::vector<int
 std::vector<int32_t> nearest_sources(const Asset& source, const std::vector<int32_t>& among, const Asset& target,
                                      const std::vector<int32_t>& vertices) {
   std::vector<int32_t> found;
-  for (int32_t vertex : vertices) found.push_back(nearest_one(source, among, rest_place(target, vertex)));
+  for (int32_t vertex : vertices) found.push_back(nearest_vertex(source, among, rest_place(target, vertex)));
   return found;
 }
 

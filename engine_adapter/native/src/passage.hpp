@@ -1,4 +1,4 @@
-// How a body passes from one level of detail to another: as taichi_soft/levels has it, sum by sum.
+// Transfers a body from one level of detail to another, bit-identical to taichi_soft/levels.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ struct Motion {
     kVelocity = 3,
     kEarlierPosition = 6,
     kEarlierVelocity = 9,
-    kPassing = 12,  // columns that pass over as they are
+    kPassing = 12,  // columns that are transferred unchanged
     kInvMass = 12,
     kMass = 15,
     kAim = 16,
@@ -43,14 +43,14 @@ struct Motion {
 struct Change {
   const Asset &source, &target;  // levels of one asset
   const Passage& over;
-  std::vector<int32_t> held;     // vertices of the target that are to be held
+  std::vector<int32_t> held;     // held vertices of the target
 };
 
-// Vertices of the target that are nearest to some of the source at rest, ascending, each once.
+// Unique vertices of the target, ascending, that are nearest at rest to given vertices of the source.
 std::vector<int32_t> nearest_vertices(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
-// The same one for each, in their order.
+// Nearest vertex of the target for each given vertex, in order.
 std::vector<int32_t> nearest_of_each(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
-// Which of some vertices of the source is nearest to each of some of the target, at rest.
+// Nearest vertex of the source at rest for each given vertex of the target.
 std::vector<int32_t> nearest_sources(const Asset& source, const std::vector<int32_t>& among, const Asset& target,
                                      const std::vector<int32_t>& vertices);
 

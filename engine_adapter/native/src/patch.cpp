@@ -10,7 +10,7 @@ namespace taichi_soft {
 
 namespace {
 
-// Force per distance [N/m] by which vertices moved each by its falloff are held back.
+// Stiffness [N/m] against moving each vertex by its falloff.
 double stiffness(const Asset& asset, const std::vector<double>& falloff) {
   const size_t width = asset.element_width;
   double total = 0.0;
@@ -42,7 +42,7 @@ double stiffness(const Asset& asset, const std::vector<double>& falloff) {
 
 }  // namespace
 
-Patch patch_round(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights,
+Patch patch_around(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights,
                   size_t count) {
   const size_t n = asset.vertex_count(), most = scene.patch_rows;
   Vector point = {0.0, 0.0, 0.0}, size;
@@ -75,7 +75,7 @@ Patch patch_round(const Scene& scene, const Asset& asset, const int32_t* corners
   for (size_t v = 0; v < n; ++v) {
     const double part = distance[v] / radius, left = std::max(1.0 - part * part, 0.0);
     falloff[v] = left * left;
-    if (!(falloff[v] >= 1e-6)) falloff[v] = 0.0;  // nor what is not a number: it would name more vertices than fit
+    if (!(falloff[v] >= 1e-6)) falloff[v] = 0.0;  // also NaN, which would exceed the capacity
     if (falloff[v] == 0.0) continue;
     found.vertices.push_back(int32_t(v));
     found.shares.push_back(falloff[v] * asset.masses[v]);

@@ -1,4 +1,4 @@
-// The part of a body that a hand takes hold of: as taichi_soft/control/grab_patch.py has it, sum by sum.
+// The part of a body that a grab holds, bit-identical to taichi_soft/control/grab_patch.py.
 #pragma once
 
 #include <vector>
@@ -9,11 +9,11 @@ namespace taichi_soft {
 
 struct Patch {
   std::vector<int32_t> vertices;
-  std::vector<double> shares;  // of a pull; they add up to 1
-  double strength;             // [N], up to which it is pulled on the patch
+  std::vector<double> shares;  // weights of the force, with sum 1
+  double strength;             // largest force on the patch [N]
 };
 
-// Round a point at rest between `count` vertices, three or four.
-Patch patch_round(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights, size_t count);
+// Patch around a rest point between `count` vertices, three or four.
+Patch patch_around(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights, size_t count);
 
 }  // namespace taichi_soft

@@ -10,11 +10,11 @@ namespace taichi_soft {
 
 namespace {
 
-[[noreturn]] void out_of_order(const char* what) {
-  fail(TS_ERROR_FILE, "the world file is not in order: %s. Export it again", what);
+[[noreturn]] void invalid_file(const char* what) {
+  fail(TS_ERROR_FILE, "the world file is invalid: %s. Export it again", what);
 }
 
-// A mesh whose squares can be computed with.
+// True if all numbers are within the limit of positions.
 bool are_places(const Archive::View<double>& numbers) {
   for (double number : numbers) {
     if (!(std::fabs(number) <= 1e30)) return false;
@@ -31,17 +31,17 @@ bool are_below(const Archive::View<int32_t>& numbers, size_t limit) {
 
 Place place_from(const int64_t* row, size_t image) {
   for (int k = 0; k < 5; ++k) {
-    if (row[k] < 0 || static_cast<uint64_t>(row[k]) > image) out_of_order("a field");
+    if (row[k] < 0 || static_cast<uint64_t>(row[k]) > image) invalid_file("a field");
   }
   const Place found = {size_t(row[0]), size_t(row[1]), size_t(row[2]), size_t(row[3]), row[4] == 1};
   if (found.count > 0 && found.offset + (found.count - 1) * found.stride + 4 * found.width > image) {
-    out_of_order("a field lies beyond the image");
+    invalid_file("a field outside the image");
   }
   return found;
 }
 
-// Whether the kernel reads within the table of a surface: see `render_table` in taichi_soft/bodies/render_mesh.py.
-bool is_surface_whole(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
+// True if all indices of a surface's table are in range: see `render_table` in taichi_soft/bodies/render_mesh.py.
+bool is_surface_valid(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
   constexpr size_t kStride = 10 * kLanes;
   const size_t blocks = (k + kLanes - 1) / kLanes, head = blocks * kStride + k;
   if (k == 0 || mesh.ints.count < head + blocks + 2) return false;
@@ -49,7 +49,7 @@ bool is_surface_whole(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
     const size_t limit = i < blocks * kStride ? k : body_vertices;
     if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= limit) return false;
   }
-  size_t before = head + blocks + 2;  // behind how many blocks have small rings, which harms nobody
+  size_t before = head + blocks + 2;  // skips the number of blocks with small rings, which is harmless
   for (size_t block = 0; block <= blocks; ++block) {
     const int32_t begin = mesh.ints[head + block];
     if (begin < 0 || size_t(begin) < before || size_t(begin) > mesh.ints.count) return false;
@@ -65,8 +65,8 @@ bool is_surface_whole(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
   return true;
 }
 
-// The same of a skin: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
-bool is_skin_whole(const Mesh::Table& mesh, size_t k, size_t n) {
+// The same for a skin: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
+bool is_skin_valid(const Mesh::Table& mesh, size_t k, size_t n) {
   constexpr size_t kSkinLanes = 16, kRow = 10;
   const size_t blocks = (k + kSkinLanes - 1) / kSkinLanes;
   if (k == 0 || mesh.ints.count < n + 1 || mesh.ints[n] < 0) return false;
@@ -97,7 +97,7 @@ void Scene::take(std::unique_ptr<Kernels> kernels) {
   code_ = std::move(kernels);
   const auto stamp = archive.texts("kernels/stamp");
   if (stamp.size() != 1 || code_->stamp() == nullptr || stamp[0] != code_->stamp()) {
-    fail(TS_ERROR_FILE, "the kernels are not those of this world file: export it again, with both");
+    fail(TS_ERROR_FILE, "the kernels belong to another export: export the world again, and ship both");
   }
   for (const std::string& name : archive.texts("kernels/names")) kernels_[name] = code_->find(name);
 }
@@ -105,7 +105,7 @@ void Scene::take(std::unique_ptr<Kernels> kernels) {
 Scene::Scene(std::vector<char> world, const std::string& name)
     : archive(std::move(world), name),
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
-                                                           : (out_of_order("axes"), nullptr)) {
+                                                           : (invalid_file("axes"), nullptr)) {
   for (int kind = 0; kind < 7; ++kind) names_[kind] = archive.texts(kKinds[kind]);
   const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
@@ -113,14 +113,14 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
   const auto grabs = archive.get<double>("grabs/limits");
   if (flags.count != 4 || grabs.count != 5 || counts.count != 2 || stable.count != 2 || limits.count != 7)
-    out_of_order("numbers");
+    invalid_file("numbers");
   has_contact = flags[0] != 0;
   sleeps = flags[1] != 0;
   has_soft_contact = flags[2] != 0;
   is_implicit = flags[3] != 0;
   patch_size = grabs[0], farthest_pull = grabs[1], pull_in_weights = grabs[2], highest_pull_speed = grabs[3];
   for (double each : grabs) {
-    if (!(each >= 0.0 && each <= 1e30)) out_of_order("grabs");
+    if (!(each >= 0.0 && each <= 1e30)) invalid_file("grabs");
   }
   patch_rows = grabs[4] >= 1.0 && grabs[4] <= 1e6 ? size_t(grabs[4]) : 0;
   slot_count = counts[0], particle_count = counts[1];
@@ -128,7 +128,7 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   has_floor = floors.count == 1;
   floor = has_floor ? floors[0] : 0.0;
   const auto floor_colliders = archive.get<int32_t>("world/floor_collider");
-  if (floor_colliders.count != 1) out_of_order("the floor");
+  if (floor_colliders.count != 1) invalid_file("the floor");
   floor_collider = floor_colliders[0];
   position_limit = limits[0], velocity_limit = limits[1], spin_limit = limits[2];
   impulse_limit = limits[3], push_limit = limits[4];
@@ -137,12 +137,12 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   begin_of_slot.assign(begins.begin(), begins.end());
   if (slot_count < 1 || size_t(slot_count) != asset_of_slot.size() || size_t(slot_count) != begin_of_slot.size() ||
       size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || particle_count > (1 << 28)) {
-    out_of_order("slots");
+    invalid_file("slots");
   }
   read_fields();
   read_assets();
   read_meshes();
-  // A level that is exported anew as it was takes the snapshots of before.
+  // Snapshots stay valid if the same scene is exported again.
   for (const char* name : {"fields/carried", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
@@ -159,14 +159,14 @@ void Scene::read_fields() {
   field_names_ = archive.texts("fields/names");
   const auto rows = archive.rows<int64_t>("fields/places", 5);
   const size_t image = archive.get<unsigned char>("fields/image").count;
-  if (rows.count != 5 * field_names_.size()) out_of_order("fields");
+  if (rows.count != 5 * field_names_.size()) invalid_file("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
   const auto kept = archive.rows<int64_t>("fields/carried", 8);
   for (size_t i = 0; i + 8 <= kept.count; i += 8) {
     const Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), int(kept[i + 6]), kept[i + 7] != 0};
     if (kept[i + 5] < 0 || each.whose < Carried::kAlways || each.whose > Carried::kOfMotors ||
         each.count > each.place.count) {
-      out_of_order("what snapshots have");
+      invalid_file("the fields of snapshots");
     }
     carried.push_back(each);
   }
@@ -204,12 +204,12 @@ Asset Scene::read_asset(const std::string& prefix) const {
       asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) ||
       asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) ||
       !are_below(asset.outer, n) || !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
-    out_of_order("an asset");
+    invalid_file("an asset");
   }
   asset.element_width = asset.elements.sizes[1];
   if ((asset.element_width != 2 && asset.element_width != 4) ||
       asset.elements.sizes[0] != asset.element_stiffness.count) {
-    out_of_order("an asset");
+    invalid_file("an asset");
   }
   asset.center = {center[0], center[1], center[2]};
   asset.thickness = skin[0], asset.friction = friction[0], asset.wave_speed = wave_speed[0];
@@ -217,7 +217,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
   return asset;
 }
 
-// Of one level. Whether they fit into the slots is looked at with the first world.
+// Rows of one level. The first world checks that they fit the slots.
 SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, size_t most) const {
   constexpr size_t kCornerRows = 4 * kLanes, kEdgeRows = 6 * kLanes;
   const std::string slot = prefix + "slot/", touching = prefix + "touching/";
@@ -238,29 +238,29 @@ SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, si
       rows.edge_damping.count != edges || edges < kLanes || rows.kind.count != 7 || !are_below(rows.tet_vertices, n) ||
       !are_below(rows.tet_edges, edges) || !are_below(rows.edges, n) || !are_below(rows.triangles, n) ||
       !are_below(rows.outer, n)) {
-    out_of_order("a level of detail");
+    invalid_file("a level of detail");
   }
   for (size_t i = 0; i < rows.edge_blocks.count; i += 2) {
     const int32_t first = rows.edge_blocks[i], count = rows.edge_blocks[i + 1];
     if (first < 0 || count < 0 || count > int32_t(kLanes) || size_t(first) + kLanes > edges) {
-      out_of_order("a level of detail");
+      invalid_file("a level of detail");
     }
   }
   for (const std::string& name : constant_names) {
     rows.constants.push_back(archive.get<float>(prefix + "constants/" + name));
-    if (blocks == 0 || rows.constants.back().count % (kLanes * blocks) != 0) out_of_order("a level of detail");
+    if (blocks == 0 || rows.constants.back().count % (kLanes * blocks) != 0) invalid_file("a level of detail");
   }
   if (!has_hulls) return rows;
   rows.touching_outer = archive.get<int32_t>(touching + "outer");
   rows.touching_triangles = archive.rows<int32_t>(touching + "triangles", 3);
   rows.carriers = archive.rows<int32_t>(touching + "carriers", 4);
   rows.weights = archive.rows<float>(touching + "weights", 4);
-  // Points of a hull come behind all particles that the slot has room for.
+  // Points of a hull come after all particles of the slot's capacity.
   const size_t room = most + asset.hull.count / 4;
   if (rows.carriers.count != rows.weights.count || rows.carriers.count != asset.hull.count ||
       !are_below(rows.carriers, n) || !are_below(rows.touching_outer, room) ||
       !are_below(rows.touching_triangles, room)) {
-    out_of_order("a level of detail");
+    invalid_file("a level of detail");
   }
   return rows;
 }
@@ -279,7 +279,7 @@ void Scene::read_levels(const std::string& prefix, int32_t count, Asset* asset) 
         rows.touching_outer.count > std::max(room.touching_outer.count, room.outer.count) ||
         rows.touching_triangles.count > std::max(room.touching_triangles.count, room.triangles.count) ||
         coarse.hull.count != asset->hull.count) {
-      out_of_order("a level of detail");
+      invalid_file("a level of detail");
     }
   }
   for (size_t i = 0; i < asset->level_count() * asset->level_count(); ++i) {
@@ -298,7 +298,7 @@ void Scene::read_levels(const std::string& prefix, int32_t count, Asset* asset) 
       const size_t end = k + 1 < over.begins.count ? size_t(over.begins[k + 1]) : over.sources.count;
       is_whole = over.begins[k] >= 0 && size_t(over.begins[k]) < end && end <= over.sources.count;
     }
-    if (!is_whole) out_of_order("how a level of detail passes to another");
+    if (!is_whole) invalid_file("the transition between levels of detail");
   }
 }
 
@@ -306,11 +306,11 @@ void Scene::read_assets() {
   const auto levels = archive.get<int32_t>("levels/counts");
   constant_names = archive.texts("levels/constants");
   has_hulls = std::find(field_names_.begin(), field_names_.end(), "hull.carriers") != field_names_.end();
-  if (levels.count != names_[TS_ASSET].size()) out_of_order("levels of detail");
+  if (levels.count != names_[TS_ASSET].size()) invalid_file("levels of detail");
   for (size_t i = 0; i < levels.count; ++i) {
     const std::string prefix = "asset" + std::to_string(i) + "/";
     assets.push_back(read_asset(prefix));
-    if (levels[i] < 1 || levels[i] > 1000) out_of_order("levels of detail");
+    if (levels[i] < 1 || levels[i] > 1000) invalid_file("levels of detail");
     if (levels[i] == 1) continue;
     read_levels(prefix, levels[i], &assets.back());
     has_levels = true;
@@ -319,7 +319,7 @@ void Scene::read_assets() {
     const int32_t asset = asset_of_slot[slot], begin = begin_of_slot[slot];
     if (asset < 0 || size_t(asset) >= assets.size() || begin < 0 ||
         size_t(begin) + assets[asset].vertex_count() > size_t(particle_count)) {
-      out_of_order("a slot");
+      invalid_file("a slot");
     }
     ++assets[asset].slot_count;
   }
@@ -329,7 +329,7 @@ void Scene::read_meshes() {
   for (size_t i = 0; i < names_[TS_MESH].size(); ++i) {
     const std::string prefix = "mesh" + std::to_string(i) + "/";
     const auto kind = archive.get<int32_t>(prefix + "kind"), is_serial = archive.get<int32_t>(prefix + "is_serial");
-    if (kind.count != 4 || kind[0] < 0 || size_t(kind[0]) >= assets.size() || kind[3] < 0) out_of_order("a mesh");
+    if (kind.count != 4 || kind[0] < 0 || size_t(kind[0]) >= assets.size() || kind[3] < 0) invalid_file("a mesh");
     const Asset& asset = assets[size_t(kind[0])];
     Mesh mesh = {kind[0],
                  kind[1],
@@ -342,15 +342,15 @@ void Scene::read_meshes() {
     if (mesh.level < -1 || mesh.level >= int32_t(asset.level_count()) ||
         is_serial.count != (is_of_all ? asset.level_count() : 1) || !are_below(mesh.triangles, mesh.vertex_count) ||
         (has_uv && mesh.uv.count != 2 * mesh.vertex_count)) {
-      out_of_order("a mesh");
+      invalid_file("a mesh");
     }
     for (size_t k = 0; k < is_serial.count; ++k) {
       const Mesh::Table table = {is_serial[k] != 0, archive.get<int32_t>(prefix + "ints" + std::to_string(k)),
                                  archive.get<float>(prefix + "floats" + std::to_string(k))};
       const size_t n = asset.level(is_of_all ? k : size_t(mesh.level)).vertex_count();
-      if (!(mesh.is_skin ? is_skin_whole(table, mesh.vertex_count, n)
-                         : is_surface_whole(table, mesh.vertex_count, n))) {
-        out_of_order("a mesh");
+      if (!(mesh.is_skin ? is_skin_valid(table, mesh.vertex_count, n)
+                         : is_surface_valid(table, mesh.vertex_count, n))) {
+        invalid_file("a mesh");
       }
       mesh.tables.push_back(table);
     }
@@ -369,12 +369,12 @@ Place Scene::place(const std::string& field, size_t count, size_t width) const {
     if (places_[i].count < count || places_[i].width < width) break;
     return places_[i];
   }
-  out_of_order(("the field " + field + " is missing, or too short").c_str());
+  invalid_file(("the field " + field + " is missing, or too short").c_str());
 }
 
 Kernels::Kernel Scene::kernel(const std::string& name) const {
   const auto found = kernels_.find(name);
-  if (found == kernels_.end()) out_of_order("kernels");
+  if (found == kernels_.end()) invalid_file("kernels");
   return found->second;
 }
 

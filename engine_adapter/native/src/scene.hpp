@@ -1,4 +1,4 @@
-// A world file in memory: all that the worlds made of it share.
+// A world file in memory: the data that its worlds share.
 #pragma once
 
 #include <map>
@@ -12,30 +12,30 @@
 
 namespace taichi_soft {
 
-// Where a field lies: element i begins `stride` i bytes behind `offset`, and has `width` numbers of 4 bytes.
+// Layout of a field: element i starts at `offset + stride * i` [bytes] and has `width` numbers of 4 bytes.
 struct Place {
   size_t offset, stride, count, width;
   bool is_whole;
 };
 
-struct Carried {  // a field that snapshots have, and how many of its elements
+struct Carried {  // a field in snapshots, and the number of its elements there
   enum { kAlways, kOfJoints, kOfMotors };
   Place place;
-  size_t count;    // for each row that joints or motors hold, if it is one of theirs
+  size_t count;    // per row of joints or motors, for their fields
   int whose;
-  bool is_finite;  // it moves bodies
+  bool is_finite;  // must be finite, because it moves bodies
 };
 
-constexpr size_t kLanes = 8;  // as taichi_soft/core/constants.py has it
+constexpr size_t kLanes = 8;  // as in taichi_soft/core/constants.py
 
-struct SlotRows {  // what kernels write into a slot: see `body_rows` in taichi_soft/fracture/cutting.py
+struct SlotRows {  // data that kernels write into a slot: see `body_rows` in taichi_soft/fracture/cutting.py
   Archive::View<float> rest, rest_inverses, edge_damping, kind, weights;
   Archive::View<int32_t> tet_vertices, tet_edges, edges, edge_blocks, triangles, outer;
-  Archive::View<int32_t> touching_outer, touching_triangles, carriers;  // where anything has a hull
+  Archive::View<int32_t> touching_outer, touching_triangles, carriers;  // only if any asset has a hull
   std::vector<Archive::View<float>> constants;                          // of tetrahedra, by field
 };
 
-// From the vertices of one level of detail to those of another: see taichi_soft/levels/passage.py.
+// Map from the vertices of one level of detail to those of another: see taichi_soft/levels/passage.py.
 struct Passage {
   Archive::View<int32_t> sources, begins;
   Archive::View<double> weights;
@@ -47,15 +47,15 @@ struct Asset {
   Archive::View<double> masses;
   Vector center;
   Archive::View<int32_t> pinned, outer, rank, surface;
-  Archive::View<int32_t> elements;  // vertices of each: 2 of springs, 4 of tetrahedra
+  Archive::View<int32_t> elements;  // vertices of each element: 2 for springs, 4 for tetrahedra
   Archive::View<double> element_stiffness;
   size_t element_width;
   Archive::View<int32_t> tets;
-  Archive::View<int32_t> hull;  // four vertices of each point of its hull; none where it touches by its surface
+  Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if the surface is used for contact
   Archive::View<double> hull_weights;
   double thickness, friction, wave_speed;
   int32_t slot_count;
-  // Levels of detail. What follows is empty where there is only one.
+  // Levels of detail. The following members are empty with a single level.
   SlotRows rows;
   std::vector<Asset> coarser;
   std::vector<Passage> passages;  // from level i to j at [i * level_count() + j]
@@ -66,17 +66,17 @@ struct Asset {
 };
 
 struct Mesh {
-  struct Table {  // what the kernel reads
+  struct Table {  // input of the kernel
     bool is_serial;
     Archive::View<int32_t> ints;
     Archive::View<float> floats;
   };
-  int32_t asset, level;  // the latter -1 where it is drawn at every level of detail
+  int32_t asset, level;  // a level of -1 means every level of detail
   bool is_skin;
   size_t vertex_count;
   Archive::View<int32_t> triangles;
   Archive::View<float> uv;
-  std::vector<Table> tables;  // one, or one for each level
+  std::vector<Table> tables;  // one, or one per level
   const Table& table(int32_t of_level) const { return tables[level < 0 ? size_t(of_level) : 0]; }
 };
 
@@ -85,8 +85,8 @@ class Scene {
   explicit Scene(const std::string& folder);
   Scene(std::vector<char> world, const ts_linked_kernel* kernels);
 
-  const std::vector<std::string>& names(int32_t kind) const;  // of TS_BODY and so on
-  // Fails where the field is missing, or has fewer elements or numbers in each.
+  const std::vector<std::string>& names(int32_t kind) const;  // of a kind such as TS_BODY
+  // Fails if the field is missing, or has fewer or narrower elements.
   Place place(const std::string& field, size_t count = 0, size_t width = 1) const;
 
   Kernels::Kernel kernel(const std::string& name) const;
@@ -98,17 +98,17 @@ class Scene {
   double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;
   double floor;
-  int32_t floor_collider;  // the floor, where there are colliders; -1 where it is none
+  int32_t floor_collider;  // collider of the floor, or -1
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
-  double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // of grabs; the third in N/kg
+  double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // limits of grabs; pull_in_weights in N/kg
   size_t patch_rows;
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;
-  bool has_levels = false, has_hulls = false;  // whether any asset has levels of detail, or a hull
+  bool has_levels = false, has_hulls = false;  // true if any asset has levels of detail, or a hull
   std::vector<std::string> constant_names;  // fields with constants of tetrahedra
   std::vector<Mesh> meshes;
   std::vector<Carried> carried;
-  uint32_t code = 0;  // of what a snapshot fits into
+  uint32_t code = 0;  // identifies compatible snapshots
 
  private:
   Scene(std::vector<char> world, const std::string& name);

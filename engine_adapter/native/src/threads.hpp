@@ -1,4 +1,4 @@
-// Who runs the tasks of a loop: the thread that calls, with threads of a world's own beside it, or the host's.
+// Runs the tasks of a loop on the calling thread and the world's threads, or on the host's.
 #pragma once
 
 #include <cstdint>
@@ -23,12 +23,11 @@ class Threads {
   Threads(const Threads&) = delete;
   Threads& operator=(const Threads&) = delete;
 
-  int32_t most() const { return most_; }  // that run at a time, with the one that calls
+  int32_t most() const { return most_; }  // largest number of threads, including the calling one
   void set_most(int32_t count) { most_ = count; }
   void use_host(ts_run_jobs function, void* user) { host_ = function, user_ = user; }
 
-  // Runs tasks 0 to count - 1, which are begun in this order, and returns when all have ended. Threads are started as
-  // they are needed.
+  // Runs tasks 0 to count - 1, started in this order, and returns when all have ended. Threads are created on demand.
   void run(int32_t count, void* closure, Task task);
 
  private:
@@ -38,15 +37,15 @@ class Threads {
 #if !defined(__wasm__)
   void run_on_workers(int32_t count, void* closure, Task task);
   int32_t helpers_for(int32_t count) noexcept;
-  void serve(int32_t thread, uint64_t done);  // after the round that was done when it started
+  void serve(int32_t thread, uint64_t done);  // waits for rounds after `done`
   void take_tasks(int32_t thread);
 
   std::vector<std::thread> workers_;
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
-  uint64_t round_ = 0;   // that is run, or was last
-  int32_t helpers_ = 0;  // workers that take part in it: the first ones
-  int32_t busy_ = 0;     // of these, that have not ended it
+  uint64_t round_ = 0;   // current or last round
+  int32_t helpers_ = 0;  // number of workers that take part in it, the first ones
+  int32_t busy_ = 0;     // number of these that have not finished it
   bool is_over_ = false;
   void* closure_ = nullptr;
   Task task_ = nullptr;

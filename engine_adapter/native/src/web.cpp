@@ -1,4 +1,4 @@
-// What builds for the web have in place of files, and what JavaScript takes besides the functions of taichi_soft.h.
+// Replaces files.cpp in builds for the web, and adds functions for JavaScript to those of taichi_soft.h.
 #include "kernels.hpp"
 #include "scene.hpp"
 
@@ -6,7 +6,7 @@ namespace taichi_soft {
 
 void Kernels::close() {}
 
-Scene::Scene(const std::string& folder) : Scene(std::vector<char>(), folder) {}  // there are no folders: it fails
+Scene::Scene(const std::string& folder) : Scene(std::vector<char>(), folder) {}  // fails: the web has no folders
 
 }  // namespace taichi_soft
 

@@ -10,7 +10,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr double kRoundOff = 1e-9;  // of a step, as in engine_adapter/fixed_step.py
+constexpr double kRoundOff = 1e-9;  // [steps], as in engine_adapter/fixed_step.py
 constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
@@ -30,18 +30,18 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const auto feels = archive.get<unsigned char>("frames/feels");
   if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 ||
       named > frames || alive.count != named || feels.count != size_t(scene_->particle_count)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: clock, surroundings or frames. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
   surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}, surroundings[3]};
   const auto frictions = archive.get<double>("slots/friction");
   friction_.assign(frictions.begin(), frictions.end());
   if (friction_.size() != size_t(scene_->slot_count)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: frictions. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: frictions. Export it again");
   }
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
-  frame_alive_.assign(frames, 0);  // a row that no frame ever had is there where there is none
+  frame_alive_.assign(frames, 0);  // without frames there is one unused row
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
   feels_.assign(feels.begin(), feels.end());
   if (scene_->has_contact) colliders_ = Colliders(archive);
@@ -97,7 +97,7 @@ void World::bind() {
   motor_limit_ = {root, s.place("motors.motor.limit", kMostMotors)};
   motor_impulse_ = {root, s.place("motors.impulse", kMostMotors)};
   motor_particle_ = {root, s.place("motors.particle", kMotorRows)};
-  if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is not in order: grabs. Export it again");
+  if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
   if (s.has_soft_contact) {
     records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
     body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
@@ -119,9 +119,9 @@ void World::bind() {
   collider_surface_ = {root, s.place("contact.collider_surface", collider_room_, 3)};
   collider_filter_ = {root, s.place("contact.collider_filter", collider_room_, 2)};
   collider_count_ = {root, s.place("contact.collider_count", 1, 1)};
-  // The kernel that reads who touches whom is given so many rows, and asks for no number.
+  // The kernel that reads contacts does not check the number of rows.
   if (events_.touch_rows < bodies * (collider_room_ + (s.has_soft_contact ? kPairRows : 0))) {
-    fail(TS_ERROR_FILE, "the world file is not in order: events. Export it again");
+    fail(TS_ERROR_FILE, "the world file is invalid: events. Export it again");
   }
 }
 
@@ -144,7 +144,7 @@ void World::set_fixed_step(double dt, int32_t substeps, int32_t max_steps) {
 
 int32_t World::require_substeps(double dt, int32_t substeps) const {
   if (substeps < 0 || substeps > 1000000) {
-    fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 to 1,000,000, or 0 for what is stable", substeps);
+    fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 to 1,000,000, or 0 for a stable number", substeps);
   }
   const int32_t stable = stable_substeps(dt);
   return substeps == 0 ? stable : substeps;
@@ -276,9 +276,9 @@ void World::write_clock(ts_clock* clock, int32_t steps_made) const {
   clock->dropped = dropped_;
 }
 
-// ---- who sleeps ----
+// ---- sleep ----
 
-void World::rouse(int32_t slot) {
+void World::mark_modified(int32_t slot) {
   wake_slot(slot);
   rows_at_ = -1.0;
 }
@@ -297,7 +297,7 @@ void World::wake_near(const Box& box) {
   is_still_ = false;
 }
 
-// Round a body and what it touches others by.
+// Box around a body and its contact surface.
 Box World::box_of(int32_t slot) const {
   const Asset& asset = asset_of(slot);
   std::vector<Vector> points(asset.vertex_count());
@@ -320,6 +320,6 @@ Box World::box_of(int32_t slot) const {
   return box;
 }
 
-void World::wake() { rouse(-1); }
+void World::wake() { mark_modified(-1); }
 
 }  // namespace taichi_soft

@@ -1,4 +1,4 @@
-// An instance of a scene that moves: what a step is, and what a game does between two.
+// A running instance of a scene: steps, and the game's calls between them.
 #pragma once
 
 #include <map>
@@ -15,15 +15,15 @@
 
 namespace taichi_soft {
 
-// As taichi_soft/bodies/status.py has them.
+// The same as in taichi_soft/bodies/status.py.
 enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
 enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32 };
-enum Aims { kStill = 0, kWithFrame = 3 };  // as taichi_soft/control/kernels/pins.py has them
+enum Aims { kStill = 0, kWithFrame = 3 };  // as in taichi_soft/control/kernels/pins.py
 
-// As taichi_soft/control/kernels/grabs.py has them; fields of other sizes are refused.
+// The same as in taichi_soft/control/kernels/grabs.py; fields of other sizes are refused.
 constexpr size_t kMostGrabs = 16, kPatchRows = 128, kGrabCorners = 4;
 
-// As taichi_soft/control/kernels/joints.py and motors.py have them.
+// The same as in taichi_soft/control/kernels/joints.py and motors.py.
 constexpr size_t kMostJoints = 64, kJointRows = 2048, kJointEnds = 5;
 constexpr size_t kMostMotors = 64, kMotorRows = 16384;
 
@@ -44,12 +44,12 @@ class Field {
   size_t stride_ = 0;
 };
 
-struct Vertices {  // a list of a body's vertices; none given stands for all
+struct Vertices {  // a list of a body's vertices; an empty list means all
   const int32_t* numbers;
   size_t count;
 };
 
-// Where a ray meets a surface, or the point of one that is nearest.
+// Hit of a ray, or the closest point of a surface.
 struct Hit {
   int32_t slot = -1;  // of the body; -1 for none
   int32_t triangle;
@@ -60,15 +60,15 @@ struct Hit {
   bool is_inside = false;
 };
 
-// What holds for all bodies.
+// Properties that all bodies share.
 struct Surroundings {
   Vector gravity;   // [m/s^2]
   double friction;  // of the floor
 };
 
-struct Drive {  // what a motor does
+struct Drive {  // settings of a motor
   bool turns, is_fixed, has_point;
-  Vector axis, point;  // the latter 0 where there is none
+  Vector axis, point;  // the point is 0 if there is none
   double speed, limit;
 };
 
@@ -82,8 +82,8 @@ class World {
   World& operator=(const World&) = delete;
 
   const Scene& scene() const { return *scene_; }
-  Mutex turn;          // of the thread that is in a call
-  ThreadId advancing{};  // which makes the steps of a frame, and lets go of its turn between them
+  Mutex turn;            // held by the thread in a call
+  ThreadId advancing{};  // thread that makes the steps of a frame, and unlocks `turn` between them
 
   // Steps.
   void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
@@ -92,9 +92,9 @@ class World {
   void set_job_system(ts_run_jobs function, void* user) { machine_->threads.use_host(function, user); }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
-  int32_t steps_due(double seconds);   // puts in the time of a frame
+  int32_t steps_due(double seconds);   // adds the time of a frame
   void step_in_time();
-  void end_frame();  // the time of steps that were due and not made is dropped
+  void end_frame();  // drops the time of due steps that were not made
   ts_before_step before_step() const { return before_step_; }
   void* user() const { return user_; }
   void write_clock(ts_clock* clock, int32_t steps_made) const;
@@ -102,7 +102,7 @@ class World {
 
   // Bodies.
   ts_body body_in(int32_t slot) const;
-  int32_t slot_of(ts_body body) const;  // fails for one that is not there
+  int32_t slot_of(ts_body body) const;  // fails for a removed body
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
   // The level of detail that fills a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
@@ -152,7 +152,7 @@ class World {
   double motor_speed(ts_motor motor);
   double motor_effort(ts_motor motor) const;
 
-  // All of them.
+  // All bodies.
   void wake();
   void set_gravity(const Vector& gravity);
   void set_friction(double friction);  // of the floor
@@ -179,7 +179,7 @@ class World {
   void teleport_collider(int32_t number, const Pose& pose);
   void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
 
-  // Frames and what hangs from them.
+  // Frames and attachments.
   int32_t add_frame(const Pose& pose);
   void remove_frame(int32_t number);
   void move_frame(int32_t number, const Pose& pose);
@@ -195,7 +195,7 @@ class World {
   void restore(const char* bytes, size_t size);
 
  private:
-  struct Holder {  // a place in a body: weights of four vertices
+  struct Holder {  // a point of a body: weights of four vertices
     int32_t vertices[4];
     double weights[4];
   };
@@ -205,29 +205,29 @@ class World {
     float axis[3], point[3], speed, limit;
     std::vector<int32_t> particles;
   };
-  struct Hanging {  // an attachment of a body whose level changes: vertices that it holds at both levels
+  struct Hanging {  // an attachment during a change of level: its vertices at both levels
     int32_t frame;
     bool feels;
     std::vector<int32_t> before, after;
   };
   class Packed;
 
-  struct Levels {  // of detail, by slot, and what pins stand for
+  struct Levels {  // levels of detail by slot, and the finest vertices of pins
     std::vector<int32_t> levels;
     std::vector<std::vector<int32_t>> held;
     size_t held_count() const;
   };
   Levels present_levels() const;
-  bool take_levels(const char** at, const SnapshotHead& head, Levels* found) const;
+  bool parse_levels(const char** at, const SnapshotHead& head, Levels* found) const;
   void bind();
-  uint32_t give_living();
+  uint32_t write_active_slots();
   Hit hit_from(const float* row) const;
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
   void require_image() const;
-  bool are_rows_in_order(const char* at, const SnapshotHead& head) const;
-  bool is_in_order(const Contact& contact, size_t colliders) const;
-  bool is_in_order(const Surroundings& given) const;
+  bool are_rows_valid(const char* at, const SnapshotHead& head) const;
+  bool is_valid(const Contact& contact, size_t colliders) const;
+  bool is_valid(const Surroundings& given) const;
   static bool are_frictions(const double* numbers, size_t count);
   void write_surroundings();
   bool is_floor(int32_t number) const;
@@ -235,11 +235,11 @@ class World {
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
   void take_down(double dt, const std::vector<int32_t>& frozen);
-  size_t frame(int32_t number) const;  // its row
-  std::vector<int32_t> hanging(int32_t slot, int32_t frame) const;
+  size_t frame(int32_t number) const;  // row of a frame
+  std::vector<int32_t> attached_vertices(int32_t slot, int32_t frame) const;
   bool is_felt(int32_t slot, const std::vector<int32_t>& vertices) const;
-  void let_go(int32_t slot, const std::vector<int32_t>& vertices);
-  size_t grab_of(ts_grab grab) const;  // its number
+  void detach_vertices(int32_t slot, const std::vector<int32_t>& vertices);
+  size_t grab_of(ts_grab grab) const;  // index of a grab
   void end_grab(size_t number);
   void write_patch(size_t number, int32_t slot, const Patch& patch);
   void read_levels();
@@ -251,19 +251,19 @@ class World {
   std::vector<int32_t> pinned(int32_t slot) const;
   std::vector<int32_t> nearest_at(int32_t slot, std::vector<int32_t> finest, int32_t level) const;
   std::vector<int32_t> finest_held(int32_t slot) const;
-  std::map<int32_t, Hanging> hanging_at(int32_t slot, const std::vector<int32_t>& held, int32_t level) const;
+  std::map<int32_t, Hanging> attachments_at_level(int32_t slot, const std::vector<int32_t>& held, int32_t level) const;
   void make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                  std::map<int32_t, Hanging>* attached);
-  void hang_on(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const;
-  Vector place_of_grab(size_t number) const;
+  void attach_at_level(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const;
+  Vector rest_point_of_grab(size_t number) const;
   void hold_at(size_t number, const Vector& place);
   std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
   Vector vertex_place(int32_t slot, int32_t vertex) const;
   std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
   double follow_speed(int32_t slot, std::vector<int32_t> held) const;
-  size_t joint_of(ts_joint joint) const;  // its number
-  size_t joint_rows() const;              // particles that all joints hold together
+  size_t joint_of(ts_joint joint) const;  // index of a joint
+  size_t joint_rows() const;              // number of particles of all joints
   void end_joint(size_t number);
   void joints_have_changed();
   Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const;
@@ -273,14 +273,14 @@ class World {
   size_t motor_of(ts_motor motor) const;
   size_t motor_rows() const;
   void end_motor(size_t number);
-  bool are_joints_in_order(const Packed& packed, const SnapshotHead& head) const;
-  bool are_motors_in_order(const Packed& packed, const SnapshotHead& head) const;
+  bool are_joints_valid(const Packed& packed, const SnapshotHead& head) const;
+  bool are_motors_valid(const Packed& packed, const SnapshotHead& head) const;
   bool lies_in(int32_t particle, int32_t slot, int32_t level) const;
   void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);
-  void rouse(int32_t slot);  // -1 for all
+  void mark_modified(int32_t slot);  // wakes a body, and discards cached frames; -1 for all
   void wake_slot(int32_t slot);
   void wake_near(const Box& box);
   Box box_of(int32_t slot) const;
@@ -299,27 +299,27 @@ class World {
   std::vector<ColliderMotion> motion_;
   Events events_;
   Surroundings surroundings_;
-  std::vector<double> friction_;  // of each body against others
-  std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
-                                         // and place, (f, 12)
+  std::vector<double> friction_;  // of each body against other bodies
+  std::vector<float> present_, coming_;  // frames after the last and the next step: rotation by rows
+                                         // and position, (f, 12)
   std::vector<unsigned char> frame_alive_;
-  std::vector<int32_t> levels_;             // of detail, that fill the slots, also of nobody
-  std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser one stand for
-  std::vector<int32_t> attachments_;        // of each particle: which attachment of its body holds it, or 0
-  std::vector<unsigned char> feels_;  // of each particle: it hangs from a frame, which is asked for its load
+  std::vector<int32_t> levels_;             // level of detail in each slot, even in empty ones
+  std::vector<std::vector<int32_t>> held_;  // finest vertices of pins at a coarser level
+  std::vector<int32_t> attachments_;        // by particle: attachment of its body that holds it, or 0
+  std::vector<unsigned char> feels_;  // by particle: 1 if its frame reports its load
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
-  int32_t steps_left_ = 0;  // of the present frame
-  double picture_ = 1.0;  // how far what is drawn is from the previous step to the last one
+  int32_t steps_left_ = 0;  // of the current frame
+  double picture_ = 1.0;  // interpolation from the previous step to the last one
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;
-  bool has_work_ = true;   // some pinned particle has somewhere to go, or has just arrived
-  bool is_still_ = false;  // none was awake after the last step, and nothing was changed since
-  double rows_at_ = -1.0;  // alpha of what was read of all bodies; below 0 once they have moved on
+  bool has_work_ = true;   // a pinned particle has a target, or has just reached it
+  bool is_still_ = false;  // all bodies slept after the last step, and nothing has changed since
+  double rows_at_ = -1.0;  // alpha of the cached positions; below 0 if they are outdated
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
@@ -329,12 +329,12 @@ class World {
   Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;
   Field<int32_t> joint_bodies_, joint_span_;
   Field<float> joint_impulse_;
-  Field<int32_t> motor_wholes_[6], motor_particle_;  // body, first and end, turns, is_fixed, has_point
+  Field<int32_t> motor_wholes_[6], motor_particle_;  // body, first, end, turns, is_fixed, has_point
   Field<float> motor_axis_, motor_point_, motor_speed_, motor_limit_, motor_impulse_;
   Field<float> collider_[7], collider_parameters_, collider_surface_;
   Field<int32_t> collider_kind_, collider_filter_, collider_count_;
   size_t collider_room_ = 0;
-  std::vector<Field<float>> constants_;  // of tetrahedra, where any asset has levels
+  std::vector<Field<float>> constants_;  // constants of tetrahedra, if any asset has levels
   Field<int32_t> body_blocks_;
 };
 

@@ -8,7 +8,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr ts_body kBody = uint64_t(3) << 56;  // what a body's handle begins with, and no other handle
+constexpr ts_body kBody = uint64_t(3) << 56;  // prefix of body handles
 
 }  // namespace
 
@@ -22,12 +22,12 @@ ts_body World::body_in(int32_t slot) const {
 int32_t World::slot_of(ts_body body) const {
   const int64_t slot = int64_t(body & 0xFFFFFFFFu) - 1;
   if (slot < 0 || slot >= scene_->slot_count || body_in(int32_t(slot)) != body) {
-    fail(TS_ERROR_HANDLE, "body %llu is not in this world, or was taken out", static_cast<unsigned long long>(body));
+    fail(TS_ERROR_HANDLE, "body %llu is not in this world, or was removed", static_cast<unsigned long long>(body));
   }
   return static_cast<int32_t>(slot);
 }
 
-// By what a body touches colliders, its vertices being at `x`.
+// Contact points of a body whose vertices are at `x`.
 std::vector<Vector> World::touching_points(const Asset& asset, const std::vector<Vector>& x) const {
   std::vector<Vector> found;
   if (asset.hull.count == 0) {
@@ -61,12 +61,12 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
     highest = std::max(highest, x[v][2]);
   }
   if (!(farthest < scene_->position_limit)) {
-    fail(TS_ERROR_ARGUMENT, "position puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
+    fail(TS_ERROR_ARGUMENT, "position puts the body beyond %g m: move it closer to the origin", scene_->position_limit);
   }
   double lowest = std::numeric_limits<double>::infinity();
   for (const Vector& each : touching_points(asset, x)) lowest = std::min(lowest, each[2]);
   if (scene_->has_floor && lowest < scene_->floor - 1e-3 * (highest - lowest)) {
-    fail(TS_ERROR_ARGUMENT, "the body would begin %.4g m below the floor: raise it", scene_->floor - lowest);
+    fail(TS_ERROR_ARGUMENT, "position starts the body %.4g m below the floor: raise it", scene_->floor - lowest);
   }
   if (spin[0] != 0.0 || spin[1] != 0.0 || spin[2] != 0.0) {
     Vector center = turned(asset.center, rows);
@@ -84,7 +84,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
       }
     }
     if (!(fastest < scene_->velocity_limit)) {
-      fail(TS_ERROR_ARGUMENT, "spin makes a vertex %.4g m/s fast: stay below %g", fastest, scene_->velocity_limit);
+      fail(TS_ERROR_ARGUMENT, "spin moves a vertex at %.4g m/s: stay below %g", fastest, scene_->velocity_limit);
     }
   }
   for (int32_t v : asset.pinned) found[8 * v + 3] = found[8 * v + 4] = found[8 * v + 5] = 0.0f;
@@ -99,14 +99,14 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
   int32_t slot = 0;
   while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || body_status_(slot) != kAbsent)) ++slot;
   if (slot == scene_->slot_count) {
-    fail(TS_ERROR_STATE, "all %d bodies of asset %d live: reserve more before exporting, or despawn one",
+    fail(TS_ERROR_STATE, "all %d bodies of asset %d are in use: reserve more before exporting, or despawn one",
          scene_->assets[asset].slot_count, asset);
   }
   const std::vector<float> rows = place_rows(scene_->assets[asset], place, turn, drift, spin);
   if (levels_[size_t(slot)] != 0) {
     refill(slot, 0);
   } else if (scene_->assets[size_t(asset)].level_count() > 1) {
-    write_kind(slot);  // a snapshot may have brought along what an earlier body had here
+    write_kind(slot);  // a snapshot may have restored data of an earlier body
   }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
   machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
@@ -131,7 +131,7 @@ void World::despawn(int32_t slot) {
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
-  body_drives_(slot) &= ~kMovesPins;  // or what hung from a frame would be aimed for ever
+  body_drives_(slot) &= ~kMovesPins;  // otherwise attached vertices would keep their targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 
@@ -196,7 +196,7 @@ std::vector<int32_t> World::checked(int32_t slot, Vertices which, bool may_be_al
   const size_t n = asset_of(slot).vertex_count();
   std::vector<int32_t> found;
   if (which.count == 0) {
-    if (!may_be_all) fail(TS_ERROR_ARGUMENT, "no vertex is named: name at least one, from 0 to %zu", n - 1);
+    if (!may_be_all) fail(TS_ERROR_ARGUMENT, "the list of vertices is empty: give at least one, from 0 to %zu", n - 1);
     for (size_t v = 0; v < n; ++v) found.push_back(int32_t(v));
     return found;
   }
@@ -236,10 +236,10 @@ void World::set_velocity(int32_t slot, const Vector& linear, const Vector& spin)
                    {Machine::whole(slot), Machine::array(machine_->numbers, 6),
                     Machine::array(machine_->found, 1)});
   if (!(*fastest < scene_->velocity_limit)) {
-    fail(TS_ERROR_ARGUMENT, "some vertices would be %.4g m/s fast: keep below %g", double(*fastest),
+    fail(TS_ERROR_ARGUMENT, "some vertices would reach %.4g m/s: stay below %g", double(*fastest),
          scene_->velocity_limit);
   }
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn, bool keeps_velocity) {
@@ -257,12 +257,12 @@ void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn,
                             Machine::array(machine_->rows, 3, 3),
                             Machine::array(machine_->found, 3)});
   if (!(found[2] < scene_->position_limit)) {
-    fail(TS_ERROR_ARGUMENT, "center puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
+    fail(TS_ERROR_ARGUMENT, "center puts the body beyond %g m: move it closer to the origin", scene_->position_limit);
   }
   if (found[0] < lowest - 1e-3 * (found[1] - found[0])) {
     fail(TS_ERROR_ARGUMENT, "center puts the body %.4g m below the floor: raise it", lowest - found[0]);
   }
-  rouse(slot);
+  mark_modified(slot);
   wake_near(left);
 }
 
@@ -271,7 +271,7 @@ void World::apply_impulse(int32_t slot, const Vector& impulse, Vertices which) {
   const double mass = mass_of(slot, vertices);
   const Vector change = {impulse[0] / mass, impulse[1] / mass, impulse[2] / mass};
   if (!(length_of(change) < scene_->velocity_limit)) {
-    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", length_of(change),
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: stay below %g", length_of(change),
          scene_->velocity_limit);
   }
   give_rows(slot, vertices);
@@ -280,7 +280,7 @@ void World::apply_impulse(int32_t slot, const Vector& impulse, Vertices which) {
   machine_->launch("add_velocity",
                    {Machine::array(machine_->rows, uint32_t(vertices.size())),
                     Machine::array(machine_->numbers, 3)});
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
@@ -290,7 +290,7 @@ void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
   for (int k = 0; k < 3; ++k) {
     const double acceleration = force[k] / mass;
     if (!(std::fabs(acceleration) < scene_->push_limit)) {
-      fail(TS_ERROR_ARGUMENT, "force would accelerate vertices by %.4g m/s^2: keep below %g", acceleration,
+      fail(TS_ERROR_ARGUMENT, "force would accelerate vertices by %.4g m/s^2: stay below %g", acceleration,
            scene_->push_limit);
     }
     numbers[k] = as_float(acceleration);
@@ -299,7 +299,7 @@ void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
   machine_->launch("add_push", {Machine::whole(slot),
                                 Machine::array(machine_->rows, uint32_t(vertices.size())),
                                 Machine::array(machine_->numbers, 3)});
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point, double radius) {
@@ -312,31 +312,31 @@ void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point,
                    {Machine::whole(slot), Machine::array(machine_->numbers, 7),
                     Machine::array(machine_->found, 2)});
   if (!(found[1] < scene_->velocity_limit)) {
-    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", found[1],
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: stay below %g", found[1],
          scene_->velocity_limit);
   }
   if (found[0] >= radius) {
     fail(TS_ERROR_ARGUMENT, "point is %.4g m from the nearest vertex, beyond radius: aim at the body", found[0]);
   }
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::set_gravity_scale(int32_t slot, double scale) {
   if (!(std::fabs(scale) <= 1e3)) fail(TS_ERROR_ARGUMENT, "scale is %g: give -1000 to 1000", scale);
   gravity_scale_(slot) = as_float(scale);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::set_damping(int32_t slot, double rate) {
   if (!(rate >= 0.0 && rate <= 1e6)) fail(TS_ERROR_ARGUMENT, "rate is %g: give 0 to 1e6 per second", rate);
   damping_(slot) = as_float(rate);
   body_drives_(slot) = (body_drives_(slot) & ~kDamped) | (as_float(rate) > 0.0f ? kDamped : 0);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::set_sheltered(int32_t slot, bool is_sheltered) {
   body_drives_(slot) = (body_drives_(slot) & ~kSheltered) | (is_sheltered ? kSheltered : 0);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::pin(int32_t slot, Vertices which) {
@@ -345,7 +345,7 @@ void World::pin(int32_t slot, Vertices which) {
   give_rows(slot, vertices);
   machine_->launch("pin_particles",
                    {Machine::array(machine_->rows, uint32_t(vertices.size()))});
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::unpin(int32_t slot, Vertices which) {
@@ -356,19 +356,19 @@ void World::unpin(int32_t slot, Vertices which) {
       return inv_mass_(p) != 0.0f || particle_aim_(p) >= kWithFrame;
     };
     vertices.erase(std::remove_if(vertices.begin(), vertices.end(), stays), vertices.end());
-    if (vertices.empty()) return rouse(slot);
+    if (vertices.empty()) return mark_modified(slot);
   } else {
     require_unattached(slot, vertices);
   }
   give_rows(slot, vertices);
   machine_->launch("free_particles",
                    {Machine::array(machine_->rows, uint32_t(vertices.size()))});
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::set_targets(int32_t slot, Vertices which, const float* targets) {
   const std::vector<int32_t> vertices = checked(slot, which, false);
-  if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is named twice: name each once");
+  if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is given twice: give each one once");
   std::vector<float> rows(3 * which.count);
   scene_->axes.rows_in(targets, which.count, rows.data());
   for (float each : rows) {
@@ -390,11 +390,11 @@ void World::set_targets(int32_t slot, Vertices which, const float* targets) {
                                      Machine::array(machine_->vertices, count, 3),
                                      Machine::array(machine_->found, 1)});
   if (*loose >= 0) fail(TS_ERROR_STATE, "vertex %d is not pinned: call ts_body_pin first", vertices[size_t(*loose)]);
-  rouse(slot);
+  mark_modified(slot);
   has_work_ = true;
 }
 
-// ---- all of them ----
+// ---- all bodies ----
 
 void World::set_wind(const Vector& velocity, double density, double drag) {
   for (double each : velocity) {
@@ -408,7 +408,7 @@ void World::set_wind(const Vector& velocity, double density, double drag) {
   for (int k = 0; k < 4; ++k) differs = differs || given[k] != wind_(0, k);
   if (!differs) return;
   for (int k = 0; k < 4; ++k) wind_(0, k) = given[k];
-  rouse(-1);
+  mark_modified(-1);
 }
 
 void World::radial_impulse(const Vector& center, double impulse, double radius) {
@@ -422,7 +422,7 @@ void World::radial_impulse(const Vector& center, double impulse, double radius) 
                    {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, 5),
                     Machine::array(machine_->found, 1)});
   if (!(*highest < scene_->velocity_limit)) {
-    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", double(*highest),
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: stay below %g", double(*highest),
          scene_->velocity_limit);
   }
   is_still_ = false;

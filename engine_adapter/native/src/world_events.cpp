@@ -1,4 +1,4 @@
-// What happened: what is read of the fields for it.
+// Events: reads contacts and sleep from the fields.
 
 #include <algorithm>
 
@@ -14,7 +14,7 @@ Present World::present() const {
   return found;
 }
 
-// Who touched whom in the last step, which is forgotten, and who sleeps.
+// Reads and clears the contacts of the last step, and reads which bodies sleep.
 std::map<Pair, std::array<float, 3>> World::look() {
   const uint32_t numbers = uint32_t(events_.status.size()), rows = uint32_t(events_.touch_rows);
   int32_t* status = machine_->numbers.room<int32_t>(numbers);
@@ -40,7 +40,7 @@ void World::record_events(int32_t kinds) {
   }
   if (!scene_->has_contact) {
     if (kinds != 0 && (kinds & ~kContacts) == 0) {
-      fail(TS_ERROR_STATE, "contacts are not seen in a world without colliders and soft contact: export it with them");
+      fail(TS_ERROR_STATE, "contact events need colliders or soft contact: export the world with them");
     }
     kinds &= ~kContacts;
   }

@@ -1,4 +1,4 @@
-// Frames, and what hangs from them: as taichi_soft/control/frames.py and attachments.py have it.
+// Frames and attachments, the same as taichi_soft/control/frames.py and attachments.py.
 
 #include <algorithm>
 
@@ -19,7 +19,7 @@ void write_pose(const Pose& pose, float* row) {
 
 size_t World::frame(int32_t number) const {
   if (number < 0 || size_t(number) >= frame_alive_.size() || frame_alive_[size_t(number)] == 0) {
-    fail(TS_ERROR_ARGUMENT, "there is no frame %d, or no more", number);
+    fail(TS_ERROR_ARGUMENT, "frame %d does not exist, or was removed", number);
   }
   return size_t(number);
 }
@@ -27,7 +27,7 @@ size_t World::frame(int32_t number) const {
 int32_t World::add_frame(const Pose& pose) {
   size_t row = 0;
   while (row < frame_alive_.size() && frame_alive_[row] != 0) ++row;
-  if (row >= kMostFrames) fail(TS_ERROR_STATE, "there are %zu frames: take one out first", row);
+  if (row >= kMostFrames) fail(TS_ERROR_STATE, "there are %zu frames: remove one first", row);
   if (row == frame_alive_.size()) {
     present_.resize(12 * (row + 1));
     coming_.resize(12 * (row + 1));
@@ -42,7 +42,7 @@ int32_t World::add_frame(const Pose& pose) {
 void World::remove_frame(int32_t number) {
   const size_t row = frame(number);
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    if (body_status_(slot) != kAbsent) let_go(slot, hanging(slot, number));
+    if (body_status_(slot) != kAbsent) detach_vertices(slot, attached_vertices(slot, number));
   }
   frame_alive_[row] = 0;
 }
@@ -56,8 +56,8 @@ Pose World::frame_pose(int32_t number) const {
   return {{row[9], row[10], row[11]}, quaternion_of(turn)};
 }
 
-// Vertices that hang from a frame, or from any for -1.
-std::vector<int32_t> World::hanging(int32_t slot, int32_t number) const {
+// Vertices that are attached to a frame, or to any frame for -1.
+std::vector<int32_t> World::attached_vertices(int32_t slot, int32_t number) const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {
     const int32_t aim = particle_aim_(particle(slot, v)) - kWithFrame;
@@ -88,23 +88,23 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
     if (scene_->is_implicit) particle_contact_(p) = 0;
   }
   body_drives_(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
-  rouse(slot);
+  mark_modified(slot);
   has_work_ = true;
 }
 
 void World::detach(int32_t slot, Vertices which) {
   std::vector<int32_t> vertices = checked(slot, which, true);
-  const std::vector<int32_t> held = hanging(slot, -1);
+  const std::vector<int32_t> held = attached_vertices(slot, -1);
   if (which.count == 0) vertices = held;
   for (int32_t vertex : vertices) {
     if (!std::binary_search(held.begin(), held.end(), vertex)) {
-      fail(TS_ERROR_STATE, "vertex %d of the body in slot %d hangs from no frame", vertex, slot);
+      fail(TS_ERROR_STATE, "vertex %d of the body in slot %d is not attached to a frame", vertex, slot);
     }
   }
-  let_go(slot, vertices);
+  detach_vertices(slot, vertices);
 }
 
-void World::let_go(int32_t slot, const std::vector<int32_t>& vertices) {
+void World::detach_vertices(int32_t slot, const std::vector<int32_t>& vertices) {
   if (vertices.empty()) return;
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
@@ -113,8 +113,8 @@ void World::let_go(int32_t slot, const std::vector<int32_t>& vertices) {
     feels_[p] = 0;
     attachments_[p] = 0;
   }
-  if (!is_felt(slot, hanging(slot, -1))) body_drives_(slot) &= ~kFeelsReaction;
-  rouse(slot);
+  if (!is_felt(slot, attached_vertices(slot, -1))) body_drives_(slot) &= ~kFeelsReaction;
+  mark_modified(slot);
 }
 
 bool World::is_felt(int32_t slot, const std::vector<int32_t>& vertices) const {
@@ -124,10 +124,10 @@ bool World::is_felt(int32_t slot, const std::vector<int32_t>& vertices) const {
 
 void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) const {
   const float* origin = present_.data() + 12 * frame(number) + 9;
-  const std::vector<int32_t> vertices = hanging(slot, number);
-  if (vertices.empty()) fail(TS_ERROR_STATE, "the body in slot %d does not hang from frame %d", slot, number);
+  const std::vector<int32_t> vertices = attached_vertices(slot, number);
+  if (vertices.empty()) fail(TS_ERROR_STATE, "the body in slot %d is not attached to frame %d", slot, number);
   if (!is_felt(slot, vertices)) {
-    fail(TS_ERROR_STATE, "what the body in slot %d pulls with is not felt: attach it with feels of 1", slot);
+    fail(TS_ERROR_STATE, "the load of the body in slot %d is not recorded: attach it with feels = 1", slot);
   }
   Vector impulse = {0.0, 0.0, 0.0}, moment = {0.0, 0.0, 0.0};
   for (int32_t vertex : vertices) {

@@ -1,4 +1,4 @@
-// Hands on bodies: as taichi_soft/control/grabs.py has it.
+// Grabs, the same as taichi_soft/control/grabs.py.
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr ts_grab kGrab = uint64_t(4) << 56;  // what a grab's handle begins with, and no other handle
+constexpr ts_grab kGrab = uint64_t(4) << 56;  // prefix of grab handles
 constexpr double kTwoPi = 6.283185307179586;
 
 }  // namespace
@@ -35,20 +35,20 @@ size_t World::grab_of(ts_grab grab) const {
 ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const Vector& point, double frequency,
                     double max_force) {
   const Asset& asset = asset_of(slot);
-  if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to take hold of", slot);
+  if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to grab", slot);
   if (triangle < 0 || size_t(triangle) >= asset.surface.count / 3) {
     fail(TS_ERROR_ARGUMENT, "triangle is %d: there are %zu, from 0", triangle, asset.surface.count / 3);
   }
   double sum = 0.0, weights[3];
   for (int i = 0; i < 3; ++i) sum = sum + given[i];
   if (!(std::min({given[0], given[1], given[2]}) >= -1e-3) || !(std::fabs(sum - 1.0) <= 1e-3)) {
-    fail(TS_ERROR_ARGUMENT, "weights must be 0 or more and add up to 1, and they are %g, %g and %g", given[0], given[1],
+    fail(TS_ERROR_ARGUMENT, "weights must be 0 or more and have the sum 1, got %g, %g and %g", given[0], given[1],
          given[2]);
   }
   if (!(frequency >= 1e-3 && frequency <= 1e3)) {
     fail(TS_ERROR_ARGUMENT, "frequency is %g Hz: give 0.001 to 1000", frequency);
   }
-  if (!(max_force <= 1e20)) fail(TS_ERROR_ARGUMENT, "max_force is %g N, too much", max_force);
+  if (!(max_force <= 1e20)) fail(TS_ERROR_ARGUMENT, "max_force is %g N: give at most 1e20", max_force);
   size_t g = 0;
   while (g < kMostGrabs && grab_body_(g) != 0) ++g;
   if (g == kMostGrabs) fail(TS_ERROR_STATE, "all %zu grabs of this world are in use: release one first", kMostGrabs);
@@ -61,7 +61,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   for (double each : asset.masses) mass += each;
   const double strongest = max_force < 0.0 ? scene_->pull_in_weights * mass : max_force;
   const int32_t* corners = asset.surface.data + 3 * triangle;
-  const Patch patch = patch_round(*scene_, asset, corners, weights, 3);
+  const Patch patch = patch_around(*scene_, asset, corners, weights, 3);
 
   grab_body_(g) = slot + 1;
   for (size_t i = 0; i < kGrabCorners; ++i) {
@@ -79,7 +79,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   write_patch(g, slot, patch);
   body_drives_(slot) |= kGrabbed;
   grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
-  rouse(slot);
+  mark_modified(slot);
   return grab_at(int32_t(g));
 }
 
@@ -94,7 +94,7 @@ void World::write_patch(size_t g, int32_t slot, const Patch& patch) {
 void World::move_grab(ts_grab grab, const Vector& point) {
   const size_t g = grab_of(grab);
   for (int k = 0; k < 3; ++k) grab_target_(g, k) = as_float(point[k]);
-  rouse(grab_body_(g) - 1);
+  mark_modified(grab_body_(g) - 1);
 }
 
 void World::release(ts_grab grab) { end_grab(grab_of(grab)); }
@@ -105,7 +105,7 @@ void World::end_grab(size_t g) {
   bool is_held = false;
   for (size_t each = 0; each < kMostGrabs; ++each) is_held = is_held || grab_body_(each) == body;
   if (!is_held) body_drives_(body - 1) &= ~kGrabbed;
-  rouse(body - 1);
+  mark_modified(body - 1);
 }
 
 Vector World::grab_force(ts_grab grab) const {

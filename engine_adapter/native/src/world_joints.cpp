@@ -1,4 +1,4 @@
-// Joints: as taichi_soft/control/joints.py and embedding.py have them.
+// Joints, the same as taichi_soft/control/joints.py and embedding.py.
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr ts_joint kJoint = uint64_t(5) << 56;  // what a joint's handle begins with, and no other handle
+constexpr ts_joint kJoint = uint64_t(5) << 56;  // prefix of joint handles
 constexpr double kFarthest = -0.5, kDraw = 0.25, kLeastWeight = 1e-4;
 
 }  // namespace
@@ -22,12 +22,12 @@ Vector World::vertex_place(int32_t slot, int32_t vertex) const {
   return {position_(p, 0), position_(p, 1), position_(p, 2)};
 }
 
-// Where vertices of `slot` lie in the tetrahedra of `other`, both as they are now.
+// Positions of vertices of `slot` in the tetrahedra of `other`, in their current shapes.
 std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
     fail(TS_ERROR_ARGUMENT,
-         "the body in slot %d has no tetrahedra to hold by: join it to the other one instead, or name vertices by onto",
+         "the body in slot %d has no tetrahedra: join it to the other body instead, or give vertices in onto",
          other);
   }
   std::vector<Coordinates> solids;
@@ -55,13 +55,13 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
     }
     if (!(highest >= kFarthest)) {
       fail(TS_ERROR_ARGUMENT,
-           "vertex %d of the body in slot %d is too far from the one in slot %d: bring the two together first, or name "
-           "vertices by onto",
+           "vertex %d of the body in slot %d is too far from the one in slot %d: move the two together first, or give "
+           "vertices in onto",
            vertex, slot, other);
     }
     double sum = 0.0;
     for (double& each : best.weights) {
-      if (std::fabs(each) < kLeastWeight) each = 0.0;  // or neighbours would be held by what is none of theirs
+      if (std::fabs(each) < kLeastWeight) each = 0.0;  // rounding must not involve other vertices
       sum += each;
     }
     for (double& each : best.weights) each = each / sum;
@@ -70,7 +70,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
   return holders;
 }
 
-// Vertices of `other` themselves, each by the first tetrahedron that has it, if there is one.
+// Vertices of `other`, each through the first tetrahedron that contains it, if any.
 std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<int32_t>& partners) const {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   std::vector<Holder> holders;
@@ -88,7 +88,7 @@ std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<in
   return holders;
 }
 
-// [m/s] at which what is held of a body may follow.
+// Largest speed at which held vertices can follow [m/s].
 double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
   const Asset& asset = asset_of(slot);
   std::sort(held.begin(), held.end());
@@ -123,14 +123,14 @@ size_t World::joint_of(ts_joint joint) const {
 }
 
 ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t* onto) {
-  if (other == slot) fail(TS_ERROR_ARGUMENT, "other is the body itself: name another one");
+  if (other == slot) fail(TS_ERROR_ARGUMENT, "other is the body itself: give another body");
   const std::vector<int32_t> vertices = checked(slot, which, false);
   std::vector<Holder> holders;
   if (onto == nullptr) {
     holders = holders_at(slot, vertices, other);
   } else {
     checked(other, {onto, which.count}, false);
-    if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is named twice: name each once");
+    if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is given twice: give each one once");
     std::vector<std::pair<int32_t, int32_t>> pairs;
     for (size_t i = 0; i < which.count; ++i) pairs.push_back({which.numbers[i], onto[i]});
     std::sort(pairs.begin(), pairs.end());
@@ -138,17 +138,17 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
     for (const auto& pair : pairs) partners.push_back(pair.second);
     holders = holders_on(other, partners);
   }
-  if (scene_->is_implicit) fail(TS_ERROR_STATE, "implicit_euler has no joints: export a world with leapfrog");
+  if (scene_->is_implicit) fail(TS_ERROR_STATE, "implicit_euler does not support joints: export a world with leapfrog");
   if (!scene_->has_contact) {
     fail(TS_ERROR_STATE,
-         "joints need bodies that are stepped together: export a world with soft_contact, or with collider_room=1");
+         "joints need a world with contact: export it with soft_contact, or with collider_room=1");
   }
   size_t j = 0;
   while (j < kMostJoints && joint_bodies_(j, 0) != 0) ++j;
   if (j == kMostJoints) fail(TS_ERROR_STATE, "all %zu joints of this world are in use: release one first", kMostJoints);
   const size_t used = joint_rows(), n = vertices.size();
   if (used + n > kJointRows) {
-    fail(TS_ERROR_STATE, "the joints of a world hold at most %zu particles, and %zu are held: release a joint first",
+    fail(TS_ERROR_STATE, "the joints of a world have at most %zu particles, and %zu are in use: release a joint first",
          kJointRows, used);
   }
   std::vector<int32_t> holding;
@@ -170,7 +170,7 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
                                    Machine::whole(int32_t(used)), Machine::real(speed),
                                    Machine::array(machine_->rows, count, kJointEnds),
                                    Machine::array(machine_->vertices, count, kJointEnds)});
-  rouse(slot);
+  mark_modified(slot);
   joint_generations_[j] = (joint_generations_[j] + 1) & 0xFFFFFF;
   joints_have_changed();
   return joint_at(int32_t(j));
@@ -182,11 +182,11 @@ void World::end_joint(size_t j) {
   const int32_t body = joint_bodies_(j, 0) - 1;
   wake_slot(joint_bodies_(j, 1) - 1);
   machine_->launch("end_joint", {Machine::whole(int32_t(j))});
-  rouse(body);
+  mark_modified(body);
   joints_have_changed();
 }
 
-// Bodies that are joined are stepped together, also where no step looks for who touches whom.
+// Joined bodies are stepped together, even in worlds without a contact search.
 void World::joints_have_changed() {
   if (!scene_->has_contact || scene_->has_soft_contact) return;
   machine_->launch("list_joined_islands", {Machine::whole(scene_->slot_count)});

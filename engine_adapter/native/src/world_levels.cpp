@@ -1,4 +1,4 @@
-// Levels of detail: as taichi_soft/levels/level_change.py and reattaching.py have them.
+// Levels of detail, the same as taichi_soft/levels/level_change.py and reattaching.py.
 
 #include <algorithm>
 #include <limits>
@@ -19,7 +19,7 @@ Argument array_of(const Archive::View<Number>& view, size_t width = 0) {
 
 }  // namespace
 
-// What a world file says of levels, and whether slots have room for them.
+// Reads levels from the world file, and checks that they fit the slots.
 void World::read_levels() {
   const Archive& archive = scene_->archive;
   const size_t slots = size_t(scene_->slot_count);
@@ -38,7 +38,7 @@ void World::read_levels() {
     for (int32_t i = 0; is_whole && i < counts[slot]; ++i) held_[slot].push_back(held[at++]);
     is_whole = is_whole && are_held(int32_t(slot), held_[slot]);
   }
-  if (!is_whole || at != held.count) fail(TS_ERROR_FILE, "the world file is not in order: levels. Export it again");
+  if (!is_whole || at != held.count) fail(TS_ERROR_FILE, "the world file is invalid: levels. Export it again");
   if (!scene_->has_levels) return;
   const auto count_of = [&](const std::string& field) { return scene_->place(field).count; };
   const auto fits = [&](const std::string& range, size_t slot, size_t most, size_t each, size_t rows) {
@@ -75,17 +75,17 @@ void World::read_levels() {
                       rows.touching_triangles.count / 3) &&
                  fits("hull.body_points", slot, count_of("hull.carriers"), 1, rows.carriers.count / 4);
     }
-    if (!is_there) fail(TS_ERROR_FILE, "the world file is not in order: a level of detail. Export it again");
+    if (!is_there) fail(TS_ERROR_FILE, "the world file is invalid: a level of detail. Export it again");
   }
 }
 
-// Whether these can be vertices of the finest level of the body in a slot.
+// True if these are valid vertices of the finest level of the body in a slot.
 bool World::are_held(int32_t slot, const std::vector<int32_t>& vertices) const {
   const size_t n = whole_of(slot).vertex_count();
   return std::all_of(vertices.begin(), vertices.end(), [n](int32_t v) { return v >= 0 && size_t(v) < n; });
 }
 
-// Writes a level of a body's asset into its slot, in the middle of its motion.
+// Writes a level of a body's asset into its slot, with the current motion.
 void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status) {
   const Asset& asset = whole_of(slot).level(size_t(level));
   const SlotRows& rows = asset.rows;
@@ -118,7 +118,7 @@ void World::write_kind(int32_t slot) {
   machine_->launch("write_kind", {Machine::whole(slot), array_of(asset_of(slot).rows.kind)});
 }
 
-// Writes the whole body of a level, at rest, into a slot where another one was.
+// Writes a complete body of a level, at rest, into a reused slot.
 void World::refill(int32_t slot, int32_t level) {
   write_slot(slot, level, Motion(whole_of(slot).level(size_t(level)).vertex_count()), kAbsent);
 }
@@ -140,8 +140,8 @@ void World::require_change(int32_t slot, int32_t level, bool may_release) const 
   for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || motor_wholes_[0](m) == slot + 1;
   if ((has_joints || has_motors) && !may_release) {
     fail(TS_ERROR_STATE,
-         "the body in slot %d has %s%s%s that name its vertices: release or remove them before its level changes, or "
-         "let ts_body_set_level do so with release of 1",
+         "the body in slot %d has %s%s%s on its vertices: release or remove them before changing its level, or "
+         "call ts_body_set_level with release = 1",
          slot, has_joints ? "joints" : "", has_joints && has_motors ? " and " : "", has_motors ? "motors" : "");
   }
   if (body_status_(slot) == kFrozen) {
@@ -157,7 +157,7 @@ std::vector<int32_t> World::pinned(int32_t slot) const {
   return found;
 }
 
-// Vertices of a level that are nearest to some of the finest.
+// Vertices of a level that are nearest to given vertices of the finest level.
 std::vector<int32_t> World::nearest_at(int32_t slot, std::vector<int32_t> finest, int32_t level) const {
   const Asset& asset = whole_of(slot);
   if (level != 0) return nearest_vertices(asset, finest, asset.level(size_t(level)));
@@ -166,7 +166,7 @@ std::vector<int32_t> World::nearest_at(int32_t slot, std::vector<int32_t> finest
   return finest;
 }
 
-// Vertices of the finest level that what is held now stands for.
+// Vertices of the finest level that the held vertices represent.
 std::vector<int32_t> World::finest_held(int32_t slot) const {
   const std::vector<int32_t> present = pinned(slot), &held = held_[size_t(slot)];
   const int32_t level = level_of(slot);
@@ -175,8 +175,8 @@ std::vector<int32_t> World::finest_held(int32_t slot) const {
   return nearest_of_each(asset_of(slot), present, whole_of(slot));
 }
 
-// What attachments will hold at another level, of which `held` are to be held: their vertices there, by number.
-std::map<int32_t, World::Hanging> World::hanging_at(int32_t slot, const std::vector<int32_t>& held,
+// Vertices of attachments at another level with the held vertices `held`, by attachment.
+std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, const std::vector<int32_t>& held,
                                                     int32_t level) const {
   std::map<int32_t, Hanging> found;
   const std::vector<int32_t> sources = pinned(slot);
@@ -197,7 +197,7 @@ std::map<int32_t, World::Hanging> World::hanging_at(int32_t slot, const std::vec
   return found;
 }
 
-// Releases what has no place at another level, and finds what is held there.
+// Releases constraints that have no vertex at another level, and finds the held vertices there.
 void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                       std::map<int32_t, Hanging>* attached) {
   for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
@@ -206,30 +206,30 @@ void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector
   for (size_t m = 0; m < kMostMotors; ++m) {
     if (motor_wholes_[0](m) == slot + 1) end_motor(m);
   }
-  for (bool is_done = false; !is_done;) {  // without what was released fewer are held, and others may have no place
+  for (bool is_done = false; !is_done;) {  // a release reduces the held vertices, so others may lose theirs
     std::vector<int32_t> finest = finest_held(slot);
     *held = nearest_at(slot, finest, level);
-    *attached = hanging_at(slot, *held, level);
+    *attached = attachments_at_level(slot, *held, level);
     is_done = true;
     std::vector<int32_t> homeless;
     for (const auto& each : *attached) {
       if (!each.second.after.empty()) continue;
       if (!may_release) {
         fail(TS_ERROR_STATE,
-             "what hangs from frame %d would hold nothing at level %d, where its vertices have no place of their own: "
-             "release it by ts_body_detach before the level changes, or let ts_body_set_level do so with release of 1",
+             "the attachment to frame %d would hold nothing at level %d: "
+             "release it with ts_body_detach before changing the level, or call ts_body_set_level with release = 1",
              each.second.frame, level);
       }
       homeless.insert(homeless.end(), each.second.before.begin(), each.second.before.end());
       is_done = false;
     }
     held_[size_t(slot)] = std::move(finest);
-    let_go(slot, homeless);
+    detach_vertices(slot, homeless);
   }
 }
 
-// Writes where frames hold vertices, and shares the load of the last step among those of an attachment.
-void World::hang_on(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const {
+// Writes the attached vertices, and distributes the last step's load over the vertices of each attachment.
+void World::attach_at_level(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const {
   for (const auto& each : attached) {
     const Hanging& held = each.second;
     const float* row = present_.data() + 12 * size_t(held.frame);
@@ -249,8 +249,8 @@ void World::hang_on(const std::map<int32_t, Hanging>& attached, const Motion& be
   }
 }
 
-// The point of the rest shape that a grab pulls at.
-Vector World::place_of_grab(size_t g) const {
+// Point of the rest shape that a grab holds.
+Vector World::rest_point_of_grab(size_t g) const {
   const int32_t slot = grab_body_(g) - 1;
   const Asset& asset = asset_of(slot);
   double weights[kGrabCorners], sum = 0.0;
@@ -265,7 +265,7 @@ Vector World::place_of_grab(size_t g) const {
   return place;
 }
 
-// Lets a grab hold the tetrahedra that its body has now, round a point of the rest shape.
+// Moves a grab to the body's current tetrahedra, around a point of the rest shape.
 void World::hold_at(size_t g, const Vector& place) {
   const int32_t slot = grab_body_(g) - 1;
   const Asset& asset = asset_of(slot);
@@ -282,7 +282,7 @@ void World::hold_at(size_t g, const Vector& place) {
     if (!(least > highest)) continue;
     highest = least, weights = shares, corners = asset.tets.data + t;
   }
-  const Patch patch = patch_round(*scene_, asset, corners, weights.data(), 4);
+  const Patch patch = patch_around(*scene_, asset, corners, weights.data(), 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
     grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
     grab_weights_(g, i) = as_float(weights[i]);
@@ -301,14 +301,14 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   make_room(slot, level, may_release, &change.held, &attached);
   std::vector<std::pair<size_t, Vector>> grabbed;
   for (size_t g = 0; g < kMostGrabs; ++g) {
-    if (grab_body_(g) == slot + 1) grabbed.push_back({g, place_of_grab(g)});
+    if (grab_body_(g) == slot + 1) grabbed.push_back({g, rest_point_of_grab(g)});
   }
   Motion before(source.vertex_count());
   const float* found = machine_->rows.room<float>(before.numbers.size());
   machine_->launch("read_motion", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
   std::copy(found, found + before.numbers.size(), before.numbers.begin());
   Motion after = passed(change, before);
-  hang_on(attached, before, &after);
+  attach_at_level(attached, before, &after);
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   write_slot(slot, level, after, body_status_(slot));
@@ -321,7 +321,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
     }
   }
   for (const auto& each : grabbed) hold_at(each.first, each.second);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 }  // namespace taichi_soft

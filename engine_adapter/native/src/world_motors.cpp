@@ -1,4 +1,4 @@
-// Motors: as taichi_soft/control/motors.py has them.
+// Motors, the same as taichi_soft/control/motors.py.
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr ts_motor kMotor = uint64_t(6) << 56;  // what a motor's handle begins with, and no other handle
+constexpr ts_motor kMotor = uint64_t(6) << 56;  // prefix of motor handles
 constexpr double kLargestLimit = 1e12, kThinnest = 1e-3;
 
 double sum_of(const std::vector<double>& numbers) {
@@ -20,7 +20,7 @@ double sum_of(const std::vector<double>& numbers) {
   return total;
 }
 
-// Whether all lie on a line, so that their turn about it cannot be seen.
+// True if all points are on a line, so that a rotation about it is undefined.
 bool is_thin(const std::vector<Vector>& rest, const std::vector<double>& shares) {
   const std::vector<Vector> arms = beside(rest, weighted_sum(shares, rest));
   std::array<double, 3> spreads = Eigen<3>(moments(shares, arms, arms)).values;
@@ -40,7 +40,7 @@ void require_motor_limit(double limit) {
   }
 }
 
-// The axis at rest, of particles that have turned since.
+// Axis in the rest state, of particles that have rotated since.
 Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const {
   const Asset& asset = asset_of(slot);
   std::vector<Vector> rest, now;
@@ -54,7 +54,7 @@ Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, c
   const double mass = sum_of(shares);
   for (double& each : shares) each = each / mass;
   if (is_thin(rest, shares)) {
-    fail(TS_ERROR_ARGUMENT, "the vertices lie on a line, so an axis cannot turn with them: name more, or set is_fixed");
+    fail(TS_ERROR_ARGUMENT, "the vertices are on a line, so no axis can rotate with them: give more, or set is_fixed");
   }
   const Matrix turn = fitting_motion(rest, now, shares).turn;
   Vector found;
@@ -80,7 +80,7 @@ std::vector<World::MotorRow> World::motors() const {
   return found;
 }
 
-// Let there be these, in the order of their numbers, and no other.
+// Replaces all motors by these, in the order of their indices.
 void World::write_motors(const std::vector<MotorRow>& rows) {
   for (size_t m = 0; m < kMostMotors; ++m) motor_wholes_[0](m) = 0;
   size_t at = 0;
@@ -135,13 +135,13 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   require_motor_limit(drive.limit);
   require_motor_speed(drive.speed, scene_->velocity_limit);
   const double length = length_of(drive.axis);
-  if (!(length > 0.0)) fail(TS_ERROR_ARGUMENT, "axis must have a direction");
+  if (!(length > 0.0)) fail(TS_ERROR_ARGUMENT, "axis has zero length");
   if (drive.has_point && !(drive.turns && drive.is_fixed)) {
     fail(TS_ERROR_ARGUMENT,
-         "point is of an axis that particles turn about, and that stays in space: set turns and is_fixed with it");
+         "point is only for a rotation about a fixed axis: set turns and is_fixed too");
   }
   if (!scene_->has_contact) {
-    fail(TS_ERROR_STATE, "motors need a world that is made for contact: export it with a collider, or collider_room=1");
+    fail(TS_ERROR_STATE, "motors need a world with contact: export it with a collider, or collider_room=1");
   }
   Vector axis = {drive.axis[0] / length, drive.axis[1] / length, drive.axis[2] / length};
   if (!drive.is_fixed) axis = axis_at_rest(slot, vertices, axis);
@@ -152,7 +152,7 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   }
   const size_t m = size_t(number), used = motor_rows();
   if (used + vertices.size() > kMotorRows) {
-    fail(TS_ERROR_STATE, "the motors of a world drive at most %zu particles, and %zu are driven: remove a motor first",
+    fail(TS_ERROR_STATE, "the motors of a world have at most %zu particles, and %zu are in use: remove a motor first",
          kMotorRows, used);
   }
   MotorRow row;
@@ -167,7 +167,7 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   write_motors(rows);
   motor_impulse_(m) = 0.0f;
   motor_generations_[m] = (motor_generations_[m] + 1) & 0xFFFFFF;
-  rouse(slot);
+  mark_modified(slot);
   return motor_at(number);
 }
 
@@ -175,14 +175,14 @@ void World::set_motor_speed(ts_motor motor, double speed) {
   const size_t m = motor_of(motor);
   require_motor_speed(speed, scene_->velocity_limit);
   motor_speed_(m) = as_float(speed);
-  rouse(motor_wholes_[0](m) - 1);
+  mark_modified(motor_wholes_[0](m) - 1);
 }
 
 void World::set_motor_limit(ts_motor motor, double limit) {
   const size_t m = motor_of(motor);
   require_motor_limit(limit);
   motor_limit_(m) = as_float(limit);
-  rouse(motor_wholes_[0](m) - 1);
+  mark_modified(motor_wholes_[0](m) - 1);
 }
 
 void World::remove_motor(ts_motor motor) { end_motor(motor_of(motor)); }
@@ -192,7 +192,7 @@ void World::end_motor(size_t m) {
   std::vector<MotorRow> rows = motors();
   rows.erase(std::find_if(rows.begin(), rows.end(), [&](const MotorRow& each) { return each.number == m; }));
   write_motors(rows);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 double World::motor_speed(ts_motor motor) {

@@ -6,8 +6,8 @@
 
 namespace taichi_soft {
 
-// The slots of all who live, into a buffer. Returns how many.
-uint32_t World::give_living() {
+// Writes the slots of all bodies into a buffer. Returns: their number.
+uint32_t World::write_active_slots() {
   int32_t* slots = machine_->rows.room<int32_t>(size_t(scene_->slot_count));
   uint32_t count = 0;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
@@ -24,7 +24,7 @@ Hit World::hit_from(const float* row) const {
   found.distance = row[0];
   const Archive::View<int32_t>& surface = asset_of(found.slot).surface;
   for (int k = 0; k < 3; ++k) {
-    // A body without triangles is asked vertex by vertex.
+    // A body without triangles is tested vertex by vertex.
     found.vertices[k] = surface.count == 0 ? found.triangle : surface[size_t(3 * found.triangle + k)];
     found.weights[k] = row[1 + k];
     found.point[k] = row[4 + k];
@@ -36,8 +36,8 @@ Hit World::hit_from(const float* row) const {
 
 namespace {
 
-// The least number above: kernels take what is nearer, and the limit itself still counts.
-float just_beyond(double limit) {
+// Next larger number: kernels accept distances below the limit, and the limit itself must count.
+float next_above(double limit) {
   return std::nextafter(as_float(std::min(limit, 3e38)), std::numeric_limits<float>::infinity());
 }
 
@@ -49,11 +49,11 @@ Hit World::first_hit(const Vector& origin, const Vector& direction, double farth
   if (largest == 0.0) fail(TS_ERROR_ARGUMENT, "direction has zero length");
   const Vector scaled = {direction[0] / largest, direction[1] / largest, direction[2] / largest};
   const double length = length_of(scaled);
-  const uint32_t count = give_living();
+  const uint32_t count = write_active_slots();
   float* ray = machine_->numbers.room<float>(8);
   float* hit = machine_->found.room<float>(12);
   for (int k = 0; k < 3; ++k) ray[k] = as_float(origin[k]), ray[3 + k] = as_float(scaled[k] / length);
-  ray[6] = just_beyond(farthest), ray[7] = 1.0f;
+  ray[6] = next_above(farthest), ray[7] = 1.0f;
   std::fill(hit, hit + 12, -1.0f);
   if (count > 0) {
     machine_->launch("find_hits", {Machine::array(machine_->rows, count),
@@ -64,11 +64,11 @@ Hit World::first_hit(const Vector& origin, const Vector& direction, double farth
 }
 
 Hit World::closest(const Vector& point, double farthest) {
-  const uint32_t count = give_living();
+  const uint32_t count = write_active_slots();
   float* asked = machine_->numbers.room<float>(4);
   float* hit = machine_->found.room<float>(13);
   for (int k = 0; k < 3; ++k) asked[k] = as_float(point[k]);
-  asked[3] = just_beyond(farthest * farthest);
+  asked[3] = next_above(farthest * farthest);
   std::fill(hit, hit + 13, -1.0f);
   if (count > 0) {
     machine_->launch("find_closest", {Machine::array(machine_->rows, count),
@@ -81,11 +81,11 @@ Hit World::closest(const Vector& point, double farthest) {
 }
 
 std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector& size) {
-  const uint32_t count = give_living(), slots = uint32_t(scene_->slot_count);
+  const uint32_t count = write_active_slots(), slots = uint32_t(scene_->slot_count);
   const uint32_t particles = uint32_t(scene_->particle_count);
   float* shape = machine_->numbers.room<float>(15);
   int32_t* first = machine_->found.room<int32_t>(slots);
-  machine_->vertices.room<int32_t>(particles);  // which of them lie inside: nobody asks
+  machine_->vertices.room<int32_t>(particles);  // required output: vertices inside the shape, unused here
   const Matrix turn = matrix_of(pose.rotation);
   for (int k = 0; k < 3; ++k) {
     shape[k] = as_float(pose.position[k]);

@@ -19,7 +19,7 @@ uint32_t bits_of(float number) {
 }  // namespace
 
 uint64_t World::hash() const {
-  // As `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
+  // The same as `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
   uint64_t code = 1469598103934665603u;
   const auto mix = [&code](uint64_t word) {
     code = (code ^ word) * 1099511628211u;
@@ -42,14 +42,14 @@ uint64_t World::hash() const {
 
 constexpr uint64_t kSnapshotMark = 0x3450414E53534354u;
 
-// What a snapshot begins with. Behind it lie, in this order: levels of detail; the fields that are carried; frames, and
-// who is held and felt there; numbers that tell handles apart; colliders; what events depend on.
+// Header of a snapshot. After it follow, in this order: levels of detail; fields; frames, with attached vertices and
+// reported loads; generations of handles; colliders; state of events.
 struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
   uint64_t frames, colliders, contacts, joint_rows, motor_rows, held;
-  int64_t kinds;  // of events that are recorded
+  int64_t kinds;  // recorded kinds of events
   double time, last_dt;
   Surroundings surroundings;
 };
@@ -58,7 +58,7 @@ namespace {
 
 template <typename Part>
 void put(char** at, const Part* data, size_t count) {
-  if (count == 0) return;  // memcpy takes no null pointer
+  if (count == 0) return;  // memcpy must not get a null pointer
   std::memcpy(*at, data, count * sizeof(Part));
   *at += count * sizeof(Part);
 }
@@ -97,10 +97,10 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<Carried>& carr
   return 4 * words;
 }
 
-// Of levels, how many vertices are held there, and which.
+// Size of levels, numbers of held vertices, and these vertices [bytes].
 size_t size_of_levels(const SnapshotHead& head, size_t slots) { return sizeof(int32_t) * (2 * slots + size_t(head.held)); }
 
-// Of all behind the fields.
+// Size of everything after the fields [bytes].
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
          sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
@@ -110,7 +110,7 @@ size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
 
 }  // namespace
 
-// What a snapshot has of levels: those of who lives.
+// Levels of a snapshot: those of existing bodies.
 World::Levels World::present_levels() const {
   Levels found;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
@@ -127,8 +127,8 @@ size_t World::Levels::held_count() const {
   return count;
 }
 
-// Reads them, and goes on to what lies behind. Returns: whether they can be.
-bool World::take_levels(const char** at, const SnapshotHead& head, Levels* found) const {
+// Reads levels and advances `at`. Returns: false if they are invalid.
+bool World::parse_levels(const char** at, const SnapshotHead& head, Levels* found) const {
   const size_t slots = size_t(scene_->slot_count);
   std::vector<int32_t> counts(slots);
   found->levels.resize(slots);
@@ -191,7 +191,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, friction_);
   for (const Collider& each : colliders_.rows) {
     Collider row;
-    std::memset(static_cast<void*>(&row), 0, sizeof row);  // what lies between its parts is the same every time
+    std::memset(static_cast<void*>(&row), 0, sizeof row);  // makes padding deterministic
     row = each;
     put(&at, &row, 1);
   }
@@ -199,11 +199,11 @@ void World::snapshot(char* bytes) const {
   put_all(&at, memory.sleepers);
   put_all(&at, memory.contacts);
   std::memcpy(bytes, &head, sizeof head);
-  head.sum = checksum(bytes, head.size);  // with a sum of 0 in its place
+  head.sum = checksum(bytes, head.size);  // computed with a sum of 0
   std::memcpy(bytes, &head, sizeof head);
 }
 
-bool World::is_in_order(const Contact& contact, size_t colliders) const {
+bool World::is_valid(const Contact& contact, size_t colliders) const {
   const auto is_below = [](int32_t number, size_t limit) { return number >= 0 && size_t(number) < limit; };
   const size_t slots = size_t(scene_->slot_count);
   for (double each :
@@ -214,7 +214,7 @@ bool World::is_in_order(const Contact& contact, size_t colliders) const {
          is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
 }
 
-// Fields as a snapshot has them, by where they lie in a world.
+// Fields of a snapshot, addressed by their offsets in a world.
 class World::Packed {
  public:
   Packed(const World& world, const char* at, const SnapshotHead& head, const std::vector<int32_t>& levels)
@@ -233,7 +233,7 @@ class World::Packed {
     return found;
   }
   int32_t level(int32_t slot) const { return levels_[size_t(slot)]; }
-  // Whether somebody lives in the slot of this number and 1.
+  // True if the slot `body - 1` has a body.
   bool lives(int32_t body) const {
     int32_t status;
     std::memcpy(&status, status_ + 4 * (body - 1), sizeof status);
@@ -251,8 +251,8 @@ bool World::lies_in(int32_t particle, int32_t slot, int32_t level) const {
   return p >= begin && p < begin + whole_of(slot).level(size_t(level)).vertex_count();
 }
 
-// Numbers of bodies and particles are within their fields already.
-bool World::are_joints_in_order(const Packed& packed, const SnapshotHead& head) const {
+// Indices of bodies and particles were checked before.
+bool World::are_joints_valid(const Packed& packed, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   if (!s.has_contact) return head.joint_rows == 0;
   const Place bodies = s.place("joints.bodies"), rows = s.place("joints.rows");
@@ -279,7 +279,7 @@ bool World::are_joints_in_order(const Packed& packed, const SnapshotHead& head) 
   return next == head.joint_rows;
 }
 
-bool World::are_motors_in_order(const Packed& packed, const SnapshotHead& head) const {
+bool World::are_motors_valid(const Packed& packed, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   const Place body = s.place("motors.motor.body"), first = s.place("motors.motor.first"),
               end = s.place("motors.motor.end"), axis = s.place("motors.motor.axis"),
@@ -302,8 +302,8 @@ bool World::are_motors_in_order(const Packed& packed, const SnapshotHead& head) 
   return next == head.motor_rows;
 }
 
-// Whether a step would read within its fields, and begin with what is finite.
-bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
+// True if all indices are in range and all values are finite, so that a step is safe.
+bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   std::vector<std::pair<size_t, int64_t>> limits = {// of whole numbers, by where their field lies
                                                     {s.place("body_status").offset, kAbsent + 1},
@@ -320,7 +320,7 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     limits.push_back({s.place("joints.particle").offset, s.particle_count});
   }
   Levels levels;
-  if (!take_levels(&at, head, &levels)) return false;
+  if (!parse_levels(&at, head, &levels)) return false;
   const Packed packed(*this, at, head, levels.levels);
   for (const Carried& each : s.carried) {
     int64_t limit = int64_t(1) << 32;
@@ -338,7 +338,7 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
       }
     }
   }
-  if (!are_joints_in_order(packed, head) || !are_motors_in_order(packed, head)) return false;
+  if (!are_joints_valid(packed, head) || !are_motors_valid(packed, head)) return false;
   for (size_t i = 0; i < 24 * head.frames; ++i) {
     float number;
     take(&at, &number, 1);
@@ -355,7 +355,7 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     if (flags[0] > 1 || flags[1] > 1) return false;
     Collider row;
     take(&at, &row, 1);
-    // Those with a grid were there when the world was exported.
+    // Shapes with a grid must be those of the export.
     const bool is_known = row.kind >= 0 && (row.kind <= TS_CAPSULE ||
                                             (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
@@ -367,28 +367,28 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
   for (size_t i = 0; i < head.contacts; ++i) {
     Contact contact;
     take(&at, &contact, 1);
-    if (!is_in_order(contact, size_t(head.colliders))) return false;
+    if (!is_valid(contact, size_t(head.colliders))) return false;
   }
   return true;
 }
 
-// The same of the world file, whose image was taken as it is.
+// The same check for the image in the world file.
 void World::require_image() const {
   std::vector<char> bytes(snapshot_size());
   snapshot(bytes.data());
   SnapshotHead head;
   std::memcpy(&head, bytes.data(), sizeof head);
-  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes.data() + sizeof head, head)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: its state names what there is not. Export it again");
+  if (!is_valid(head.surroundings) || !are_rows_valid(bytes.data() + sizeof head, head)) {
+    fail(TS_ERROR_FILE, "the world file is invalid: its state refers to missing objects. Export it again");
   }
 }
 
 void World::restore(const char* bytes, size_t size) {
   SnapshotHead head;
-  if (size < sizeof head) fail(TS_ERROR_SNAPSHOT, "%zu bytes are no snapshot", size);
+  if (size < sizeof head) fail(TS_ERROR_SNAPSHOT, "%zu bytes are not a snapshot", size);
   std::memcpy(&head, bytes, sizeof head);
-  if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are no snapshot");
-  if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
+  if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are not a snapshot");
+  if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot belongs to another world file");
   const size_t slots = size_t(scene_->slot_count);
   if (head.joint_rows > kJointRows || head.motor_rows > kMotorRows) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   if (head.held > slots * size_t(scene_->particle_count)) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
@@ -405,10 +405,10 @@ void World::restore(const char* bytes, size_t size) {
   if (sum != checksum(bytes + sizeof head, size - sizeof head, of_head)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
-  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes + sizeof head, head)) {
-    fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not");
+  if (!is_valid(head.surroundings) || !are_rows_valid(bytes + sizeof head, head)) {
+    fail(TS_ERROR_SNAPSHOT, "this snapshot is invalid: it refers to missing objects");
   }
-  // What may find no memory comes before what changes the world.
+  // Allocate before changing the world, so that a failed allocation changes nothing.
   const size_t frames = size_t(head.frames);
   Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
                            std::vector<Contact>(size_t(head.contacts))};
@@ -416,7 +416,7 @@ void World::restore(const char* bytes, size_t size) {
   colliders_.rows.reserve(size_t(head.colliders));
   const char* at = bytes + sizeof head;
   Levels levels;
-  take_levels(&at, head, &levels);
+  parse_levels(&at, head, &levels);
   const Packed packed(*this, at, head, levels.levels);
   if (scene_->has_contact) machine_->launch("forget_held", {});
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {

@@ -1,4 +1,4 @@
-// Gravity and friction: as taichi_soft/control/drives.py and frictions.py have them.
+// Gravity and friction, the same as taichi_soft/control/drives.py and frictions.py.
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr uint32_t kFirstSerial = 1;  // of a collider that was exported
+constexpr uint32_t kFirstSerial = 1;  // serial of an exported collider
 
 bool is_friction(double number) { return number >= 0.0 && number <= 1e6; }
 
@@ -28,7 +28,7 @@ void World::set_gravity(const Vector& gravity) {
   if (gravity == surroundings_.gravity) return;
   surroundings_.gravity = gravity;
   write_surroundings();
-  rouse(-1);
+  mark_modified(-1);
 }
 
 void World::set_friction(double friction) {
@@ -36,20 +36,20 @@ void World::set_friction(double friction) {
   const int32_t number = scene_->floor_collider;
   if (!scene_->has_floor || (scene_->has_contact && !is_floor(number))) {
     fail(TS_ERROR_STATE,
-         "the world has no floor: ts_collider_set_friction changes a collider's friction, ts_body_set_friction that "
-         "between bodies");
+         "the world has no floor: use ts_collider_set_friction for a collider, or ts_body_set_friction for "
+         "contact between bodies");
   }
   if (scene_->has_contact) return set_collider_friction(number, friction);
   if (friction == surroundings_.friction) return;
   surroundings_.friction = friction;
   write_surroundings();
-  rouse(-1);
+  mark_modified(-1);
 }
 
 bool World::is_floor(int32_t number) const {
   if (number < 0 || number != scene_->floor_collider || size_t(number) >= colliders_.rows.size()) return false;
   const Collider& row = colliders_.rows[size_t(number)];
-  return row.is_alive && row.serial == kFirstSerial;  // another one may have come into its row
+  return row.is_alive && row.serial == kFirstSerial;  // the row may have another collider
 }
 
 void World::set_collider_friction(int32_t number, double friction) {
@@ -68,12 +68,12 @@ void World::set_body_friction(int32_t slot, double friction) {
   require_friction(friction);
   if (!scene_->has_soft_contact) {
     fail(TS_ERROR_STATE,
-         "a body's friction counts between bodies, and these do not touch each other: export the world with "
-         "soft_contact, or change that of the floor or a collider");
+         "a body's friction applies between bodies, and this world has no soft contact: export it with "
+         "soft_contact, or change the friction of the floor or a collider");
   }
   if (friction == friction_[size_t(slot)]) return;
   give_friction(slot, friction);
-  rouse(slot);
+  mark_modified(slot);
 }
 
 void World::give_friction(int32_t slot, double friction) {
@@ -86,7 +86,7 @@ void World::write_surroundings() {
   floor_(0, 2) = as_float(surroundings_.friction);
 }
 
-bool World::is_in_order(const Surroundings& given) const {
+bool World::is_valid(const Surroundings& given) const {
   for (double each : given.gravity) {
     if (!(std::fabs(each) < scene_->position_limit)) return false;
   }

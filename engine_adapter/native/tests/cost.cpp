@@ -1,4 +1,4 @@
-// Measures the time of a step beside its kernel, which is timed within it: cost FOLDER [ROUNDS [STEPS]]
+// Measures the time of a step without its kernel: cost FOLDER [ROUNDS [STEPS]]
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -28,7 +28,7 @@ void run_timed(void* context) {
   kernel_took = microseconds_since(start);
 }
 
-// The same scene, as if it were linked with its kernels, that of the step between two looks at the clock.
+// The same scene with linked kernels, in which the kernel of the step is timed.
 std::shared_ptr<Scene> with_timed_step(const Scene& scene, const std::string& folder) {
   std::ifstream file(folder + "/world.tsw", std::ios::binary);
   std::vector<char> world((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -47,7 +47,7 @@ void print(const char* what, std::vector<double> numbers) {
   std::printf("%-32s %9.3f %9.3f %9.3f\n", what, numbers.front(), numbers[numbers.size() / 2], numbers.back());
 }
 
-// Times many steps in a row. Each round begins with a new world.
+// Times consecutive steps. Each round begins with a new world.
 void measure(const char* what, const std::shared_ptr<Scene>& scene, int rounds, int steps, int32_t events) {
   std::vector<double> own, ratios;
   for (int round = 0; round < rounds; ++round) {

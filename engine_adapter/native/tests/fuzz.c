@@ -1,7 +1,7 @@
-/* Calls of the library with bad and good arguments at random: fuzz FOLDER SECONDS SEED.
+/* Calls the library with random valid and invalid arguments: fuzz FOLDER SECONDS SEED.
  *
- * It ends with 0 where every call returned TS_OK or an error with a text, and where no refused call changed the
- * state of the world.
+ * It exits with 0 if every call returned TS_OK or an error with a text, and no refused call changed the world's
+ * state.
  */
 #include <inttypes.h>
 #include <math.h>
@@ -28,7 +28,7 @@ static uint32_t below(uint32_t limit) { return (uint32_t)((next() >> 33) % limit
 
 static int one_in(uint32_t count) { return below(count) == 0; }
 
-static int is_tame; /* the arguments of this call could be right: else hardly any would be */
+static int is_tame; /* true for calls with likely valid arguments, which would be rare otherwise */
 
 static int bad(uint32_t count) { return !is_tame && one_in(count); }
 
@@ -73,7 +73,7 @@ static ts_body any_body(ts_world world) {
   return found;
 }
 
-static ts_grab any_grab(ts_world world) { /* or one that was, or one of another world */
+static ts_grab any_grab(ts_world world) { /* a current grab, an earlier one, or one of another world */
   static ts_grab known[16];
   ts_grab found = 0;
   if (bad(15)) return next();
@@ -123,7 +123,7 @@ static ts_pull* pull(void) {
   return bad(20) ? NULL : &found;
 }
 
-/* They wait no longer, and say who, where and when. */
+/* Drained events must have valid contents and no longer wait. */
 static ts_result drain(ts_world world) {
   static ts_event events[100];
   const int has_room = !bad(10);
@@ -182,7 +182,7 @@ static ts_result take_hold(ts_world world, ts_body body) {
   return result;
 }
 
-/* Which one is asked for its load, most often: one that hangs there. */
+/* Body for reading loads: usually one that is attached. */
 static ts_body hanging;
 static int32_t its_frame;
 
@@ -310,7 +310,7 @@ static ts_result one_call(ts_world world) {
                           3 * (size_t)(bad(3) ? below(400) : (uint32_t)info.vertex_count));
     }
     case 29: {
-      /* Not so short, or so many, that a frame takes minutes. */
+      /* Limits the cost of a frame. */
       ts_fixed_step step = {size_of(sizeof step), whole(9), (int32_t)below(9) - 2, number()};
       if (step.dt > 0.0 && step.dt < 1e-3) step.dt = 1e-3;
       return ts_world_set_fixed_step(world, bad(20) ? NULL : &step);
@@ -411,7 +411,7 @@ static ts_result one_call(ts_world world) {
   }
 }
 
-/* Numbers of all bodies, grabs, joints and motors. */
+/* Handles of all bodies, grabs, joints and motors. */
 static void look(ts_world world, uint64_t found[64]) {
   for (int32_t i = 0; i < 64; ++i) {
     found[i] = 0;
@@ -422,7 +422,7 @@ static void look(ts_world world, uint64_t found[64]) {
   }
 }
 
-/* A snapshot that was taken goes back; one that is damaged is refused. */
+/* A valid snapshot must restore; a damaged one must be refused. */
 static void try_snapshots(ts_world world) {
   size_t size = 0;
   uint64_t before = 0, after = 0, there[64], again[64];

@@ -1,7 +1,7 @@
 /* Plays a recorded game on a world file: play FOLDER < GAME.
  *
- * A game is a list of calls, one a line, as tests/native/games.py writes them. Each step prints the hash of the
- * state, and each reading a hash of what was read; so do the players in other languages.
+ * A game is a list of calls, one per line, written by tests/native/games.py. Each step prints the hash of the state,
+ * and each read a hash of the result. The players in other languages print the same.
  */
 #include <inttypes.h>
 #include <stdio.h>

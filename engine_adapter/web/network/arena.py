@@ -1,4 +1,4 @@
-"""The world of the network sample: two players push soft cubes over a stage that they can raise."""
+"""World of the network sample: two players push soft cubes over a stage that they can raise."""
 
 from taichi_soft import BoxShape, Contact, Material, World, box, sphere
 

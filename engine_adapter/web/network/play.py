@@ -1,10 +1,10 @@
-"""Play a game between Python and node over a slow network that loses messages, and compare the two worlds.
+"""Play a game between Python and node over a slow, lossy network, and compare the two worlds.
 
     .venv/bin/python engine_adapter/web/network/play.py           # in real time
     .venv/bin/python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
 
-Each player is a process and sends UDP datagrams to this process, which is the network between them: it
-delays, loses, copies and reorders datagrams.
+Each player is a process and sends UDP datagrams to this process, which simulates the network: it delays, loses,
+copies and reorders datagrams.
 """
 
 import argparse
@@ -26,14 +26,14 @@ from typing import Any
 HERE = Path(__file__).parent
 DT = 1 / 60
 NAMES = ("Python", "node")  # of the players
-DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # of every message, up to more, and more of a few [s]
-LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # parts of all messages
-LATE_START = (0, 20)  # frames after which each player begins
-PATIENCE = 60.0  # for a process that says nothing [s]
+DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # of every message; up to this much more; more for a few messages [s]
+LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # fractions of messages
+LATE_START = (0, 20)  # frame in which each player begins
+PATIENCE = 60.0  # timeout for a silent process [s]
 
 
 class Network:
-    """Messages on their way, drawn from a seed: the same ones in every run with `--fast`."""
+    """Messages in flight, with delays from a seed: reproducible with `--fast`."""
 
     def __init__(self, seed: int) -> None:
         self._rng, self._newest = random.Random(seed), [0, 0]
@@ -41,7 +41,7 @@ class Network:
         self.counts: Counter[str] = Counter()
 
     def send(self, now: float, to: int, data: bytes) -> None:
-        """Take a message for a player at a time [s]."""
+        """Send a message to a player at a time [s]."""
         rng = self._rng
         self.counts["sent"] += 1
         if rng.random() < LOST:
@@ -76,7 +76,7 @@ class Line:
         self.port = self.socket.getsockname()[1]
 
     def meet(self, process: subprocess.Popen[str], name: str) -> None:
-        """Wait until the player is there. Raises: ChildProcessError if its process ends before."""
+        """Wait until the player has connected. Raises: ChildProcessError if its process ends first."""
         self.socket.settimeout(0.1)
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
@@ -88,7 +88,7 @@ class Line:
             else:
                 self.socket.settimeout(PATIENCE)
                 return
-        raise ChildProcessError(f"{name} did not begin")
+        raise ChildProcessError(f"{name} did not start")
 
     def send(self, data: bytes) -> None:
         """Send to the player."""
@@ -100,7 +100,7 @@ class Line:
 
 
 def run_fast(lines: list[Line], network: Network) -> None:
-    """Let both make their frames on one simulated clock, until both are done."""
+    """Run both players on one simulated clock until both are done."""
     state, frame = [b"frame", b"frame"], 0
     while state != [b"done", b"done"]:
         now = frame * DT
@@ -117,7 +117,7 @@ def run_fast(lines: list[Line], network: Network) -> None:
 
 
 def run(lines: list[Line], network: Network) -> None:
-    """Carry what both send in real time, until both are done."""
+    """Forward messages in real time until both players are done."""
     state, heard = [b"frame", b"frame"], time.monotonic()
     with selectors.DefaultSelector() as selector:
         for player, line in enumerate(lines):
@@ -140,7 +140,7 @@ def run(lines: list[Line], network: Network) -> None:
 def session(
     folder: Path, *, ticks: int, seed: int, is_fast: bool, cheat: int | None = None
 ) -> tuple[list[dict[str, Any]], Counter[str]]:
-    """Run both processes. Returns: what each reports, and what the network did."""
+    """Run both processes. Returns: their reports, and counts of the network."""
     lines, network = [Line(), Line()], Network(seed)
     commands: list[list[str | Path]] = [
         [sys.executable, HERE / "player.py", *([] if cheat is None else ["--cheat", str(cheat)])],
@@ -172,31 +172,31 @@ def session(
 
 
 def export(folder: Path) -> None:
-    """Write the same world for node."""
+    """Export the same world for node."""
     command = ["export", str(HERE / "arena.py"), "--out", str(folder), "--for", "web"]
     done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], stdout=subprocess.DEVNULL)
     if done.returncode != 0:
         sys.exit(
-            f"the world was not exported by {sys.executable}, for the reason above. "
+            f"{sys.executable} could not export the world, for the reason above. "
             "In a checkout where `make setup` was run, use .venv/bin/python"
         )
 
 
 def main() -> None:
-    """Play, print what happened, and end with an error if the worlds differ."""
+    """Play, print a summary, and exit with an error if the worlds differ."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--fast", action="store_true", help="on a simulated clock, as fast as both can")
     parser.add_argument("--ticks", type=int, default=3600, help="of 1/60 s (default 3600)")
     parser.add_argument("--seed", type=int, default=1, help="of the network (default 1)")
     parser.add_argument("--cheat", type=int, metavar="TICK", help="change a bit in Python's world")
-    parser.add_argument("--world", type=Path, help="folder of the exported world, if there is one already")
+    parser.add_argument("--world", type=Path, help="folder of a world that is already exported")
     options = parser.parse_args()
     if options.ticks < 1:
         parser.error(f"--ticks is {options.ticks}: give 1 or more")
     if options.cheat is not None and not 0 <= options.cheat < options.ticks:
         parser.error(f"--cheat is {options.cheat}: give a tick from 0 to {options.ticks - 1}")
     if options.world is not None and not (options.world / "kernels" / "web.wasm").is_file():
-        parser.error(f"--world is {options.world}: give a folder that taichi-soft export --for web wrote")
+        parser.error(f"--world is {options.world}: give a folder from taichi-soft export --for web")
     if shutil.which("node") is None:
         sys.exit("needs node: apt-get install nodejs")
     with tempfile.TemporaryDirectory() as scratch:
@@ -207,7 +207,7 @@ def main() -> None:
         try:
             reports, counts = session(folder, **asked)
         except (ChildProcessError, TimeoutError) as error:
-            sys.exit(f"the game was not played to its end, for the reason above: {error}")
+            sys.exit(f"the game stopped early, for the reason above: {error}")
     print(", ".join(f"{counts[name]:,} {name}" for name in ("sent", "lost", "copied", "overtaken")))
     for name, found in zip(NAMES, reports, strict=True):
         print(

@@ -1,4 +1,4 @@
-// The player of the network sample whose world is a module of WebAssembly: as `player.py`, which says more.
+// Player of the network sample in node, with a WebAssembly world. See `player.py` for details.
 //
 //     node player.mjs FOLDER --port N --ticks N [--fast]
 
@@ -50,7 +50,7 @@ function frame() {
   line.send(session.confirmed >= ticks && session.tick === ticks ? "done" : "frame");
 }
 
-// Frames by this machine's own clock.
+// Run frames on this machine's clock.
 function run(due = performance.now()) {
   frame();
   const next = due + 1000 * DT;

@@ -1,4 +1,4 @@
-"""The player of the network sample in Python. `play.py` starts it, and `player.mjs` in node."""
+"""Player of the network sample in Python. `play.py` starts it, and `player.mjs` in node."""
 
 import argparse
 import json
@@ -11,7 +11,7 @@ from engine_adapter.session import Inputs
 from engine_adapter.web.network.arena import players, stage, world
 
 STEP = FixedStep(dt=1 / 60, substeps=8)
-FORCE, LIFT = 8.0, 0.02  # for each unit of an input [N]; by which each player raises the stage [m]
+FORCE, LIFT = 8.0, 0.02  # force per unit of input [N]; height by which each player raises the stage [m]
 
 
 def act(inputs: Inputs) -> None:
@@ -22,7 +22,7 @@ def act(inputs: Inputs) -> None:
 
 
 def press(tick: int, player: int) -> bytes:
-    """Return what a player does in a tick: another direction every third of a second or so."""
+    """Return a player's input in a tick: a new direction about every third of a second."""
     turn = tick // (17 + 6 * player)
     return bytes(
         [(37 * turn + 91 * player) % 201, (59 * turn + 13 * player) % 201, int(tick % 50 < 5 + player)]
@@ -30,7 +30,7 @@ def press(tick: int, player: int) -> bytes:
 
 
 class Player:
-    """A session, the socket to the other machine, and the time that it took."""
+    """A session, the socket to the other machine, and timings."""
 
     def __init__(self, line: socket.socket, player: int, ticks: int, cheat: int) -> None:
         self.line, self.player, self.ticks, self.cheat = line, player, ticks, cheat
@@ -39,7 +39,7 @@ class Player:
         self.seconds = 0.0  # for repeated ticks
 
     def act(self, inputs: Inputs) -> None:
-        """Apply inputs; a cheat sees one bit of them changed in one tick."""
+        """Apply inputs; a cheat changes one bit in one tick."""
         if world.step_count == self.cheat:
             inputs = (bytes([inputs[0][0] ^ 1, *inputs[0][1:]]), inputs[1])
         act(inputs)
@@ -59,7 +59,7 @@ class Player:
         self.line.send(b"done" if session.confirmed >= self.ticks == session.tick else b"frame")
 
     def report(self) -> dict[str, Any]:
-        """Return what there is to tell at the end."""
+        """Return the summary of the game."""
         session = self.session
         session.settle()
         return {
@@ -75,7 +75,7 @@ class Player:
 
 
 def play(player: Player, is_fast: bool) -> None:
-    """Play until `play.py` says that both know all inputs. It is the clock too if `is_fast`."""
+    """Play until `play.py` reports that both know all inputs. With `is_fast` it also drives the clock."""
     due = time.monotonic()
     while True:
         if not is_fast:
@@ -95,7 +95,7 @@ def play(player: Player, is_fast: bool) -> None:
 
 
 def main() -> None:
-    """Play over the port of this machine that the command line names."""
+    """Play over the local port from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--ticks", type=int, required=True)

@@ -1,4 +1,4 @@
-"""The world of the sample: a jelly, and balls that fall onto it.
+"""World of the sample: a jelly, and balls that fall onto it.
 
 taichi-soft export game.py --out game.softworld --axes y-up --for web
 """

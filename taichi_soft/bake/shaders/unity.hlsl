@@ -1,11 +1,11 @@
-// A baked clip in Unity, for a Custom Function node of Shader Graph in the vertex stage: file this one, name
-// BakedVertex, inputs vertex (UV1, the second set, which names the pixel of a vertex), seconds, and the pictures as
-// Bare Texture 2D. Numbers are those of metadata.json.
+// Plays a baked clip in Unity, in a Custom Function node of Shader Graph in the vertex stage: source this file, name
+// BakedVertex, inputs vertex (UV1, the second set, which is the pixel of a vertex), seconds, and the textures as
+// Bare Texture 2D. See metadata.json for the numbers.
 //
 // Import position_high.png, position_low.png and normal.png with sRGB off, Non-Power of 2 "None", no mip maps, no
-// compression, filter "Point", and a max size not below theirs.
-// Importers of glTF mirror x and turn texture coordinates over (v becomes 1 - v), and a texture's first row is its
-// lowest. All three are undone here. Give the renderer bounds from lowest to highest.
+// compression, filter "Point", and a max size of at least their size.
+// Importers of glTF mirror x and flip texture coordinates (v becomes 1 - v), and a texture's first row is its
+// lowest. This shader undoes all three. Set the renderer's bounds from lowest to highest.
 #ifndef TAICHI_SOFT_BAKED_VERTEX
 #define TAICHI_SOFT_BAKED_VERTEX
 

@@ -1,1 +1,1 @@
-"""What a game writes into the fields, and what the substep does with it."""
+"""Kernels that write control inputs to the fields, and functions of the substep that apply them."""

@@ -1,8 +1,8 @@
-"""What drives a body from outside within a step: pushes, linear damping, wind; and what its pins take up.
+"""External forces of a step: applied forces, linear damping, wind; and the load on pins.
 
-All but gravity act on velocities, for as long as they last, so that their impulse over a step is exact: under
-leapfrog half a substep's worth comes before the first kick and the other half after the last, as velocities
-are between.
+All except gravity change velocities for their exact duration, so that their impulse over a step is exact.
+Under leapfrog, half a substep's impulse comes before the first kick and the other half after the last one,
+because velocities are at half substeps.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -14,7 +14,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def push_particles(state: ti.template(), body, seconds):
-    """Change the velocities of one body by what pushes and linear damping do in `seconds`."""
+    """Apply forces and linear damping to the velocities of one body for `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:
         keep = exp(-seconds * state.body_damping[body])
@@ -31,9 +31,9 @@ def push_particles(state: ti.template(), body, seconds):
 
 @ti.real_func
 def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
-    """Change the velocities of one body by what the wind does in `h` [s], triangle by triangle.
+    """Apply wind to the velocities of one body for `h` [s], triangle by triangle.
 
-    A vertex takes up its third of 1/4 rho c_d A |v_n| v_n implicitly: it is never taken beyond the wind's own
+    A vertex receives its third of 1/4 rho c_d A |v_n| v_n implicitly, so that it never exceeds the wind's
     speed along the normal.
     """
     wind = state.wind[None]
@@ -50,7 +50,7 @@ def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
             n = across / twice_area
             sum = state.particle_velocity[a] + state.particle_velocity[b] + state.particle_velocity[c]
             flow = ti.abs((wind.xyz - sum / 3.0).dot(n))
-            drag = wind.w * twice_area * flow / 24.0  # of each vertex [kg/s]
+            drag = wind.w * twice_area * flow / 24.0  # per vertex [kg/s]
             for i in range(3):
                 p = corners[i]
                 inv_mass = state.particle_inv_mass[p]
@@ -64,7 +64,7 @@ def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
 
 @ti.real_func
 def add_reactions(state: ti.template(), body: ti.i32, seconds: ti.f32):
-    """Add up what internal forces and gravity on pinned particles do in `seconds` [N s]."""
+    """Accumulate the impulse of internal forces and gravity on pinned particles during `seconds` [N s]."""
     if state.body_drives[body] & FEELS_REACTION != 0:
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
@@ -76,7 +76,7 @@ def add_reactions(state: ti.template(), body: ti.i32, seconds: ti.f32):
 
 @ti.func
 def _open_pushes(state: ti.template(), body):
-    """Clear what is left of the pushes of an earlier step, where this is the first since."""
+    """Clear forces of an earlier step before the first force of this step."""
     if state.body_drives[body] & PUSHED == 0:
         state.body_drives[body] = state.body_drives[body] | PUSHED
         particles = state.body_particles[body]
@@ -91,10 +91,10 @@ def add_push(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     acceleration: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Push `particles` of one body throughout the coming step, each with its mass times (3,) [m/s^2]."""
+    """Accelerate `particles` of one body during the next step by (3,) [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        if state.body_status[body] == SKIPPING:  # what a force field does to it counts in its own time
+        if state.body_status[body] == SKIPPING:  # a force field does not act on a skipping body
             state.body_status[body] = ACTIVE
         _open_pushes(state, body)
         a = ti.Vector([acceleration[0], acceleration[1], acceleration[2]])
@@ -105,7 +105,7 @@ def add_push(
 
 @ti.kernel
 def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Push every vertex of one body throughout the coming step, each with its mass times a row [m/s^2]."""
+    """Accelerate every vertex of one body during the next step by a row [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _open_pushes(state, body)
@@ -117,26 +117,26 @@ def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarr
 
 @ti.kernel
 def write_gravity_scale(state: ti.template(), body: ti.i32, scale: ti.f32):
-    """By what gravity on one body is multiplied."""
+    """Write the factor on gravity of one body."""
     state.body_gravity_scale[body] = scale
 
 
 @ti.kernel
 def write_linear_damping(state: ti.template(), body: ti.i32, rate: ti.f32):
-    """How fast the velocities of one body fade [1/s]."""
+    """Write the damping rate of one body's velocities [1/s]."""
     state.body_damping[body] = rate
     _set_bit(state, body, DAMPED, int(rate > 0.0))
 
 
 @ti.kernel
 def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
-    """Whether the wind misses one body."""
+    """Write whether one body is sheltered from the wind."""
     _set_bit(state, body, SHELTERED, is_sheltered)
 
 
 @ti.kernel
 def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)) -> ti.i32:
-    """Velocity [m/s] and density times drag coefficient [kg/m^3], (4,). Returns whether any differs (1)."""
+    """Write velocity [m/s] and density times drag coefficient [kg/m^3], (4,). Returns 1 if they changed."""
     given = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
     differs = int((given != state.wind[None]).any())
     state.wind[None] = given

@@ -1,9 +1,9 @@
-"""Friction between bodies, written anew between two steps."""
+"""Change the friction between bodies between two steps."""
 
 from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
 def write_friction(state: ti.template(), body: ti.i32, friction: ti.f32):
-    """Coulomb's coefficient of one body against others."""
+    """Write the Coulomb coefficient of one body against other bodies."""
     state.soft.body_surface[body][0] = friction

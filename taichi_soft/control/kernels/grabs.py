@@ -1,9 +1,9 @@
-"""Grabs: their fields, and springs that pull a patch of a body's surface to a point: a hand, or a mouse.
+"""Grabs: their fields, and springs that pull a patch of a body's surface to a target.
 
-Each is a soft constraint in the sense of Catto, Soft Constraints (GDC 2011): the velocity after the pull
-enters the spring and its damper, so that it takes nothing beyond its aim, however stiff it is. A particle of
-the patch has its share of both; the shares add up to 1. What is more than the patch can bear pulls at the
-whole body, by mass, which deforms nothing.
+Each is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper use the velocity after the
+pull, so that the grab does not overshoot for any stiffness. Each particle of the patch has a share of the
+force; the shares have the sum 1. A force above the strength of the patch acts on the whole body in
+proportion to mass, which causes no deformation.
 """
 
 from typing import Any
@@ -19,11 +19,10 @@ from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.elements.kernels.linear_system import add_inertia
 
 MOST_GRABS, PATCH_ROWS = 16, 128
-"""Grabs of one world at a time, and particles that one of them holds."""
+"""Largest number of grabs of a world, and of particles of a grab."""
 
 CORNERS = 4
-"""Particles between which its point lies: of a triangle, or of a tetrahedron once the level of detail has
-changed."""
+"""Corners of a grabbed point's element: a triangle, or a tetrahedron after a change of level of detail."""
 
 PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
 """Columns of `write_grab` and `read_grab`."""
@@ -35,20 +34,19 @@ class GrabFields:
 
     def __init__(self, real: Any) -> None:
         """Allocate; contents are zero."""
-        self.body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
+        self.body = ti.field(ti.i32, MOST_GRABS)  # index plus 1, 0 if unused
         self.corners = ti.Vector.field(CORNERS, ti.i32, MOST_GRABS)
         self.weights = ti.Vector.field(CORNERS, real, MOST_GRABS)  # of the corners
         self.target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
         self.spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
         self.limits = ti.Vector.field(3, real, MOST_GRABS)
-        self.force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
+        self.force = ti.Vector.field(3, real, MOST_GRABS)  # in the last substep [N]
         self.count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
         self.particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
         self.share = ti.field(real, MOST_GRABS * PATCH_ROWS)
 
     def clear(self, loader: Loader) -> None:
-        """Let there be no grab. A world that was here before may have held particles that there are not any
-        more."""
+        """Remove all grabs, because an earlier world may have left invalid particles."""
         for numbers in (self.body, self.count, self.particle, self.share):
             loader.fill(numbers, np.zeros(0))
         for places in (self.corners, self.weights):
@@ -57,7 +55,7 @@ class GrabFields:
             loader.fill(rows, np.zeros((0, 3)))
 
     def carried(self) -> list[list[Any]]:
-        """What the next step depends on: of each grab, of each in use, of each row of its patch."""
+        """Fields that the next step depends on: per grab, per grab in use, and per row of the patches."""
         return [
             [self.body],
             [self.corners, self.weights, self.target, self.spring, self.limits, self.force, self.count],
@@ -67,7 +65,7 @@ class GrabFields:
 
 @ti.func
 def _stretch(state: ti.template(), g):
-    """From where a grab wants its point to where that is [m], no longer than the longest."""
+    """Vector from a grab's target to its point [m], limited to the longest stretch."""
     corners, weights = state.grabs.corners[g], state.grabs.weights[g]
     point = ti.Vector.zero(state.real, 3)
     for i in ti.static(range(CORNERS)):
@@ -78,11 +76,11 @@ def _stretch(state: ti.template(), g):
 
 @ti.func
 def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
-    """What the patch leaves to the whole body, as a change of its velocity [m/s].
+    """Change of the whole body's velocity by the force above the patch's strength [m/s].
 
     Args:
-        wanted: force of the spring and its damper, at the velocity that the body is going to have [N].
-        drag: by how much it falls with that velocity [N s/m].
+        wanted: force of spring and damper at the resulting velocity [N].
+        drag: decrease of that force with the velocity [N s/m].
     """
     on_patch, on_all, inv_mass = state.grabs.limits[g].x, state.grabs.limits[g].y, state.grabs.limits[g].z
     force = wanted / (1.0 + h * drag * inv_mass)
@@ -92,9 +90,9 @@ def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
 
 @ti.real_func
 def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
-    """Change the velocities of one body by the pull of its grabs in `h` [s].
+    """Apply the grabs of one body to its velocities for `h` [s].
 
-    It looks at the velocities after the forces of this substep, or it would not feel what holds against it.
+    It uses the velocities after the forces of this substep, so that it includes resisting forces.
     """
     if state.body_drives[body] & GRABBED != 0:
         gravity = gravity_on(state, body)
@@ -106,7 +104,7 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
                 drag = spring.y + h * spring.x
                 part = ti.cast(0.0, state.real)
                 wanted, total = -pull, ti.Vector.zero(state.real, 3)
-                for turn in range(2):  # the first time to see how strong it is, the second to do it
+                for turn in range(2):  # first compute the strength, then apply the force
                     total = ti.Vector.zero(state.real, 3)
                     row = g * PATCH_ROWS
                     while row < g * PATCH_ROWS + state.grabs.count[g]:
@@ -182,15 +180,15 @@ def write_grab(
     patch: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shares: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Begin a grab, or let one hold other particles.
+    """Write a new grab, or change the particles of a grab.
 
     Args:
-        corners: particles between which its point lies, (4,).
-        numbers: their weights, the point to pull to [m]; of the spring stiffness [N/m], damping [N s/m] and
-            longest stretch [m]; strongest pull on the patch and on all [N]; 1 / mass of the body [1/kg];
-            with what it pulled in the last substep [N].
+        corners: particles of the element of the grabbed point, (4,).
+        numbers: their weights; target [m]; stiffness [N/m], damping [N s/m] and longest stretch [m] of the
+            spring; largest force on the patch and in total [N]; 1 / mass of the body [1/kg]; force in the
+            last substep [N].
         patch: particles, at most `PATCH_ROWS`.
-        shares: of them.
+        shares: shares of the force, one per particle.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -212,13 +210,13 @@ def write_grab(
 
 @ti.kernel
 def write_grab_target(state: ti.template(), g: ti.i32, target: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Where a grab pulls to from now on, (3,) [m]."""
+    """Write the target of a grab, (3,) [m]."""
     state.grabs.target[g] = ti.Vector([target[0], target[1], target[2]])
 
 
 @ti.kernel
 def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
-    """Let go."""
+    """Remove a grab."""
     others = 0
     state.grabs.body[g] = 0
     ti.loop_config(serialize=True)
@@ -235,7 +233,7 @@ def read_grab(
     corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
     numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Corners and numbers of a grab as `write_grab` takes them, (4,) and (16,)."""
+    """Read corners and numbers of a grab in the layout of `write_grab`, (4,) and (16,)."""
     for k in ti.static(range(CORNERS)):
         corners[k] = state.grabs.corners[g][k]
         numbers[k] = state.grabs.weights[g][k]

@@ -1,6 +1,6 @@
-"""Impulses on particles between two steps: changes of velocity, at once.
+"""Impulses on particles between two steps, as immediate changes of velocity.
 
-Leapfrog keeps velocities half a substep behind; a change of velocity is simply added to them.
+Leapfrog's velocities are half a substep behind; the change is added to them.
 """
 
 from taichi_soft.bodies.status import ABSENT
@@ -11,7 +11,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def falloff(distance2, radius2):
-    """1 at the centre, 0 from the radius on, with a slope of 0 at both."""
+    """Smooth falloff: 1 at the centre, 0 from the radius on, with zero slope at both."""
     rest = ti.max(1.0 - distance2 / radius2, 0.0)
     return rest * rest
 
@@ -28,7 +28,7 @@ def add_velocity(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     change: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Change the velocity of `particles`, but for pinned ones, by (3,) [m/s]."""
+    """Add (3,) [m/s] to the velocities of `particles`, except pinned ones."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         _change_velocity(state, particles[i], ti.Vector([change[0], change[1], change[2]]))
@@ -41,12 +41,12 @@ def add_impulse_near(
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Share out an impulse among the particles round a point, in proportion to mass and `falloff`.
+    """Distribute an impulse over the particles around a point, in proportion to mass and `falloff`.
 
     Args:
         place: point [m], radius [m], impulse [N s]: (7,).
-        found: receives the distance to the nearest particle [m] and the highest change of speed [m/s], (2,);
-            where nothing is within reach or the change is too large, nothing is changed.
+        found: receives the distance to the nearest particle [m] and the largest change of speed [m/s], (2,).
+            If no particle is in range or the change is too large, nothing is changed.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -83,12 +83,12 @@ def add_radial_impulse(
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Push all bodies away from a point, each by its own share of mass in reach.
+    """Push all bodies away from a point, each in proportion to its fraction of mass in range.
 
     Args:
         place: centre [m], radius [m], impulse on a body at the centre [N s]: (5,).
-        found: receives the largest change of speed that it can make [m/s], (1,); if that is too large,
-            nothing is changed.
+        found: receives the largest possible change of speed [m/s], (1,). If it is too large, nothing is
+            changed.
     """
     highest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)

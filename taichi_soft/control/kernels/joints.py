@@ -1,16 +1,16 @@
-"""Joints: their fields, and how they act.
+"""Joints: their fields and their solver.
 
-A joint holds particles of one body at places in another, which go with a tetrahedron of that.
+A joint holds particles of one body at points embedded in tetrahedra of another.
 
-In every substep impulses make the velocity of each particle that of its place, row by row, some times over
-(Gauss-Seidel). That takes energy out and puts none in, whatever the masses; it has no stiffness that could be
-too high. The rows are gone through there and back: in one direction only, those that are not satisfied yet
-would act as forces that come from no energy, and bodies would begin to flutter.
+In every substep, Gauss-Seidel sweeps over the rows apply impulses that equalise the velocities of each
+particle and its point. This removes energy and never adds any, for all masses, and has no stiffness that
+could be too high. Sweeps alternate their direction: with one direction, the remaining errors would act as
+non-conservative forces, and bodies would flutter.
 
-What has come apart all the same is drawn together, no faster than the bodies can follow.
+Remaining gaps are closed no faster than the bodies can follow.
 
-The impulse on the place is shared out so that it acts where the particle is. So momentum and angular
-momentum stay, also where there is a gap.
+The impulse on the point is distributed so that it acts at the particle's position. So momentum and angular
+momentum are conserved even with a gap.
 """
 
 from typing import Any
@@ -22,47 +22,46 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import holds_fields, ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
-"""Joints of one world at a time, and particles that all of them hold together."""
+"""Largest number of joints of a world, and of particles of all joints."""
 
 ENDS = 5
-"""Particles that a row names: the one that is held, and four of the other body that hold it. Their positions
-times their weights, 1 and four that add up to -1, add up to the gap between the particle and its place."""
+"""Particles of a row: the held one, and four of the other body. The sum of their positions times their
+weights, 1 and four with the sum -1, is the gap between the particle and its point."""
 
 SWEEPS = 6
-"""Times all rows of an island are gone through in a substep, an even number. Rows that share no particle need
-one."""
+"""Sweeps over all rows of an island per substep, an even number. Rows without shared particles need one."""
 
 CLOSE = 30.0
-"""Rate at which a gap closes [1/s]. Faster, rows that cannot all be satisfied at once, as of a fine mesh held
-by a coarse one, would shake what is light."""
+"""Closing rate of a gap [1/s]. At higher rates, conflicting rows, as of a fine mesh held by a coarse one,
+would shake light bodies."""
 
 MOST_SHIFT = 0.5
-"""Change of the weights, at most, that makes an impulse act where the particle is: what is farther off its
-place, over the size of the tetrahedron, is turned a little by the joint."""
+"""Largest change of the weights that moves an impulse to the particle's position. With larger gaps, relative
+to the tetrahedron, the joint does not conserve angular momentum exactly."""
 
 
 @holds_fields
 class JointFields:
-    """Joints, and the rows that they are made of, packed to the front in the order of joining.
+    """Joints and their rows, packed in the order of creation.
 
-    End k of row r is at r ENDS + k.
+    End k of row r has the index r ENDS + k.
     """
 
     def __init__(self, particles: int) -> None:
         """Allocate; contents are zero."""
-        self.bodies = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # numbers plus 1, 0 where there is no joint
-        self.rows = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # range
-        self.draw_speed = ti.field(ti.f32, MOST_JOINTS)  # [m/s] at which a gap closes, at most
+        self.bodies = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # indices plus 1, 0 if unused
+        self.rows = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # range of rows
+        self.draw_speed = ti.field(ti.f32, MOST_JOINTS)  # largest closing speed of a gap [m/s]
         self.impulse = ti.Vector.field(3, ti.f32, MOST_JOINTS)  # on the first body in the last step [N s]
         self.particle = ti.field(ti.i32, JOINT_ROWS * ENDS)
         self.weight = ti.field(ti.f32, JOINT_ROWS * ENDS)
-        self.share = ti.field(ti.f32, JOINT_ROWS * ENDS)  # of an impulse, in the last substep
+        self.share = ti.field(ti.f32, JOINT_ROWS * ENDS)  # share of the impulse in the last substep
         self.row_impulse = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # on the first end, in the last substep
-        self.approach = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # at which the gap is to change [m/s]
-        self.is_held = ti.field(ti.i32, particles)  # 1 where it is the first end of a row
+        self.approach = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # target rate of change of the gap [m/s]
+        self.is_held = ti.field(ti.i32, particles)  # 1 if it is the first end of a row
 
     def carried(self) -> list[list[Any]]:
-        """What the next step depends on: of each joint, of each row in use, of each of its ends."""
+        """Fields that the next step depends on: per joint, per row in use, and per end of a row."""
         return [
             [self.bodies, self.rows, self.draw_speed, self.impulse],
             [self.row_impulse],
@@ -72,7 +71,7 @@ class JointFields:
 
 @ti.func
 def _open_row(state: ti.template(), r, h, draw_speed):
-    """How an impulse of one row is shared out in this substep, and how fast its gap is to close."""
+    """Compute the impulse shares and the target closing speed of one row for this substep."""
     at = r * ENDS
     gap = ti.Vector.zero(ti.f32, 3)
     for k in range(at, at + ENDS):
@@ -80,7 +79,7 @@ def _open_row(state: ti.template(), r, h, draw_speed):
         state.joints.share[k] = state.joints.weight[k]
     a = state.particle_position[state.joints.particle[at + 1]]
     volume6, largest = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
-    for turn in range(2):  # the first time to see how large the shift is, the second to do it
+    for turn in range(2):  # first compute the size of the shift, then apply it
         part = ti.min(1.0, MOST_SHIFT / ti.max(largest, 1e-30))
         for i in range(3):
             b = state.particle_position[state.joints.particle[at + 2 + i]] - a
@@ -101,7 +100,7 @@ def _open_row(state: ti.template(), r, h, draw_speed):
 
 @ti.func
 def _solve_row(state: ti.template(), j, r):
-    """Let the gap of a row change as fast as it is to."""
+    """Apply the impulse that gives the gap of a row its target rate of change."""
     at = r * ENDS
     total, wanted = ti.cast(0.0, ti.f32), state.joints.approach[r]
     for k in range(at, at + ENDS):
@@ -122,7 +121,7 @@ def _solve_row(state: ti.template(), j, r):
 
 @ti.func
 def _turned(i, first, last, back):
-    """The number itself, or counted from the other end."""
+    """Index i, or its mirror image for a backward sweep."""
     return ti.select(back == 1, first + last - 1 - i, i)
 
 
@@ -130,12 +129,12 @@ def _turned(i, first, last, back):
 def solve_joints(
     state: ti.template(), island: ti.i32, h: ti.f32, is_first: ti.i32, common: ti.math.vec3
 ) -> ti.math.vec2:
-    """Let the joints of an island act for a substep of `h` [s], after all its bodies have been kicked.
+    """Solve the joints of an island for a substep of `h` [s], after the kicks of all its bodies.
 
     Args:
         is_first: 1 in the first substep of a step.
-        common: velocity that the bodies of the island share [m/s].
-    Returns: the highest speed of a particle that a joint names [m/s], and the highest beside `common`.
+        common: mean velocity of the bodies of the island [m/s].
+    Returns: the highest speed of a particle of a joint [m/s], absolute and relative to `common`.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     is_joined, member = 0, first
@@ -151,7 +150,7 @@ def solve_joints(
             for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
-                # What explodes takes no other with it.
+                # Ignore joints to a body that failed, so that it cannot damage others.
                 is_exploding = (
                     state.contact.is_exploding[body] + state.contact.is_exploding[ti.max(ends[1] - 1, 0)]
                 )
@@ -177,7 +176,7 @@ def solve_joints(
 
 @ti.func
 def are_joined(state: ti.template(), a, b):
-    """Whether a joint holds two bodies to each other (1)."""
+    """1 if a joint connects two bodies."""
     found = 0
     if state.body_drives[a] & state.body_drives[b] & JOINED != 0:
         for j in range(MOST_JOINTS):
@@ -189,7 +188,7 @@ def are_joined(state: ti.template(), a, b):
 
 @ti.func
 def mark_held(state: ti.template(), is_held):
-    """Note which particles joints hold (1), or held (0)."""
+    """Mark (1) or unmark (0) the particles that joints hold."""
     for j in range(MOST_JOINTS):
         if state.joints.bodies[j][0] > 0:
             r = state.joints.rows[j][0]
@@ -200,7 +199,7 @@ def mark_held(state: ti.template(), is_held):
 
 @ti.kernel
 def forget_held(state: ti.template()):
-    """Note that no particle is held, before joints change; each step finds anew which are."""
+    """Unmark all particles before joints change; each step marks them again."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)
@@ -217,12 +216,12 @@ def write_joint(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Begin a joint.
+    """Write a new joint.
 
     Args:
-        first: row, behind those of all others.
-        particles: of `body` and the four of `other` that hold it, (n, 5).
-        weights: of these, 1 and four that add up to -1, (n, 5).
+        first: first row, after those of all other joints.
+        particles: held particle of `body` and four particles of `other`, (n, 5).
+        weights: their weights, 1 and four with the sum -1, (n, 5).
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -244,7 +243,7 @@ def write_joint(
 
 @ti.kernel
 def end_joint(state: ti.template(), j: ti.i32):
-    """Let go, and close the gap in the rows."""
+    """Remove a joint, and close the gap in the rows."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)
@@ -274,7 +273,7 @@ def end_joint(state: ti.template(), j: ti.i32):
 
 @ti.kernel
 def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """What a joint did to its first body in the last step, (3,) [N s]."""
+    """Read the impulse of a joint on its first body in the last step, (3,) [N s]."""
     for k in ti.static(range(3)):
         impulse[k] = state.joints.impulse[j][k]
 
@@ -283,7 +282,7 @@ def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarra
 def add_joint_forces(
     state: ti.template(), body: ti.i32, h: ti.f32, forces: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Add what joints did to the particles of one body in the last substep of `h` [s] to (n, 3) [N]."""
+    """Add the forces of joints on the particles of one body in the last substep of `h` [s] to (n, 3) [N]."""
     ti.loop_config(serialize=True)
     for j in range(MOST_JOINTS):
         ends = state.joints.bodies[j]

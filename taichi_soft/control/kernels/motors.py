@@ -1,16 +1,15 @@
-"""Motors: their fields, and how they bring a part of a body to a speed about an axis, or along it.
+"""Motors: their fields, and how they drive a part of a body about or along an axis.
 
-A motor moves its particles by one pattern d: where it turns them about the axis a through c,
-d = a x (x - c) [m]; where it pushes them along the axis, d = a. With velocities v after the forces of a
-substep of h seconds
+A motor moves its particles by one pattern d: d = a x (x - c) [m] for a rotation about the axis a through c,
+and d = a for a push along the axis. With velocities v after the forces of a substep of h seconds
 
     inertia  I = sum m d.d        speed  w = sum m d.v / I
     impulse  J = I (wanted - w), no larger than limit h
     v += J / I d
 
-The pattern is that of a rigid motion, so a motor deforms only what lies between its particles and the rest of
-the body. The particles have the wanted speed after the substep's forces, unless that takes more than the
-limit. An axis that turns with the particles lies in them as it lay in the rest shape.
+The pattern is a rigid motion, so a motor deforms only the region between its particles and the rest of the
+body. The particles have the target speed after the substep's forces, unless that exceeds the limit. An axis
+that rotates with the particles keeps its position in the rest shape.
 """
 
 from typing import Any
@@ -24,27 +23,27 @@ from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
-"""Motors of one world at a time, and particles that all of them drive together."""
+"""Largest number of motors of a world, and of particles of all motors."""
 
 MOST_CHANGE = 0.25
-"""Of a particle's velocity in a substep, over the speed of sound in its body: what is moved faster than that
-leaves the rest of the body behind, torn."""
+"""Largest change of a particle's velocity per substep, over the speed of sound in its body. Faster changes
+would tear the particles off the rest of the body."""
 
 
 @ti.dataclass
 class MotorRow:
     """One motor."""
 
-    body: ti.i32  # its number plus 1, 0 where there is no motor
-    first: ti.i32  # of its rows in `MotorFields.particle`, and the row behind the last
+    body: ti.i32  # index plus 1, 0 if unused
+    first: ti.i32  # first row in `MotorFields.particle`, and the row after the last
     end: ti.i32
-    turns: ti.i32  # 1 where it turns particles about its axis, 0 where it pushes them along that
-    is_fixed: ti.i32  # 1 where the axis keeps its direction, 0 where it turns with the particles
-    has_point: ti.i32  # 1 where it passes through a point, 0 where through the centre of the particles
+    turns: ti.i32  # 1: rotates particles about its axis, 0: pushes them along it
+    is_fixed: ti.i32  # 1: the axis keeps its direction, 0: it rotates with the particles
+    has_point: ti.i32  # 1: it passes through a point, 0: through the centre of the particles
     axis: ti.math.vec3  # of unit length, in space or in the rest shape
     point: ti.math.vec3  # [m]
-    speed: ti.f32  # wanted [rad/s] or [m/s]
-    limit: ti.f32  # of torque [N m] or force [N]
+    speed: ti.f32  # target [rad/s] or [m/s]
+    limit: ti.f32  # largest torque [N m] or force [N]
 
 
 @holds_fields
@@ -55,26 +54,26 @@ class MotorFields:
         """Allocate; contents are zero."""
         self.motor = MotorRow.field(shape=MOST_MOTORS)  # type: ignore[attr-defined]
         self.particle = ti.field(ti.i32, MOTOR_ROWS)
-        self.is_driven = ti.field(ti.i32, bodies)  # 1 where a motor drives it
+        self.is_driven = ti.field(ti.i32, bodies)  # 1 if a motor drives it
         self.impulse = ti.field(ti.f32, MOST_MOTORS)  # in the last step [N m s] or [N s]
 
     def clear(self, loader: Loader) -> None:
-        """Let there be no motor."""
+        """Remove all motors."""
         loader.fill(self.motor.body, np.zeros(0))
         loader.fill(self.is_driven, np.zeros(0))
         loader.fill(self.impulse, np.zeros(0))
 
     def carried(self) -> list[list[Any]]:
-        """What is read of each motor after a step. The next step depends on what Python knows of it."""
+        """Results of each motor. The inputs of the next step are stored in Python."""
         return [[self.impulse]]
 
 
 @ti.func
 def _axis_now(state: ti.template(), motor):
-    """A point on the axis of a motor [m], and its direction.
+    """Current point on the axis of a motor [m], and its direction.
 
-    One that turns with the particles does so by the rotation that is nearest to sum m x r^T, x now and r at
-    rest from their centres.
+    An axis that rotates with the particles uses the rotation nearest to sum m x r^T, with current x and rest
+    r relative to their centres.
     """
     first = state.motors.particle[motor.first]
     x0, r0 = state.particle_position[first], state.rest_position[first]
@@ -107,7 +106,7 @@ def _pattern(state: ti.template(), motor, p, point, axis):
 
 @ti.func
 def _run_motor(state: ti.template(), motor, h, kick):
-    """Returns: the impulse that it gave [N m s] or [N s]."""
+    """Apply a motor. Returns: its impulse [N m s] or [N s]."""
     gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
     point, axis = _axis_now(state, motor)
     inertia, momentum, longest = point.x * 0.0, point.x * 0.0, point.x * 0.0
@@ -123,13 +122,13 @@ def _run_motor(state: ti.template(), motor, h, kick):
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
         row = row_behind(row)
-    impulse = h * 0.0  # the point may be infinite
+    impulse = h * 0.0  # NaN if the point is infinite
     if inertia > 0.0:
         speed = momentum / inertia
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
         change = ti.max(-most, ti.min(motor.speed - speed, most))
         pushed = inertia * change
-        # Or the body is on its way to infinity.
+        # Otherwise the body diverges.
         if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18 and ti.abs(pushed) < 1e18:
             row = motor.first
             while row < motor.end:
@@ -144,10 +143,10 @@ def _run_motor(state: ti.template(), motor, h, kick):
 
 @ti.real_func
 def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32):
-    """Let the motors of one body act for a substep of `h` [s], in a world with contact.
+    """Apply the motors of one body for a substep of `h` [s].
 
-    They look at the velocities after a kick of the forces [s]: so they feel what holds against them. Without
-    one, forces are found later (0), and gravity alone is felt.
+    They use the velocities after a kick of `kick` [s], so that they include resisting forces. If `kick` is 0,
+    forces are computed later, and they include gravity only.
 
     Args:
         is_first: 1 in the first substep of a step.
@@ -159,7 +158,7 @@ def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_f
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
                 if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
-                    state.contact.calm[body] = 0.0  # however slowly it begins to move
+                    state.contact.calm[body] = 0.0  # keeps a slow start from counting as rest
 
 
 @ti.kernel
@@ -169,13 +168,12 @@ def write_motors(
     numbers: ti.types.ndarray(dtype=ti.f32, ndim=2),
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Let there be these motors, and no other.
+    """Replace all motors.
 
     Args:
-        rows: of each its number, its body, first row, the row behind the last, `turns`, `is_fixed`,
-            `has_point`, (k, 7).
-        numbers: axis, point [m], wanted speed, limit, (k, 8).
-        particles: of all rows.
+        rows: index, body, first row, row after the last, `turns`, `is_fixed` and `has_point` of each, (k, 7).
+        numbers: axis, point [m], target speed and limit of each, (k, 8).
+        particles: particles of all rows.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -207,14 +205,14 @@ def write_motors(
 
 @ti.kernel
 def write_drive(state: ti.template(), number: ti.i32, speed: ti.f32, limit: ti.f32):
-    """What speed a motor drives towards from now on, and how strongly at most."""
+    """Write the target speed and the limit of a motor."""
     state.motors.motor[number].speed = speed
     state.motors.motor[number].limit = limit
 
 
 @ti.kernel
 def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
-    """Of the particles that a motor drives, about its axis [rad/s] or along it [m/s]."""
+    """Read the speed of a motor's particles about its axis [rad/s] or along it [m/s]."""
     inertia, momentum = 0.0, 0.0
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -232,5 +230,5 @@ def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
 
 @ti.kernel
 def forget_impulse(state: ti.template(), number: ti.i32):
-    """What the last motor of that number did is not what the next one did."""
+    """Clear the impulse of a motor before its index is reused."""
     state.motors.impulse[number] = 0.0

@@ -1,8 +1,8 @@
-"""Pinned particles: no inverse mass, and a velocity that somebody else decides.
+"""Pinned particles: their inverse mass is zero, and their velocity is prescribed.
 
-`particle_aim` says where one goes in the coming step: nowhere (`STILL`), to its target (`TO_TARGET`), nowhere
-any more (`ARRIVED`, with the velocity of the step before still to be taken from it), or with a frame
-(`WITH_FRAME` plus its number), in whose axes its target is.
+`particle_aim` is its motion in the next step: none (`STILL`), to its target (`TO_TARGET`), none after it has
+reached its target, with its velocity still to clear (`ARRIVED`), or with a frame (`WITH_FRAME` plus its
+row), in whose axes the target is given.
 """
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS, SKIPPING
@@ -14,7 +14,7 @@ STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
 
 @ti.kernel
 def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Stop particles and hold them where they are."""
+    """Pin particles at their positions, at rest."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]
@@ -27,7 +27,7 @@ def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32
 
 @ti.kernel
 def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Give pinned particles their mass back, with the velocity that they have."""
+    """Restore the mass of pinned particles; they keep their velocity."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]
@@ -37,7 +37,7 @@ def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i3
 
 @ti.kernel
 def read_pinned(state: ti.template(), begin: ti.i32, pinned: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """1 where a vertex of one body is pinned, in the caller's order."""
+    """Write 1 for each pinned vertex of one body, in the caller's order."""
     ti.loop_config(serialize=True)
     for i in range(pinned.shape[0]):
         pinned[i] = int(state.particle_inv_mass[state.particle_of_vertex[begin + i]] == 0.0)
@@ -50,11 +50,11 @@ def write_targets(
     targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Say where pinned particles are at the end of the coming step [m].
+    """Write the positions of pinned particles at the end of the next step [m].
 
     Args:
-        found: receives the number of the first in `particles` that is not pinned, with nothing changed, or
-            -1: (1,).
+        found: (1,), receives the index in `particles` of the first one that is not pinned (then nothing is
+            changed), or -1.
     """
     loose = -1
     ti.loop_config(serialize=True)
@@ -81,7 +81,7 @@ def attach_particles(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     places: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Let particles of one body go with a frame, at `places` in its axes [m], and feel their load or not."""
+    """Attach particles of one body to a frame at `places` in its axes [m]; `feels` records their load."""
     i = 0
     while i < particles.shape[0]:
         p = particles[i]
@@ -98,7 +98,7 @@ def attach_particles(
 
 @ti.kernel
 def write_feeling(state: ti.template(), body: ti.i32, feels: ti.i32):
-    """Whether what the pins of one body take up is added up."""
+    """Write whether the load on one body's pins is recorded."""
     bit = ti.select(feels != 0, FEELS_REACTION, 0)
     state.body_drives[body] = (state.body_drives[body] & ~FEELS_REACTION) | bit
 
@@ -111,7 +111,7 @@ def read_reaction(
     origin: ti.types.ndarray(dtype=ti.f32, ndim=1),
     load: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Impulse [N s] and its moment about a point [N m s], (6,), that `particles` took up in the last step."""
+    """Read the impulse on `particles` in the last step [N s], and its moment about a point [N m s], (6,)."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         center = ti.Vector([origin[0], origin[1], origin[2]])
@@ -130,11 +130,11 @@ def read_reaction(
 def aim_pinned(
     state: ti.template(), body_count: ti.i32, dt: ti.f32, frames: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ) -> ti.i32:
-    """Give pinned particles the velocity that takes them in a step of `dt` [s] to where they are to be.
+    """Set the velocity of pinned particles that moves them to their targets in a step of `dt` [s].
 
     Args:
-        frames: where each frame is then: rotation matrix, row by row, and position [m], (f, 12).
-    Returns: how many bodies will have to be looked at before the step after, too.
+        frames: poses of all frames after the step: rotation matrix by rows, and position [m], (f, 12).
+    Returns: number of bodies that need another call before the following step.
     """
     waiting = 0
     ti.loop_config(serialize=True)
@@ -165,7 +165,7 @@ def aim_pinned(
 
 @ti.func
 def _aim(state: ti.template(), p, dt, frames: ti.template()):
-    """Returns 1 where the particle will have to be aimed again."""
+    """Set the velocity of one pinned particle. Returns: 1 if it needs another call."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
     if aim >= WITH_FRAME:
@@ -181,7 +181,7 @@ def _aim(state: ti.template(), p, dt, frames: ti.template()):
 
 @ti.func
 def in_world(frames: ti.template(), frame, local):
-    """A point in the axes of a frame, in those of the world [m]."""
+    """Transform a point from a frame's axes to the world's [m]."""
     return ti.Vector(
         [
             frames[frame, 3 * i] * local.x

@@ -1,4 +1,4 @@
-"""What frames, hands and other bodies feel of a body."""
+"""Loads of a body on frames, grabs and joints."""
 
 from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.joints import ENDS, MOST_JOINTS
@@ -7,7 +7,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def forget_loads(state: ti.template(), body):
-    """Of a step that was undone because the body broke: NaN otherwise, for as long as it is frozen."""
+    """Clear the loads of a step that was undone because the body failed; otherwise they stay NaN."""
     zero = ti.Vector.zero(state.real, 3)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):

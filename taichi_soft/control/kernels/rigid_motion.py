@@ -1,4 +1,4 @@
-"""A whole body moved or set in motion as a rigid one, between two steps."""
+"""Move a whole body, or set its velocity, as a rigid body between two steps."""
 
 from taichi_soft.bodies.status import JUST_PLACED
 from taichi_soft.control.kernels.pins import TO_TARGET
@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def _center_of_mass(state: ti.template(), body):
-    """In float64 [m]."""
+    """Centre of mass in float64 [m]."""
     particles = state.body_particles[body]
     moment, mass = ti.Vector.zero(ti.f64, 3), ti.cast(0.0, ti.f64)
     p = particles[0]
@@ -32,11 +32,11 @@ def write_rigid_velocity(
     motion: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Set the velocities of one body, but for pinned particles, to those of a rigid one.
+    """Set the velocities of one body, except pinned particles, to a rigid motion.
 
     Args:
         motion: velocity of the centre of mass [m/s], angular velocity [rad/s]: (6,).
-        found: receives the highest speed [m/s], (1,); if that is too high, nothing is changed.
+        found: receives the highest speed [m/s], (1,). If it is too high, nothing is changed.
     """
     fastest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)
@@ -73,15 +73,14 @@ def jump(
     turn: ti.types.ndarray(dtype=ti.f64, ndim=2),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Turn one body about its centre of mass and put that somewhere else, with where it was before the step
-    and where its pins are to be after the coming one.
+    """Rotate one body about its centre of mass and move it, together with its previous positions and the
+    targets of its pins.
 
     Args:
-        place: the new centre [m], the height below which nothing may come [m], what the velocity is
-            multiplied by: (5,).
+        place: new centre [m], smallest allowed height [m], factor on the velocity: (5,).
         turn: rotation matrix (3, 3).
-        found: receives the lowest height, the highest, and the largest coordinate [m], (3,); where they are
-            out of bounds nothing is changed.
+        found: receives the lowest and the highest height and the largest coordinate [m], (3,). If they are
+            out of bounds, nothing is changed.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

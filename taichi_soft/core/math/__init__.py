@@ -1,1 +1,1 @@
-"""Small algebra on values: pure Taichi functions, usable in float32 and float64 alike."""
+"""Linear algebra on values: pure Taichi functions for float32 and float64."""

@@ -1,4 +1,4 @@
-"""Where points lie in tetrahedra, in NumPy: LAPACK would round otherwise on another processor."""
+"""Barycentric coordinates in NumPy without LAPACK, whose rounding depends on the processor."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Floats = NDArray[np.float64]
 
 
 def edge_inverses(corners: Floats) -> Floats:
-    """A^-1 of thesis eq. 6.1 by Cramer's rule, (..., 3, 3) [1/m], of corners (..., 4, 3) [m].
+    """Compute A^-1 of thesis eq. 6.1 by Cramer's rule, (..., 3, 3) [1/m], for corners (..., 4, 3) [m].
 
     Rows are the gradients of the barycentric coordinates of corners 1 to 3.
     """
@@ -19,12 +19,12 @@ def edge_inverses(corners: Floats) -> Floats:
 
 
 def barycentric(points: Floats, corners: Floats) -> Floats:
-    """Coordinates (..., 4) of points (..., 3) [m], each in its tetrahedron."""
+    """Barycentric coordinates (..., 4) of points (..., 3) [m], each in its tetrahedron."""
     return shares_by(edge_inverses(corners), points - corners[..., 0, :])
 
 
 def shares_by(inverses: Floats, arms: Floats) -> Floats:
-    """The same by what `edge_inverses` has found, of arms (..., 3) [m] from the first corners."""
+    """The same from a result of `edge_inverses`, for vectors (..., 3) [m] from the first corners."""
     x, y, z = arms[..., 0, None], arms[..., 1, None], arms[..., 2, None]
     rest = inverses[..., 0] * x + inverses[..., 1] * y + inverses[..., 2] * z
     return np.concatenate([1.0 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)

@@ -1,16 +1,16 @@
 """Eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
-Jacobi keeps its accuracy where eigenvalues coincide (a body at rest has three equal ones), which
-closed formulas do not in float32 (Golub and Van Loan, Matrix Computations, section 8.5).
+Jacobi stays accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in float32
+(Golub and Van Loan, Matrix Computations, section 8.5).
 """
 
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 6
-"""Convergence is quadratic once sorted out: four sweeps reach float32, six reach float64."""
+"""Number of sweeps. Convergence is quadratic: four sweeps reach float32, six reach float64."""
 
 NOTHING = 1e-17
-"""An entry whose share of the diagonal is smaller changes nothing there, not even in float64."""
+"""Relative size below which an off-diagonal entry does not change the diagonal, even in float64."""
 
 
 @ti.func

@@ -1,7 +1,7 @@
-"""Elementary functions by arithmetic alone, so that every processor and system gives the same bits.
+"""Elementary functions from arithmetic alone, bit-identical on every processor and system.
 
-A C library's `expf` and its like differ in their last bits from one system to the next. Here arguments are
-brought near 0, where Taylor's series are short. Results are within 4 ulps.
+The functions of C libraries, such as `expf`, differ in their last bits between systems. Here arguments are
+reduced to a range near 0, where Taylor series are short. Results are within 4 ulps.
 """
 
 import math
@@ -13,16 +13,16 @@ from taichi_soft.core.runtime import ti
 
 @dataclass(frozen=True)
 class _Kind:
-    """A floating-point format, with what is found to its last place in it."""
+    """Constants of a floating-point format."""
 
     real: Any
-    whole: Any  # integers of as many bits
+    whole: Any  # integer type of the same size
     fraction: int  # bits of the fraction
-    bias: int  # of the exponent
+    bias: int  # bias of the exponent
     root_half: int  # bits of the square root of 1/2
-    largest: float  # whose power, and the reciprocal of that, is a normal number
-    ln2: tuple[float, float]  # log(2) in two parts, the first of which times any exponent is exact
-    terms: tuple[int, int, int, int]  # of the series of exp, log, cosine and sine, arctangent
+    largest: float  # largest x for which e^x and e^-x are normal numbers
+    ln2: tuple[float, float]  # log(2) in two parts; the product of the first with any exponent is exact
+    terms: tuple[int, int, int, int]  # lengths of the series of exp, log, cosine and sine, arctangent
 
 
 _SINGLE = _Kind(
@@ -47,7 +47,7 @@ _DOUBLE = _Kind(
 )
 _LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
 _HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
-"""pi / 2 in two parts, the first of which times any whole number below 2^20 is exact in 64 bits."""
+"""pi / 2 in two parts; the product of the first with any integer below 2^20 is exact in 64 bits."""
 
 # Coefficients after the first terms: 1 + x of exp, 2 s of log, 1 and x of cosine and sine, x of arctangent.
 _EXP = [1.0 / math.factorial(k) for k in range(2, 14)]
@@ -58,13 +58,13 @@ _ATAN = [(-1.0) ** k / (2 * k + 1) for k in range(1, 22)]
 
 
 def _is_double(x: Any) -> bool:
-    """Whether a number of the kernel that Taichi compiles now has 64 bits."""
+    """True if a number of the current kernel has 64 bits."""
     return bool(x.ptr.get_rvalue_type() == ti.f64)
 
 
 @ti.func
 def _series(coefficients: ti.template(), count: ti.template(), x, kind: ti.template()):
-    """Sum of the first coefficients[k] x^k. Constants are wrapped: Taichi takes a bare one for 32 bits."""
+    """Sum of the first terms coefficients[k] x^k. Bare constants would have 32 bits, so wrap them."""
     total = kind.real(coefficients[count - 1])
     for k in ti.static(range(count - 2, -1, -1)):
         total = total * x + kind.real(coefficients[k])
@@ -84,9 +84,9 @@ def _exp(x, kind: ti.template()):
 
 @ti.func
 def _log(x, kind: ti.template()):
-    # Without the cast Taichi 1.7 takes the bits of a parameter for a number to convert, and crashes.
+    # Without the cast, Taichi 1.7 converts the bits of a parameter like a number, and crashes.
     bits = ti.bit_cast(ti.cast(x, kind.real), kind.whole)
-    # The fraction begins anew at the square root of 1/2, so that it is near 1 on both sides.
+    # The fraction is in [sqrt(1/2), sqrt(2)), so that it is near 1.
     exponent = (bits - kind.whole(kind.root_half)) >> kind.whole(kind.fraction)
     m = ti.bit_cast(bits - (exponent << kind.whole(kind.fraction)), kind.real)
     s = (m - kind.real(1.0)) / (m + kind.real(1.0))
@@ -126,13 +126,13 @@ def _atan2(y, x, kind: ti.template()):
 
 @ti.func
 def exp(x):
-    """e^x of a number. The largest is that of 87 (64 bits: 708), and below -87 (-708) it is 0."""
+    """e^x, clamped to e^87 (64 bits: e^708), and 0 below -87 (-708)."""
     return _exp(x, _DOUBLE) if ti.static(_is_double(x)) else _exp(x, _SINGLE)
 
 
 @ti.func
 def log(x):
-    """Natural logarithm of a number that is normal, and above 0."""
+    """Natural logarithm of a normal positive number."""
     return _log(x, _DOUBLE) if ti.static(_is_double(x)) else _log(x, _SINGLE)
 
 
@@ -150,7 +150,7 @@ def log_each(v):
 
 @ti.func
 def cos_sin(x):
-    """Cosine and sine of an angle [rad] below 10^6: two numbers."""
+    """Cosine and sine of an angle [rad] below 10^6."""
     return _cos_sin(x, _DOUBLE) if ti.static(_is_double(x)) else _cos_sin(x, _SINGLE)
 
 

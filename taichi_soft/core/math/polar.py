@@ -1,20 +1,21 @@
-"""The rotation in a 3x3 matrix: R of the polar decomposition F = U R."""
+"""Rotation R of the polar decomposition F = U R of a 3x3 matrix."""
 
 from taichi_soft.core.math.tensors import cofactor, determinant, plus
 from taichi_soft.core.runtime import ti
 
 ROUNDS = 6
-"""Five reach float32, six float64, also for flat matrices (a 10^8 th of their size across)."""
+"""Number of iterations: five reach float32, six float64, even for flat matrices (aspect ratio 10^8)."""
 
 
 @ti.func
 def orthogonal_factor(F):
-    """The orthogonal matrix nearest to F, as columns: a rotation, or one that mirrors where F does.
+    """Nearest orthogonal matrix to F, as columns: a rotation, or a reflection if F mirrors.
 
-    Newton's iteration for the polar decomposition with scaling by norms (Higham 1986), in cofactors instead
-    of inverses: F and cof F have the same singular vectors, and their sum evens out the singular values. So
-    flat matrices are no special case, and without branches the lanes of a block go side by side. What has
-    shrunk to a line has no such matrix; then the result is finite and means nothing.
+    Newton's iteration for the polar decomposition with scaling by norms (Higham 1986), with cofactors
+    instead of
+    inverses: F and cof F have the same singular vectors, and their sum equalises the singular values. So flat
+    matrices are no special case, and the code is branch-free for vectorisation. For a matrix of rank 1 the
+    result is finite but arbitrary.
     """
     a, b, c = F[0], F[1], F[2]
     side = ti.select(determinant(F) < 0.0, -1.0, 1.0)

@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def turned(q, v):
-    """A vec3 turned by `q`."""
+    """Rotate a vec3 by `q`."""
     axis = q.xyz
     t = 2.0 * axis.cross(v)
     return v + q.w * t + axis.cross(t)
@@ -14,7 +14,7 @@ def turned(q, v):
 
 @ti.func
 def turned_back(q, v):
-    """A vec3 turned by the inverse of `q`."""
+    """Rotate a vec3 by the inverse of `q`."""
     axis = q.xyz
     t = 2.0 * v.cross(axis)
     return v + q.w * t + t.cross(axis)
@@ -22,7 +22,7 @@ def turned_back(q, v):
 
 @ti.func
 def spun(q, rotation):
-    """`q` and then a turn by the rotation vector [rad], as one quaternion."""
+    """Compose `q` with a following rotation by a rotation vector [rad]."""
     angle2 = rotation.dot(rotation)
     result = q
     if angle2 > 0.0:

@@ -1,7 +1,7 @@
 """Rotations as unit quaternions (x, y, z, w), in float64.
 
-Each sum is written out in its order, so that another language gets the same bits: libraries of linear algebra
-round a dot product as they like, and so do C libraries with sine and arctangent.
+Each sum has an explicit order, so that other languages are bit-identical. Dot products of linear algebra
+libraries, and sine and arctangent of C libraries, round differently.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
-    """Rows of the matrix that turns as a unit quaternion does, of numbers or arrays."""
+    """Rows of the rotation matrix of a unit quaternion, for numbers or arrays."""
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -25,7 +25,7 @@ def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
 
 
 def length_of(vector: Floats) -> float:
-    """Of three or four numbers."""
+    """Length of three or four numbers."""
     total = 0.0
     for each in vector.tolist():
         total += each * each
@@ -33,14 +33,14 @@ def length_of(vector: Floats) -> float:
 
 
 def turned(points: Floats, rows: Floats) -> Floats:
-    """Points (n, 3), each multiplied by a matrix (3, 3)."""
+    """Multiply points (n, 3) by a matrix (3, 3)."""
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in rows], axis=1)
 
 
 def quaternion_of(matrix: Floats) -> Floats:
-    """The quaternion of a rotation matrix (3, 3), with w of 0 or more."""
-    # 4 q q^T, whose rows are all q times one of its components: the longest is the most exact.
+    """Convert a rotation matrix (3, 3) to a quaternion with w of 0 or more."""
+    # The rows of 4 q q^T are multiples of q: the longest is the most exact.
     m = matrix
     trace = m[0, 0] + m[1, 1] + m[2, 2]
     skew = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
@@ -54,12 +54,12 @@ def quaternion_of(matrix: Floats) -> Floats:
 
 
 def matrix_of(quaternion: Floats) -> Floats:
-    """The rotation matrix (3, 3) of a unit quaternion."""
+    """Convert a unit quaternion to a rotation matrix (3, 3)."""
     return np.array(turning_rows(*quaternion.tolist()))
 
 
 def multiplied(second: Floats, first: Floats) -> Floats:
-    """The turn `first` and then `second`."""
+    """Product of quaternions: the rotation `first`, then `second`."""
     (a, b, c, w), (d, e, f, u) = second.tolist(), first.tolist()
     return np.array(
         [
@@ -72,7 +72,7 @@ def multiplied(second: Floats, first: Floats) -> Floats:
 
 
 def rotation_vector(start: Floats, end: Floats) -> Floats:
-    """The shortest turn from one quaternion to another: axis times angle, (3,) [rad]."""
+    """Shortest rotation from one quaternion to another: axis times angle, (3,) [rad]."""
     turn = multiplied(end, np.r_[-start[:3], start[3]])
     if turn[3] < 0:
         turn = -turn
@@ -83,7 +83,7 @@ def rotation_vector(start: Floats, end: Floats) -> Floats:
 
 
 def turned_by(quaternion: Floats, vector: Floats) -> Floats:
-    """A quaternion turned further by a rotation vector [rad], of unit length."""
+    """Compose a quaternion with a following rotation vector [rad], normalised."""
     angle = length_of(vector)
     cosine, sine = _cos_sin(0.5 * angle)
     axis = vector * (0.5 if angle == 0.0 else sine / angle)
@@ -92,10 +92,10 @@ def turned_by(quaternion: Floats, vector: Floats) -> Floats:
 
 
 def _cos_sin(angle: float) -> tuple[float, float]:
-    """Taylor's series of an eighth of the angle [rad], which is doubled three times."""
+    """Cosine and sine by the Taylor series of an eighth of the angle [rad], doubled three times."""
     part = (angle - math.tau * math.floor(angle / math.tau + 0.5)) / 8.0
     square = part * part
-    behind = versine = 0.0  # the sine is part (1 - behind), the cosine is 1 - versine
+    behind = versine = 0.0  # sine = part (1 - behind), cosine = 1 - versine
     for k in range(16, 0, -2):
         behind = (1.0 - behind) * square / (k * (k + 1))
         versine = (1.0 - versine) * square / (k * (k - 1))
@@ -106,7 +106,7 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angle(sine: float, cosine: float) -> float:
-    """Gregory's series of the tangent of a quarter. The cosine is 0 or more. Returns: radians."""
+    """Angle [rad] by Gregory's series of the tangent of its quarter. The cosine must be 0 or more."""
     tangent = sine / (1.0 + cosine)
     tangent = tangent / (1.0 + math.sqrt(1.0 + tangent * tangent))
     square, behind = tangent * tangent, 0.0

@@ -1,4 +1,4 @@
-"""Loops over rows of which one copy is compiled."""
+"""Loops over rows that compile to a single copy."""
 
 from taichi_soft.core.constants import ROW_BITS
 from taichi_soft.core.runtime import ti
@@ -6,10 +6,9 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def row_behind(row):
-    """The next row, in a loop with `while`.
+    """Next row of a `while` loop.
 
-    LLVM makes vector and unrolled copies of a loop whose turns it can count beforehand: up to ten times the
-    code of the loop, which every start of a game compiles anew. By this it cannot count. For loops that run
-    seldom.
+    LLVM makes vectorised and unrolled copies of loops with a known trip count, up to ten times the code,
+    which increases compile time. This function hides the trip count. Use it for loops that run rarely.
     """
     return (row + 1) & ROW_BITS

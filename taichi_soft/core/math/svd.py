@@ -1,4 +1,4 @@
-"""Singular values of a 3x3 matrix with the sign of its determinant, and the rotation nearest to it."""
+"""Signed singular value decomposition of a 3x3 matrix, and its nearest rotation."""
 
 from taichi_soft.core.math.eigen import symmetric_eigen
 from taichi_soft.core.math.tensors import inner_square, times
@@ -7,9 +7,9 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def signed_svd(F):
-    """U, s and V of F = U diag(s) V^T, U and V rotations, s0 >= s1 >= |s2|, s2 negative where F mirrors.
+    """Decompose F = U diag(s) V^T with rotations U and V, s0 >= s1 >= |s2|, and s2 negative if F mirrors.
 
-    U is built from the images of V's columns, so it stays a rotation where F is flat or zero.
+    U is built from the images of V's columns, so it stays a rotation for a flat or zero F.
     Args:
         F: as columns.
     Returns: U as columns, s as vec3, V as columns.
@@ -22,7 +22,7 @@ def signed_svd(F):
     b = b - u0 * u0.dot(b)
     s1 = ti.sqrt(b.dot(b))
     u1 = b / ti.max(s1, 1e-30)
-    if s1 <= 1e-6 * s0:  # b has no direction that means anything: any at right angles to u0
+    if s1 <= 1e-6 * s0:  # the direction of b is undefined: take any perpendicular to u0
         u1 = u0.cross(V[1])
         if u1.dot(u1) < 0.1:
             u1 = u0.cross(V[2])
@@ -33,7 +33,7 @@ def signed_svd(F):
 
 @ti.func
 def nearest_rotation(F):
-    """U V^T of F = U S V^T: the rotation nearest to F, as rows.
+    """Nearest rotation to F, U V^T of F = U S V^T, as rows.
 
     Args:
         F: as columns.

@@ -1,7 +1,7 @@
 """3x3 matrices as a tuple of their three columns.
 
-Taichi 1.7 expands `ti.Matrix` products into scalars at once, but keeps vector operations whole until
-late. Writing the algebra column by column halves the compile time of every law at the same speed.
+Taichi 1.7 expands `ti.Matrix` products into scalars early, but vector operations late. Writing the algebra
+column by column halves the compile time of every law at the same speed.
 """
 
 from taichi_soft.core.runtime import ti
@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def widened(v):
-    """A vec3 with a zero behind: four numbers are loaded and stored in one piece."""
+    """Extend a vec3 by a zero, because four numbers are loaded and stored as one vector."""
     return ti.Vector([v.x, v.y, v.z, v.x * 0.0])
 
 
@@ -89,7 +89,7 @@ def determinant(columns):
 
 @ti.func
 def cofactor(columns):
-    """det(M) M^-T, as columns: no division, so it also holds where the matrix is singular."""
+    """det(M) M^-T, as columns; computed without division, so it is valid for singular matrices."""
     return columns[1].cross(columns[2]), columns[2].cross(columns[0]), columns[0].cross(columns[1])
 
 

@@ -1,22 +1,21 @@
-"""Geometry of one triangle: what is nearest, what a line of sight meets, how much of the view it fills."""
+"""Geometry of one triangle: closest point, ray intersection, solid angle, overlap with a box."""
 
 from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Least divisor: what is smaller is a length of zero in float32, and its numerator is then zero too."""
+"""Smallest divisor: smaller ones are zero lengths in float32, and their numerators are zero too."""
 
 
 @ti.func
 def closest_point_on_triangle(x, a, b, c):
-    """Barycentric coordinates of the triangle's point nearest to x, vec3.
+    """Barycentric coordinates of the triangle's closest point to x, vec3.
 
-    The nearest of the projection onto the plane, where that falls inside, and of the nearest points of the
-    three edges. Each is a point of the triangle whatever the rounding, so flat triangles, down to a segment
-    or a point, are no special case.
+    It is the closest of the projection onto the plane, if that is inside, and the closest points of the three
+    edges. All are points of the triangle for any rounding, so degenerate triangles are no special case.
     Args:
         x, a, b, c: vec3 [m].
-    Returns: weights of a, b and c, each from 0 to 1, of sum 1.
+    Returns: weights of a, b and c, each from 0 to 1, with sum 1.
     """
     ab, ac, ax = b - a, c - a, x - a
     bc, bx = c - b, x - b
@@ -32,7 +31,7 @@ def closest_point_on_triangle(x, a, b, c):
         t = ti.min(ti.max(away.dot(along) / ti.max(along.dot(along), _TINY), 0.0), 1.0)
         gap = away - along * t
         distance = gap.dot(gap)
-        is_nearer = distance < best  # no branch: it would keep lanes from running side by side
+        is_nearer = distance < best  # branch-free for vectorisation
         best = ti.select(is_nearer, distance, best)
         v = ti.select(is_nearer, (t, 1.0 - t, 0.0)[edge], v)
         w = ti.select(is_nearer, (0.0, t, t)[edge], w)
@@ -41,14 +40,15 @@ def closest_point_on_triangle(x, a, b, c):
 
 @ti.func
 def pierce_triangle(a, b, c):
-    """Where the z axis goes through a triangle: for a ray, in axes whose z runs along it from its start.
+    """Intersect the z axis with a triangle: for rays, in axes with the origin at the ray's start and z along
+    it.
 
-    The axis is as thick as float32 resolves at the triangle's distance, so nothing slips through between two
-    triangles. One that is seen edge on is not met: its neighbours are.
+    The axis has the thickness of float32's resolution at the triangle's distance, so no ray passes between
+    two triangles. A triangle seen edge-on is not hit, but its neighbours are.
     Args:
         a, b, c: vec3 [m].
-    Returns: -1 where the axis enters through the front (from which a, b, c run counterclockwise), 1 where it
-        leaves through it, 0 where it passes by; and the weights of a, b and c there, vec3 of sum 1.
+    Returns: -1 if the axis enters through the front (from which a, b, c run counterclockwise), 1 if it leaves
+        through it, 0 if it misses; and the weights of a, b and c at the hit, vec3 with sum 1.
     """
     areas = ti.Vector([b.x * c.y - b.y * c.x, c.x * a.y - c.y * a.x, a.x * b.y - a.y * b.x])
     across = ti.max(ti.abs(a.x), ti.abs(a.y), ti.abs(b.x), ti.abs(b.y), ti.abs(c.x), ti.abs(c.y))
@@ -63,10 +63,10 @@ def pierce_triangle(a, b, c):
 
 @ti.func
 def solid_angle(a, b, c):
-    """How much of the view from the origin a triangle fills [sr], negative seen from its front.
+    """Solid angle of a triangle from the origin [sr], negative seen from its front.
 
-    Over a closed surface that looks outward the sum is 4 pi inside and 0 outside. Van Oosterom and Strackee
-    1983.
+    The sum over a closed surface that faces outward is 4 pi inside and 0 outside (Van Oosterom and Strackee
+    1983).
     """
     la, lb, lc = a.norm(), b.norm(), c.norm()
     down = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
@@ -75,13 +75,13 @@ def solid_angle(a, b, c):
 
 @ti.func
 def triangle_touches_box(a, b, c, half):
-    """Whether a triangle has a point in the box from -half to half, which includes its faces.
+    """True if a triangle touches the box from -half to half, including its faces.
 
-    By separating axes: the normals of the box and of the triangle, and the cross products of their edges
-    (Akenine-Moeller 2001). A flat triangle leaves the axes of a segment or a point.
+    Uses separating axes: the normals of the box and of the triangle, and the cross products of their edges
+    (Akenine-Moeller 2001). A degenerate triangle uses the axes of a segment or a point.
     """
     normal = (b - a).cross(c - a)
-    heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal, unless the triangle is flat
+    heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal up to rounding
     reach = ti.abs(normal).dot(half)
     touches = spans_meet(a, b, c, half) and heights.max() >= -reach and heights.min() <= reach
     for edge in ti.static((b - a, c - b, a - c)):
@@ -93,5 +93,5 @@ def triangle_touches_box(a, b, c, half):
 
 @ti.func
 def spans_meet(a, b, c, reach):
-    """Whether along each axis something of a, b and c lies between -reach and reach."""
+    """True if the interval of a, b and c overlaps [-reach, reach] along each axis."""
     return ti.min(ti.max(a, b, c) + reach, reach - ti.min(a, b, c)).min() >= 0.0

@@ -1,1 +1,1 @@
-"""What a world file has kernels for that Python does otherwise."""
+"""Kernels of a world file that replace Python code."""

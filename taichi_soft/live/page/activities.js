@@ -1,4 +1,4 @@
-// What is being prepared, how far it is and for how long, shown for as long as it goes on.
+// Shows running tasks with their progress and elapsed time.
 export class Activities {
   constructor(box) {
     this.box = box;

@@ -1,4 +1,4 @@
-// Keeps a connection, hands packets to the view and messages to the panel.
+// Keeps the connection; passes packets to the view and messages to the panel.
 import { Activities } from "./activities.js";
 import { Panel } from "./panel.js";
 import { View } from "./view.js";
@@ -14,7 +14,7 @@ const send = request => {
   socket.send(request instanceof ArrayBuffer ? request : JSON.stringify(request));
 };
 
-// Of the values that a slider takes between two frames of the screen, the newest is sent. Other requests wait for it.
+// Sends only the newest value of each slider per screen frame. Other requests are sent after it.
 const values = new Map();
 const sendValues = () => { values.forEach(send); values.clear(); };
 const ask = request => {
@@ -22,7 +22,7 @@ const ask = request => {
   else { sendValues(); send(request); }
 };
 
-// From a move of the hand to the frame after the one that first shows it [ms], of the last moves.
+// Latency of the last moves: from a move of the hand to the frame after the first one that shows it [ms].
 const begun = new Map(), late = [];
 let pull = 0;
 
@@ -35,7 +35,7 @@ function arrived(pull) {
   document.getElementById("late").textContent = `${share(0.5)}, ${share(0.95)} ms`;
 }
 
-// A hand moves at most 60 times a second: pointers tell more often.
+// Send at most 60 moves per second; pointers report more.
 let moved = null, movedAt = 0, moves = 0;
 const hand = {
   grab: (pane, origin, direction) => ask({ do: "grab", pane, origin, direction }),
@@ -51,7 +51,7 @@ let view;
 try {
   view = new View(canvas, hand);
 } catch (error) {
-  say("this browser has no WebGL to draw with: switch its hardware acceleration on, or take another browser");
+  say("this browser has no WebGL: turn on hardware acceleration, or use another browser");
   throw error;
 }
 view.shot = () => canvas.toBlob(blob => panel.offer(URL.createObjectURL(blob), "live.png"));
@@ -66,7 +66,7 @@ function connect() {
     waiting = [];
     tries += 1;
     activities.show([]);
-    say(event.code === 1008 ? "cut off: too many messages" : "there is no connection: it was refused, or the server has ended");
+    say(event.code === 1008 ? "disconnected: too many messages" : "no connection: the server refused it or has ended");
     setTimeout(connect, Math.min(1000 * 2 ** (tries - 1), 15000));
   };
 }
@@ -111,7 +111,7 @@ function name(pane, chosen) {
   let label = document.getElementById(id);
   if (!label) { label = document.createElement("span"); label.id = id; box.append(label); }
   label.style.left = `calc(${(100 * shown.indexOf(pane)) / shown.length}% + .6rem)`;
-  label.textContent = [chosen.law ?? "as the scene has it", chosen.strain, chosen.flips].filter(Boolean).join(", ");
+  label.textContent = [chosen.law ?? "scene default", chosen.strain, chosen.flips].filter(Boolean).join(", ");
 }
 
 function take(buffer) {
@@ -133,7 +133,7 @@ function take(buffer) {
   } else waiting[pane] = buffer;
 }
 
-// The newest frame of each pane, once a frame of the screen.
+// Draw the newest frame of each pane once per screen frame.
 let counted = 0, since = performance.now();
 function frame() {
   requestAnimationFrame(frame);

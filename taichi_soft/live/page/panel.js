@@ -1,4 +1,4 @@
-// The controls: plain HTML, so that keyboards and screen readers know them.
+// The controls: plain HTML, for keyboards and screen readers.
 import { Plot } from "./plot.js";
 import { quantity } from "./quantity.js";
 import { PATIENCE, Slider } from "./slider.js";
@@ -67,7 +67,7 @@ export class Panel {
     };
   }
 
-  // Sliders follow the world at once, also one that was just moved.
+  // Let all sliders follow the world immediately, even one that was just moved.
   release() { for (const slider of this.sliders.values()) slider.touched = -PATIENCE; }
 
   async upload(limit) {
@@ -78,7 +78,7 @@ export class Panel {
     at("upload").value = "";
   }
 
-  // Warn of a material that needs more substeps than there are, before it becomes unstable.
+  // Warn of a material that needs more substeps than are set, before it becomes unstable.
   warn() {
     const state = this.state, sliders = this.sliders;
     if (!state) return;
@@ -104,7 +104,7 @@ export class Panel {
     at("pause").setAttribute("aria-pressed", state.is_paused);
     at("pause").textContent = state.is_paused ? "Play" : "Pause";
     at("undo").disabled = !state.undo;
-    at("undo").title = state.undo ? `Undo: ${state.undo}` : "There is no change to undo";
+    at("undo").title = state.undo ? `Undo: ${state.undo}` : "Nothing to undo";
     at("step-ms").textContent = `${state.step_ms[0].toFixed(1)} ms`;
     at("step-ms").title = `99th percentile ${state.step_ms[1].toFixed(1)} ms`;
     at("factor").textContent = `${state.factor.toFixed(2)} x`;
@@ -121,7 +121,7 @@ export class Panel {
     }
     this.follow("tint", message.tint);
     this.follow("preset", state.preset);
-    // A law that was chosen, and a refusal, are seen here too; one that is not used yet stays.
+    // Show laws chosen by others, and refusals; keep a selection that is not applied yet.
     const choice = message.coming ?? message.chosen;
     if (!this.isEdited) for (const id of CHOICE) this.follow(id, choice[id]);
   }
@@ -150,7 +150,7 @@ export class Panel {
     this.fading = setTimeout(() => { at("said").textContent = this.trouble ?? ""; }, isRefused ? 12000 : 8000);
   }
 
-  // Words that stay until they are taken back by null; nothing can be controlled meanwhile.
+  // Show a text and disable the controls, until null.
   stop(words) {
     const before = this.trouble;
     this.trouble = words;

@@ -1,4 +1,4 @@
-// Numbers as a person reads them: three digits, SI prefixes.
+// Formats numbers with three digits and SI prefixes.
 const SCALED = new Set(["Pa", "J", "N s"]);
 const PREFIXES = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"]];
 

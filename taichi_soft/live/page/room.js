@@ -1,4 +1,4 @@
-// What bodies stand in: light, sky, and a floor with a grid that fades into the horizon.
+// Light, sky, and a floor with a grid that fades into the horizon.
 import * as THREE from "three";
 
 const HORIZON = 0xdde3ea, ZENITH = 0x8fadcb, FLOOR = 0xb9bec5, LINE = "rgba(70, 84, 100, 0.34)", BOLD = "rgba(70, 84, 100, 0.6)";
@@ -21,7 +21,7 @@ export class Room {
     this.reach = 3;
   }
 
-  // A floor at a height, or none. Its grid has cells of 1 m, and bold lines every 10 m.
+  // Draw a floor at a height, or none. Its grid has cells of 1 m, and bold lines every 10 m.
   drawFloor(height) {
     if (this.floor) { this.scene.remove(this.floor); this.floor.geometry.dispose(); this.floor.material.map.dispose(); this.floor.material.dispose(); }
     this.floor = null;
@@ -33,7 +33,7 @@ export class Room {
     this.scene.add(this.floor);
   }
 
-  // The sun shines on what lies within `reach` of a point.
+  // Aim the sun at a point; shadows cover the range `reach` around it.
   aim(target, reach) {
     this.reach = reach;
     this.sun.target.position.set(...target);
@@ -43,7 +43,7 @@ export class Room {
     eye.updateProjectionMatrix();
   }
 
-  // Sky and fog go with the camera, which looks at something `away` metres from it.
+  // Move sky and fog with the camera, whose target is `away` metres from it.
   follow(camera, away) {
     this.sky.position.copy(camera.position);
     this.sky.scale.setScalar(0.5 * camera.far);
@@ -63,7 +63,7 @@ function sky() {
   const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.BackSide, fog: false, toneMapped: false, depthWrite: false });
   const mesh = new THREE.Mesh(geometry, material);
   mesh.frustumCulled = false;
-  mesh.renderOrder = 1; // only where nothing hides it
+  mesh.renderOrder = 1; // draw last, behind everything else
   return mesh;
 }
 

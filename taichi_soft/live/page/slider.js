@@ -1,6 +1,6 @@
 import { quantity } from "./quantity.js";
 
-// The page hears of a change some frames after the hand made it: until then a control keeps what the hand chose.
+// The server confirms a change some frames later: until then, a control keeps the user's value [ms].
 export const PATIENCE = 1500;
 
 export class Slider {
@@ -39,7 +39,7 @@ export class Slider {
     this.input.setAttribute("aria-valuetext", words);
   }
 
-  // What the world has, unless a hand is on it.
+  // Show the world's value, unless the user is moving the slider.
   show(value) {
     if (performance.now() - this.touched < PATIENCE) return;
     const { low, high, is_log } = this.about;

@@ -1,4 +1,4 @@
-// The view: bodies, colliders and floor in light and shadow; one pane beside the other.
+// The view: renders bodies, colliders and floor with shadows, in one or two panes.
 import * as THREE from "three";
 import { Room } from "./room.js";
 import { OrbitControls } from "./three/OrbitControls.js";
@@ -6,7 +6,7 @@ import { OrbitControls } from "./three/OrbitControls.js";
 const RAMP = [[77, 133, 204], [107, 191, 194], [242, 224, 133], [242, 145, 71], [204, 46, 56]].map(c => c.map(v => v / 255));
 const toLinear = v => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 
-// What one world shows.
+// Content of one world.
 class Pane {
   constructor() {
     this.scene = new THREE.Scene();
@@ -60,7 +60,7 @@ class Pane {
     });
   }
 
-  // The box of all bodies: its corners, or null without bodies.
+  // Bounding box of all bodies, or null without bodies.
   box() {
     const box = new THREE.Box3();
     if (this.body) box.setFromBufferAttribute(this.body.geometry.attributes.position);
@@ -94,7 +94,7 @@ class Pane {
   }
 }
 
-// Colours of a scale in 128 steps.
+// Colour scale in 128 steps.
 const LADDER = Array.from({ length: 128 }, (_, i) => {
   const place = (i / 127) * (RAMP.length - 1), at = Math.min(Math.floor(place), RAMP.length - 2), share = place - at;
   return RAMP[at].map((v, k) => toLinear(v + share * (RAMP[at + 1][k] - v)));
@@ -126,7 +126,7 @@ export class View {
     this.isStale = true;
     this.held = null;
     this.pointer = null;
-    for (const [name, call] of [["pointerdown", "press"], ["pointermove", "pull"], ["pointerup", "letGo"], ["pointercancel", "letGo"]]) {
+    for (const [name, call] of [["pointerdown", "press"], ["pointermove", "pull"], ["pointerup", "release"], ["pointercancel", "release"]]) {
       canvas.addEventListener(name, event => this[call](event), { capture: true });
     }
     canvas.addEventListener("keydown", event => this.key(event));
@@ -169,7 +169,7 @@ export class View {
     this.renderer.setScissorTest(true);
     const wide = width / this.shown.length;
     this.camera.aspect = wide / height;
-    // The angle of view belongs to the shorter side, as in films.
+    // The field of view belongs to the shorter side, as in films.
     const half = Math.tan(((this.fov ?? 40) * Math.PI) / 360);
     this.camera.fov = (360 / Math.PI) * Math.atan(this.camera.aspect < 1 ? half / this.camera.aspect : half);
     this.camera.updateProjectionMatrix();
@@ -185,7 +185,7 @@ export class View {
     });
   }
 
-  // The ray under a pointer, and the pane that it is in.
+  // Ray under a pointer, and its pane.
   ray(event) {
     const box = this.canvas.getBoundingClientRect(), wide = box.width / this.shown.length;
     const i = Math.min(this.shown.length - 1, Math.max(0, Math.floor((event.clientX - box.left) / wide)));
@@ -200,7 +200,7 @@ export class View {
     return { place: i, pane: this.shown[i], caster };
   }
 
-  // Where a ray hits a body that no collider hides, or null.
+  // Hit of a ray on a body that no collider hides, or null.
   hit(pane, caster) {
     const { body, solids } = this.panes.get(pane) ?? {};
     if (!body) return null;
@@ -223,7 +223,7 @@ export class View {
     this.hand.grab(pane, origin.toArray(), direction.toArray());
   }
 
-  // The cursor shows a body that can be grabbed: bodies move too, so it looks now and then.
+  // Update the cursor over bodies that can be grabbed. This runs regularly, because bodies move too.
   point() {
     if (this.held || performance.now() < this.pointAt) return;
     this.pointAt = performance.now() + 60;
@@ -239,7 +239,7 @@ export class View {
     if (point) this.hand.move(this.held.pane, point.toArray());
   }
 
-  letGo(event) {
+  release(event) {
     if (!this.held || event.pointerId !== this.held.id) return;
     event.stopImmediatePropagation();
     this.hand.release(this.held.pane);
@@ -247,7 +247,7 @@ export class View {
     this.canvas.classList.remove("holds");
   }
 
-  // All bodies, seen from where the camera looks now.
+  // Frame all bodies, keeping the camera's direction.
   frameAll() {
     const box = new THREE.Box3();
     for (const number of this.shown) {

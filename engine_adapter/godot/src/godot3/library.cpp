@@ -1,4 +1,4 @@
-// What Godot 3 calls when it loads the library: the class SoftWorldNative is told to it.
+// Entry points for Godot 3, which register the class SoftWorldNative.
 #include "../world_native.hpp"
 
 using taichi_soft_godot::api;

@@ -50,7 +50,7 @@ void read_transform(const Variant& value, float out[12]) {
   std::memcpy(out, &found, sizeof found);
 }
 
-// What a pool array of Godot has: the functions of each kind differ by name only.
+// Reads a pool array of Godot; the functions of the kinds differ only in name.
 #define TAKEN(kind, Number)                                                                    \
   godot_pool_##kind##_array array = api->godot_variant_as_pool_##kind##_array(&value);         \
   auto* read = api->godot_pool_##kind##_array_read(&array);                                    \
@@ -114,7 +114,7 @@ Variant of_transform(const float numbers[12]) {
   return found;
 }
 
-// A pool array of Godot, filled at once.
+// Makes and fills a pool array of Godot.
 #define FILLED(kind, count, values)                                                                          \
   godot_pool_##kind##_array array;                                                                           \
   api->godot_pool_##kind##_array_new(&array);                                                                \

@@ -1,4 +1,4 @@
-// Godot 3: its functions, and its type for any value.
+// Functions and Variant of Godot 3.
 #pragma once
 
 #include <gdnative_api_struct.gen.h>
@@ -7,6 +7,6 @@ namespace taichi_soft_godot {
 
 using Variant = godot_variant;
 
-extern const godot_gdnative_core_api_struct* api;  // from when the library is loaded
+extern const godot_gdnative_core_api_struct* api;  // set when the library is loaded
 
 }  // namespace taichi_soft_godot

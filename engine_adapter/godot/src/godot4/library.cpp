@@ -1,4 +1,4 @@
-// What Godot 4 calls when it loads the library: the class SoftWorldNative is told to it.
+// Entry point for Godot 4, which registers the class SoftWorldNative.
 #include <deque>
 
 #include "../world_native.hpp"
@@ -28,17 +28,17 @@ void call_into(void* result, void* which, GDExtensionClassInstancePtr instance, 
   const Method& method = *static_cast<const Method*>(which);
   const Variant found = taichi_soft_godot::call(*reinterpret_cast<WorldNative*>(instance), method, count,
                                                 static_cast<const Variant* const*>(values));
-  godot.variant_destroy(Address(result));  // of what was there; mostly nothing
+  godot.variant_destroy(Address(result));  // destroy the previous value, usually nil
   *static_cast<Variant*>(result) = found;
 }
 
 void call(void* which, GDExtensionClassInstancePtr instance, const GDExtensionConstVariantPtr* values,
           GDExtensionInt count, GDExtensionVariantPtr result, GDExtensionCallError* error) {
   call_into(result, which, instance, int(count), values);
-  error->error = GDEXTENSION_CALL_OK;  // a script goes on after a refused call, and asks for null
+  error->error = GDEXTENSION_CALL_OK;  // scripts continue after a refused call and check for null
 }
 
-// For callers that have looked at types and counts. All is of type Variant, so values are here as above.
+// For callers that checked types and counts. All values are Variants, the same as above.
 void call_typed(void* which, GDExtensionClassInstancePtr instance, const GDExtensionConstTypePtr* values,
                 GDExtensionTypePtr result) {
   call_into(result, which, instance, static_cast<const Method*>(which)->argument_count, values);
@@ -58,7 +58,7 @@ void register_method(const Method& method) {
   std::deque<Name> names;
   std::vector<GDExtensionPropertyInfo> arguments;
   std::vector<GDExtensionClassMethodArgumentMetadata> metadata;
-  // Of type Variant: PROPERTY_USAGE_DEFAULT with PROPERTY_USAGE_NIL_IS_VARIANT, by extension_api.json.
+  // Type Variant: PROPERTY_USAGE_DEFAULT with PROPERTY_USAGE_NIL_IS_VARIANT, see extension_api.json.
   GDExtensionPropertyInfo any{GDEXTENSION_VARIANT_TYPE_NIL, no_class.address(), no_class.address(), 0,
                               no_hint.address(), 6 | 131072};
   for (int i = 0; i < method.argument_count; ++i) {

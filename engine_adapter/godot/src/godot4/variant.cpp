@@ -19,13 +19,13 @@ constexpr auto kBool = GDEXTENSION_VARIANT_TYPE_BOOL, kInt = GDEXTENSION_VARIANT
                kVectors2 = GDEXTENSION_VARIANT_TYPE_PACKED_VECTOR2_ARRAY,
                kVectors3 = GDEXTENSION_VARIANT_TYPE_PACKED_VECTOR3_ARRAY;
 
-// Of constructors and methods, by extension_api.json. A method is found by the hash of its arguments.
+// Indices of constructors, from extension_api.json. Methods are found by the hash of their signature.
 constexpr int kEmpty = 0, kOfString = 2, kOfStringName = 2, kOfParts = 3;
 constexpr GDExtensionInt kHashOfResize = 848867239, kHashOfSize = 3173160232;
 
 template <typename Function>
 Function present(Function function, const std::string& name) {
-  if (function == nullptr) throw Refused("this Godot has no " + name + ", which 4.1 to 4.4 have");
+  if (function == nullptr) throw Refused("this Godot lacks " + name + ", which 4.1 to 4.4 have");
   return function;
 }
 
@@ -52,15 +52,15 @@ void find_types() {
   }
 }
 
-// In a Godot of double precision Variant and all vectors are larger than here.
-void look_at_precision() {
+// Refuses a Godot with double precision, where Variant and all vectors are larger.
+void require_single_precision() {
   const double parts[] = {1.0, 2.0, 3.0};
   const GDExtensionConstTypePtr arguments[] = {Address(&parts[0]), Address(&parts[1]), Address(&parts[2])};
   double memory[3] = {};
   float first = 0.0f;
   present(godot.variant_get_ptr_constructor(kVector3, kOfParts), "constructor of Vector3")(Address(memory), arguments);
   std::memcpy(&first, memory, sizeof first);
-  if (first != 1.0f) throw Refused("this Godot is built with double precision: one with single precision is needed");
+  if (first != 1.0f) throw Refused("this Godot is built with double precision: use one with single precision");
 }
 
 template <GDExtensionVariantType type>
@@ -81,10 +81,10 @@ void resize(const Held<type>& array, size_t count) {
   const GDExtensionConstTypePtr arguments[] = {Address(&wanted)};
   int64_t code = 0;
   types[type].resize(array.address(), arguments, Address(&code), 1);
-  if (code != 0) throw Refused("Godot has no room for " + std::to_string(count) + " values");
+  if (code != 0) throw Refused("Godot cannot allocate " + std::to_string(count) + " values");
 }
 
-// An array of Godot, filled at once. `index` gives the address of its first value.
+// Makes and fills an array of Godot. `index` returns the address of its first value.
 template <GDExtensionVariantType type, typename Number, typename Index>
 Variant filled(const std::vector<Number>& numbers, size_t numbers_per_value, Index index) {
   Held<type> array;
@@ -96,7 +96,7 @@ Variant filled(const std::vector<Number>& numbers, size_t numbers_per_value, Ind
   return of_type<type>(array.address());
 }
 
-// What an array of Godot has. `index` gives the address of its first value.
+// Reads an array of Godot. `index` returns the address of its first value.
 template <GDExtensionVariantType type, typename Number, typename Index>
 std::vector<Number> taken(const Variant& value, Index index) {
   Held<type> array;
@@ -111,15 +111,15 @@ std::vector<Number> taken(const Variant& value, Index index) {
 }  // namespace
 
 void find_functions(GDExtensionInterfaceGetProcAddress get_proc_address) {
-  // Godot 4.0 hands over a table in place of the function; it begins with its version.
+  // Godot 4.0 passes a table instead of the function; the table begins with its version.
   uint32_t version[2];
   std::memcpy(version, reinterpret_cast<const void*>(get_proc_address), sizeof version);
-  if (version[0] == 4 && version[1] == 0) throw Refused("this is Godot 4.0: 4.1 or later is needed");
+  if (version[0] == 4 && version[1] == 0) throw Refused("this is Godot 4.0: use 4.1 or later");
 #define FOUND(type, name) \
   godot.name = present(reinterpret_cast<GDExtensionInterface##type>(get_proc_address(#name)), "function " #name);
   FUNCTIONS_OF_GODOT(FOUND)
 #undef FOUND
-  look_at_precision();
+  require_single_precision();
   find_types();
 }
 
@@ -226,7 +226,7 @@ Variant of_list(std::vector<Variant> values) {
   Held<kArray> array;
   types[kArray].make(array.address(), nullptr);
   resize(array, values.size());
-  for (size_t i = 0; i < values.size(); ++i) {  // into empty ones, which need no end
+  for (size_t i = 0; i < values.size(); ++i) {  // the old values are nil and need no destructor
     std::memcpy(static_cast<void*>(godot.array_operator_index(array.address(), GDExtensionInt(i))), &values[i],
                 sizeof values[i]);
   }

@@ -1,16 +1,16 @@
-// Godot 4: its functions, and its type for any value.
+// Functions and Variant of Godot 4.
 #pragma once
 
 #include <gdextension_interface.h>
 
 namespace taichi_soft_godot {
 
-// As large as in every Godot 4 with single precision (extension_api.json, builtin_class_sizes of "float_64").
+// Size of a Variant in Godot 4 with single precision (extension_api.json, builtin_class_sizes of "float_64").
 struct Variant {
   alignas(8) unsigned char memory[24];
 };
 
-// All that is asked of Godot, by the names of its interface without and with underscores. Godot 4.1 has them.
+// All functions of Godot's interface that are used, by names in camel case and with underscores. Godot 4.1 has them.
 #define FUNCTIONS_OF_GODOT(X)                                                     \
   X(PrintError, print_error)                                                      \
   X(VariantNewNil, variant_new_nil)                                               \
@@ -44,21 +44,21 @@ struct Functions {
 
 extern Functions godot;
 
-// Throws Refused where this Godot lacks one, or has numbers of another size.
+// Throws Refused if this Godot lacks a function or has double precision.
 void find_functions(GDExtensionInterfaceGetProcAddress get_proc_address);
 
-// Functions of a type, those that are called.
+// The required functions of a type.
 struct TypeFunctions {
   GDExtensionVariantFromTypeConstructorFunc to_variant = nullptr;
   GDExtensionTypeFromVariantConstructorFunc from_variant = nullptr;
-  GDExtensionPtrConstructor make = nullptr;  // empty; a StringName of a String, and a String of a StringName
+  GDExtensionPtrConstructor make = nullptr;  // makes an empty value; or a StringName from a String, or the reverse
   GDExtensionPtrDestructor destroy = nullptr;
   GDExtensionPtrBuiltInMethod resize = nullptr, size = nullptr;
 };
 
 extern TypeFunctions types[GDEXTENSION_VARIANT_TYPE_VARIANT_MAX];
 
-// Of a value: Godot has a type of pointer for each use of one.
+// Address of a value, for each of Godot's pointer types.
 class Address {
  public:
   explicit Address(const void* value) : value_(const_cast<void*>(value)) {}
@@ -71,7 +71,7 @@ class Address {
   void* value_;
 };
 
-// A value of a type that only Godot's functions know. Whoever makes one fills it at once.
+// A value of an opaque Godot type. It must be filled immediately after construction.
 template <GDExtensionVariantType type>
 class Held {
  public:

@@ -1,6 +1,6 @@
-// Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in the order in which Unity would: BehaviourChecks
-// FOLDER, a world with axes for Unity. With a second argument, `levels`, the world is that of this name in
-// tests/native/scenes.py. A test of what they do, and none of Unity.
+// Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in Unity's order: BehaviourChecks FOLDER, a world with
+// axes for Unity. With the second argument `levels`, the world is `levels` of tests/native/scenes.py. This does not test
+// Unity.
 using System;
 using System.IO;
 using System.Reflection;
@@ -57,7 +57,7 @@ namespace TaichiSoft
             return 0;
         }
 
-        // The mesh of a level is drawn at this level: of bodies without a skin, whose assets have one for each.
+        // Bodies without a skin are drawn with the mesh of their level.
         private static void CheckLevels(string folder)
         {
             var world = new SoftWorldBehaviour();
@@ -115,7 +115,7 @@ namespace TaichiSoft
             lateUpdates();
         }
 
-        // A component that draws a body. Returns: where it puts its mesh.
+        // Makes a component that draws a body. Returns: its MeshFilter.
         private static MeshFilter Drawn(SoftWorldBehaviour world, string body, string mesh)
         {
             var filter = new MeshFilter();

@@ -1,14 +1,16 @@
 # Draws a soft body of a SoftWorld. For Godot 4.
 #
-# Vertices are places in the scene, so this node leaves its parent's transform. Set its look by material_override.
+# Vertices are in global coordinates, so this node ignores its parent's transform. Set the material with
+# material_override.
 class_name TaichiSoftBody
 extends MeshInstance3D
 
-## The SoftWorld; empty for the nearest one above this node.
+## Path of the SoftWorld; empty takes the nearest ancestor.
 @export var world_path := NodePath()
-## As the script of the world called it; empty where `body` is set, to what SoftWorld.spawn returned.
+## Name of the body in the world's script; empty if `body` is set to a result of SoftWorld.spawn.
 @export var body_name := ""
-## Empty for the first mesh of the body's asset. A body without a skin is drawn by the mesh of its level of detail.
+## Name of the mesh; empty takes the first mesh of the body's asset. A body without a skin uses the mesh of its level of
+# detail.
 @export var mesh_name := ""
 
 var body := 0:
@@ -17,7 +19,7 @@ var body := 0:
 var _world: SoftWorld = null
 var _drawn := ArrayMesh.new()
 var _mesh := -1
-var _level := -1  # level of detail that the mesh draws; -1 for all of them: a skin
+var _level := -1  # level of detail of the mesh; -1 for a skin, which fits all levels
 var _arrays := []
 
 
@@ -27,7 +29,7 @@ func _ready() -> void:
     mesh = _drawn
     _world = _find_world()
     if _world == null:
-        push_error("%s: no SoftWorld is above it or at world_path" % name)
+        push_error("%s: no ancestor is a SoftWorld, and world_path names none" % name)
     else:
         _world.started.connect(_on_started)
         if _world.native != null:
@@ -35,7 +37,7 @@ func _ready() -> void:
     set_process(_world != null)
 
 
-## Draw another body; 0 for none.
+## Draw another body; 0 draws none.
 func set_body(value: int) -> void:
     body = value
     _mesh = -1
@@ -47,13 +49,13 @@ func _process(_delta: float) -> void:
     draw()
 
 
-## Read the body from the world into the mesh; called in each frame.
+## Update the mesh from the world; called in each frame.
 func draw() -> void:
     if _mesh < 0 or _world.native == null:
         return
     var read = _read()
     _drawn.clear_surfaces()
-    if read == null:  # it was taken out of the world
+    if read == null:  # the body was removed from the world
         set_body(0)
         return
     _arrays[Mesh.ARRAY_VERTEX] = read[0]
@@ -74,10 +76,10 @@ func _on_started() -> void:
     set_body(_world.body(body_name) if body_name != "" else body)
 
 
-# Positions and normals; null if the body was removed from the world.
+# Return positions and normals; null if the body was removed from the world.
 func _read():
     var native := _world.native
-    if _level >= 0:  # a snapshot can change the level, too
+    if _level >= 0:  # a snapshot can change the level
         var level = native.get_level(body)
         if level != null and level != _level:
             _find_mesh()
@@ -93,7 +95,7 @@ func _find_mesh() -> void:
         return
     _mesh = _mesh_of(asset, native.get_level(body))
     if _mesh < 0:
-        push_error("%s: the body has no mesh of that name" % name)
+        push_error("%s: the body has no mesh with this name" % name)
         return
     _level = native.mesh_info(_mesh)[4]
     var uvs: PackedVector2Array = native.uvs(_mesh)
@@ -103,7 +105,7 @@ func _find_mesh() -> void:
     _arrays[Mesh.ARRAY_TEX_UV] = uvs if uvs.size() > 0 else null
 
 
-# Number of the mesh that draws a level of detail of an asset; -1 for none.
+# Return the number of the mesh for a level of detail of an asset; -1 for none.
 func _mesh_of(asset: int, level: int) -> int:
     var native := _world.native
     if mesh_name != "":

@@ -1,13 +1,13 @@
-# A world that `taichi-soft export --axes y-up` wrote, stepped with Godot's own physics. For Godot 4.
+# Steps a world from `taichi-soft export --axes y-up` together with Godot's physics. For Godot 4.
 #
 # Physics bodies below this node, or in the group "soft_colliders", are colliders of the soft bodies, by their
-# CollisionShape3Ds: spheres, boxes, capsules and boundaries. Those that move are followed in each physics frame, and
-# rigid bodies are pushed. The world file needs room for them: World(collider_room=...).
+# CollisionShape3Ds: spheres, boxes, capsules and boundaries. Colliders follow moving bodies in each physics frame,
+# and rigid bodies are pushed. The world file needs capacity for them: World(collider_room=...).
 class_name SoftWorld
 extends Node3D
 
 signal started
-## A collider is a number; `node` is the physics body that it was made of, or null.
+## `collider` is a number; `node` is the physics body of the collider, or null.
 signal contact_began(which: int, collider: int, node: Node, impulse: Vector3)
 signal contact_ended(which: int, collider: int, node: Node, impulse: Vector3, duration: float)
 signal soft_contact_began(which: int, other: int, impulse: Vector3)
@@ -22,7 +22,7 @@ enum Shape { PLANE, SPHERE, BOX, CAPSULE }
 enum Event { CONTACT_BEGAN = 1, CONTACT_ENDED = 2, SLEPT = 4, WOKE = 8, FROZE = 16 }
 
 const NATIVE := "SoftWorldNative"  # the class of taichi_soft.gdextension
-const AFTER_OTHERS := 100  # so that what moves bodies comes first
+const AFTER_OTHERS := 100  # runs after scripts that move bodies
 const NEARLY := 1.0 - 1e-6
 const VALUES_PER_EVENT := 8
 const TOLD_BY := {
@@ -37,21 +37,21 @@ const TOLD_BY := {
 
 @export_dir var world_file := ""
 @export var autostart := true
-## Of a step; 0 for as many as are stable.
+## Substeps of a step; 0 chooses a stable number.
 @export_range(0, 1000) var substeps := 0
 @export_group("Colliders of Godot's shapes")
 @export_range(0.0, 2.0, 0.01) var friction := 0.5
-## Below 0 for the bodies' own.
+## Restitution of these colliders; below 0 uses that of the bodies.
 @export_range(-1.0, 1.0, 0.01) var restitution := -1.0
 @export_range(0.0, 1.0, 0.001) var thickness := 0.0
 
 var native: RefCounted = null  # the functions of SoftWorldNative; null until started
 
 var _dt := 0.0
-var _shapes := {}  # by a collider's number, from the shape's axes to those of its resource
+var _shapes := {}  # by collider: transform from the shape's axes to those of its resource
 var _followed: Array[Dictionary] = []
-var _nodes := {}  # by a collider's number, a WeakRef of the physics body that it was made of
-var _nodes_gone := {}  # the same of those that were taken out since the last step
+var _nodes := {}  # by collider: WeakRef of its physics body
+var _nodes_gone := {}  # the same for colliders removed since the last step
 var _recorded := 0  # bits of Event
 
 
@@ -66,11 +66,11 @@ func _physics_process(delta: float) -> void:
     step(delta)
 
 
-## Load the world file: takes seconds. Returns whether it could be done.
+## Load the world file. Returns false if that failed.
 func start() -> bool:
     stop()
     if not ClassDB.class_exists(NATIVE):
-        push_error("there is no class %s: Godot has not loaded taichi_soft.gdextension" % NATIVE)
+        push_error("class %s does not exist: Godot has not loaded taichi_soft.gdextension" % NATIVE)
         return false
     var fresh: RefCounted = ClassDB.instantiate(NATIVE)
     if fresh.load(ProjectSettings.globalize_path(world_file)) == null:
@@ -83,7 +83,7 @@ func start() -> bool:
     return true
 
 
-## Give the world back. Bodies are no more.
+## Destroy the world and its bodies.
 func stop() -> void:
     set_physics_process(false)
     native = null
@@ -95,14 +95,14 @@ func stop() -> void:
     _recorded = 0
 
 
-## One step of `delta` seconds; called in each physics frame.
+## Make one step of `delta` seconds; called in each physics frame.
 func step(delta: float) -> bool:
     if not _is_started("step") or not _set_step(delta):
         return false
     for each in _followed.duplicate():
         _move(each)
     _record()
-    # Godot has made its own step. It gets what the bodies give in this one with its next.
+    # Godot has made its step. It receives the impulses of this step in its next one.
     if native.advance(delta) == null:
         return false
     for each in _followed:
@@ -111,7 +111,7 @@ func step(delta: float) -> bool:
     return true
 
 
-## The body of that name in the script of the world; 0 for none.
+## Return the body with a name of the world's script; 0 for none.
 func body(body_name: String) -> int:
     if not _is_started("body"):
         return 0
@@ -119,7 +119,7 @@ func body(body_name: String) -> int:
     return 0 if slot == null else native.body(slot)
 
 
-## A new body; 0 where that is refused.
+## Spawn a body. Returns 0 if that is refused.
 func spawn(asset_name: String, place: Transform3D, velocity := Vector3(), spin := Vector3()) -> int:
     if not _is_started("spawn"):
         return 0
@@ -134,7 +134,7 @@ func despawn(which: int) -> bool:
     return _is_started("despawn") and native.despawn(which) != null
 
 
-## Be there at the end of the coming step. `which` is a name of the world's script or a number of add_collider.
+## Move a collider over the next step. `which` is a name of the world's script or a number from add_collider.
 func move_collider(which: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.COLLIDER, which, "move_collider")
     if number < 0:
@@ -143,7 +143,7 @@ func move_collider(which: Variant, place: Transform3D) -> bool:
     return native.move_collider(number, place * turn) != null
 
 
-## A collider of one of Godot's shapes; returns its number, or -1 where that is refused.
+## Add a collider from one of Godot's shapes. Returns its number, or -1 if that is refused.
 func add_collider(shape: Resource, place: Transform3D) -> int:
     if not _is_started("add_collider"):
         return -1
@@ -162,10 +162,10 @@ func add_collider(shape: Resource, place: Transform3D) -> int:
         kind = Shape.PLANE
         turn = _above(shape.plane)
     else:
-        push_error("%s is no SphereShape3D, BoxShape3D, CapsuleShape3D or WorldBoundaryShape3D" % shape)
+        push_error("%s is not a SphereShape3D, BoxShape3D, CapsuleShape3D or WorldBoundaryShape3D" % shape)
         return -1
     if not place.basis.get_scale().is_equal_approx(Vector3.ONE):
-        push_error("a collider has the scale %s: change the shape's own size instead" % place.basis.get_scale())
+        push_error("a collider has the scale %s: change the size of its shape instead" % place.basis.get_scale())
         return -1
     var made = native.add_collider(kind, size, place * turn, friction, restitution, thickness, 1, -1)
     if made == null:
@@ -184,15 +184,15 @@ func remove_collider(number: int) -> bool:
     return true
 
 
-## What bodies gave it in the last step [N s].
+## Impulse of bodies on a collider in the last step [N s].
 func collider_impulse(which: Variant) -> Vector3:
     var number := _number(Kind.COLLIDER, which, "collider_impulse")
     var found = null if number < 0 else native.collider_impulse(number)
     return Vector3() if found == null else found[0]
 
 
-## The first soft body on a ray: body, point, normal, distance, triangle, weights and vertices of its own surface.
-## Empty where there is none.
+## Find the first soft body on a ray: body, point, normal, distance, and triangle, weights and vertices of its surface.
+## Returns an empty Dictionary if there is none.
 func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     var found = native.raycast(origin, direction, reach) if _is_started("raycast") else null
     if found == null or found.is_empty():
@@ -208,19 +208,19 @@ func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     }
 
 
-## Bodies that touch a sphere, or enclose it.
+## Return the bodies that touch or enclose a sphere.
 func overlap_sphere(center: Vector3, radius: float) -> Array:
     var found = native.overlap_sphere(center, radius) if _is_started("overlap_sphere") else null
     return [] if found == null else found
 
 
-## Bodies that touch a box with edges of `size`, or enclose it.
+## Return the bodies that touch or enclose a box with edges of `size`.
 func overlap_box(place: Transform3D, size: Vector3) -> Array:
     var found = native.overlap_box(place, size) if _is_started("overlap_box") else null
     return [] if found == null else found
 
 
-## Take hold where `raycast` has hit, and pull towards there. Returns a number; 0 where nothing was hit.
+## Grab a body at a hit of `raycast`. Returns the number of the grab; 0 if nothing was hit.
 func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
     if not _is_started("grab") or hit.is_empty():
         return 0
@@ -228,7 +228,7 @@ func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
     return 0 if made == null else made
 
 
-## Pull towards another point.
+## Move a grab to another point.
 func move_grab(which: int, point: Vector3) -> bool:
     return _is_started("move_grab") and native.move_grab(which, point) != null
 
@@ -237,7 +237,7 @@ func release_grab(which: int) -> bool:
     return _is_started("release_grab") and native.release_grab(which) != null
 
 
-## With what it pulls [N].
+## Force of a grab [N].
 func grab_force(which: int) -> Vector3:
     var found = native.grab_force(which) if _is_started("grab_force") else null
     return Vector3() if found == null else found
@@ -248,7 +248,7 @@ func set_gravity(gravity: Vector3) -> bool:
     return _is_started("set_gravity") and native.set_gravity(gravity) != null
 
 
-## Coulomb's coefficient of a body against others. That of a collider by its name or number: set_collider_friction.
+## Coulomb coefficient of a body against other bodies. For a collider, by name or number, use set_collider_friction.
 func set_body_friction(which: int, friction: float) -> bool:
     return _is_started("set_body_friction") and native.set_body_friction(which, friction) != null
 
@@ -258,13 +258,14 @@ func set_collider_friction(collider: Variant, friction: float) -> bool:
     return number >= 0 and native.set_collider_friction(number, friction) != null
 
 
-## Let vertices be held by another body: where they are in it, or each at a vertex of it. Returns a number, or 0.
+## Attach vertices to another body, at their current positions in it or each to one of its vertices. Returns the number
+# of the joint, or 0 if that is refused.
 func join(which: int, vertices: PackedInt32Array, other: int, onto := PackedInt32Array()) -> int:
     var made = native.join(which, vertices, other, onto) if _is_started("join") else null
     return 0 if made == null else made
 
 
-## The joint of the world's script of this name; 0 for none.
+## Return the joint with a name of the world's script; 0 for none.
 func joint(called: Variant) -> int:
     var number := _number(Kind.JOINT, called, "joint")
     var found = null if number < 0 else native.joint_of(number)
@@ -275,13 +276,14 @@ func release_joint(which: int) -> bool:
     return _is_started("release_joint") and native.release_joint(which) != null
 
 
-## With what the other body pulls [N].
+## Force of the other body of a joint [N].
 func joint_force(which: int) -> Vector3:
     var found = native.joint_force(which) if _is_started("joint_force") else null
     return Vector3() if found == null else found
 
 
-## Turn vertices about an axis that turns with them, with so much torque at most. Returns a number, or 0.
+## Rotate vertices about an axis that rotates with them, with a limited torque. Returns the number of the motor, or 0 if
+# that is refused.
 func add_motor(which: int, vertices: PackedInt32Array, axis: Vector3, speed: float, max_torque: float) -> int:
     if not _is_started("add_motor"):
         return 0
@@ -289,7 +291,7 @@ func add_motor(which: int, vertices: PackedInt32Array, axis: Vector3, speed: flo
     return 0 if made == null else made
 
 
-## The motor of the world's script of this name; 0 for none.
+## Return the motor with a name of the world's script; 0 for none.
 func motor(called: Variant) -> int:
     var number := _number(Kind.MOTOR, called, "motor")
     var found = null if number < 0 else native.motor_of(number)
@@ -300,7 +302,7 @@ func set_motor_speed(which: int, speed: float) -> bool:
     return _is_started("set_motor_speed") and native.set_motor_speed(which, speed) != null
 
 
-## With 0 its vertices coast.
+## Limit of the torque; with 0 the vertices coast.
 func set_motor_limit(which: int, limit: float) -> bool:
     return _is_started("set_motor_limit") and native.set_motor_limit(which, limit) != null
 
@@ -309,72 +311,72 @@ func remove_motor(which: int) -> bool:
     return _is_started("remove_motor") and native.remove_motor(which) != null
 
 
-## Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments bar the change;
+## Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments prevent it;
 ## with `release` they are released. Each level has its own vertices.
 func set_level(which: int, level: int, release := false) -> bool:
     return _is_started("set_level") and native.set_level(which, level, int(release)) != null
 
 
-## The level of detail of a body; -1 for no body.
+## Return the level of detail of a body; -1 for no body.
 func get_level(which: int) -> int:
     var found = native.get_level(which) if _is_started("get_level") else null
     return -1 if found == null else found
 
 
-## Number of levels of detail that a body has; 0 for no body.
+## Return the number of levels of detail of a body; 0 for no body.
 func level_count(which: int) -> int:
     var asset = native.asset_of(which) if _is_started("level_count") else null
     return 0 if asset == null else native.level_count(asset)
 
 
-## Positions of the vertices of a body at its level of detail, by their numbers.
+## Return the positions of a body's vertices at its level of detail.
 func positions(which: int) -> PackedVector3Array:
     var found = native.positions(which) if _is_started("positions") else null
     return PackedVector3Array() if found == null else found
 
 
-## A place that moves as the game says, for bodies to hang from. Returns its number, or -1 where that is refused.
+## Add a frame, a pose that the game moves and bodies attach to. Returns its number, or -1 if that is refused.
 func add_frame(place: Transform3D) -> int:
     var made = native.add_frame(place) if _is_started("add_frame") else null
     return -1 if made == null else made
 
 
-## Be there at the end of the coming step. `frame` is a name of the world's script or a number of add_frame.
+## Move a frame over the next step. `frame` is a name of the world's script or a number from add_frame.
 func move_frame(frame: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.FRAME, frame, "move_frame")
     return number >= 0 and native.move_frame(number, place) != null
 
 
-## What hangs from it is let go.
+## Remove a frame and detach its vertices.
 func remove_frame(frame: Variant) -> bool:
     var number := _number(Kind.FRAME, frame, "remove_frame")
     return number >= 0 and native.remove_frame(number) != null
 
 
-## Let vertices go with a frame, from where both are now. `feels` where frame_load is asked later.
+## Attach vertices to a frame at their current positions. Set `feels` to use frame_load later.
 func attach(which: int, vertices: PackedInt32Array, frame: Variant, feels := false) -> bool:
     var number := _number(Kind.FRAME, frame, "attach")
     return number >= 0 and native.attach(which, vertices, number, int(feels)) != null
 
 
-## Let vertices go; none stands for all that hang from frames.
+## Detach vertices from frames; an empty array detaches all.
 func detach(which: int, vertices := PackedInt32Array()) -> bool:
     return _is_started("detach") and native.detach(which, vertices) != null
 
 
-## What a body pulled a frame with in the last step [N].
+## Force of a body on a frame in the last step [N].
 func frame_load(which: int, frame: Variant) -> Vector3:
     var number := _number(Kind.FRAME, frame, "frame_load")
     var found = null if number < 0 else native.frame_load(which, number)
     return Vector3() if found == null else found[0]
 
 
-## Tells states apart: that of Python's world in the same state.
+## Hash of the state, equal to that of Python's world in the same state.
 func state_hash() -> String:
     return native.state_hash() if _is_started("state_hash") else ""
 
 
-## The soft bodies and their colliders; Godot's own bodies are not in it.
+## Snapshot of the soft bodies and their colliders, without Godot's bodies.
 func snapshot() -> PackedByteArray:
     return native.snapshot() if _is_started("snapshot") else PackedByteArray()
 
@@ -412,12 +414,12 @@ func _set_step(delta: float) -> bool:
     if native.set_fixed_step(delta, substeps, 1) == null:
         return false
     _dt = delta
-    # The picture is alpha of the way from the step before to the last one. With nearly a step of time put in
-    # here it stays that of the last step, where Godot draws its own bodies.
+    # Bodies are drawn at alpha between the last two steps. Adding almost a full step here keeps alpha near 1, the
+    # time at which Godot draws its bodies.
     return native.advance(NEARLY * delta) != null
 
 
-# From a plane to axes whose y stands on it.
+# Transform from a plane to axes with y along its normal.
 func _above(plane: Plane) -> Transform3D:
     var up := plane.normal.normalized()
     var aside := Vector3.RIGHT if absf(up.x) < 0.9 else Vector3.BACK
@@ -433,7 +435,7 @@ func _physics_bodies() -> Array[PhysicsBody3D]:
         if node is PhysicsBody3D:
             found.append(node)
         var children := node.get_children()
-        children.reverse()  # so that they come out in the order of the scene
+        children.reverse()  # keeps the order of the scene
         waiting.append_array(children)
     for node in get_tree().get_nodes_in_group("soft_colliders"):
         if node is PhysicsBody3D and not node in found:
@@ -442,7 +444,7 @@ func _physics_bodies() -> Array[PhysicsBody3D]:
 
 
 func _follow(physics_body: PhysicsBody3D) -> void:
-    # Of Godot's classes the one that moves inherits the one that does not.
+    # AnimatableBody3D, which moves, inherits StaticBody3D.
     var stays := physics_body is StaticBody3D and not physics_body is AnimatableBody3D
     for shape in physics_body.get_children():
         if not shape is CollisionShape3D or shape.disabled or shape.shape == null:
@@ -463,7 +465,7 @@ func _follow(physics_body: PhysicsBody3D) -> void:
             )
 
 
-# Only what somebody is connected to: to look for contacts takes time.
+# Record only events with a connected signal, because recording contacts takes time.
 func _record() -> void:
     var kinds := 0
     for told_by in TOLD_BY:
@@ -520,7 +522,7 @@ func _move(each: Dictionary) -> void:
     var place := shape.global_transform
     var rigid := each.body.get_ref() as RigidBody3D
     if rigid != null:
-        # What the server says, as in Godot 3, where the node could be one step behind.
+        # Read the server's state as in Godot 3, where the node could be one step late.
         var state := PhysicsServer3D.body_get_direct_state(rigid.get_rid())
         if state != null:
             place = state.transform * shape.transform
@@ -529,8 +531,8 @@ func _move(each: Dictionary) -> void:
         move_collider(each.number, place)
 
 
-# The engine feels an impulse one step late. So it gets half of it in advance, and that is taken back later:
-# the page docs/coupling.md says why.
+# The engine receives impulses one step late. So half of each is applied in advance and subtracted later, see
+# docs/coupling.md.
 func _push_back(each: Dictionary) -> void:
     var rigid := each.body.get_ref() as RigidBody3D
     if rigid == null or rigid.freeze:

@@ -1,0 +1,12 @@
+"""Old public names that work for one more version."""
+
+import warnings
+
+
+def warn_renamed(old: str, new: str) -> None:
+    """Warn the caller of the calling function that a public name has changed."""
+    warnings.warn(
+        f"{old} is deprecated and will be removed in the next version: use {new}",
+        DeprecationWarning,
+        stacklevel=3,
+    )
