@@ -142,15 +142,15 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     }.items():
         if is_asked and asked is Schedule.FLAT:
             raise OptionError(
-                f"schedule 'flat' does not support {feature}: use 'per_body' or 'auto', and another integrator "
-                "than 'explicit_euler'"
+                f"schedule 'flat' does not support {feature}: use 'per_body' or 'auto', and another "
+                "integrator than 'explicit_euler'"
             )
         if is_asked:
             asked = Schedule.PER_BODY
     if not integrator.has_hulls and _has_hulls(context):
         raise OptionError(
-            f"integrator {name!r} does not support hulls, because its solves hold vertices: use 'leapfrog', or "
-            "assets without hull"
+            f"integrator {name!r} does not support hulls, because its solves hold vertices: use 'leapfrog', "
+            "or assets without hull"
         )
     return choose_schedule(asked, context.layout, device)
 

@@ -134,7 +134,7 @@ void World::require_change(int32_t slot, int32_t level, bool may_release) const 
          asset.level_count(), fix.c_str());
   }
   bool has_joints = false, has_motors = false;
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     has_joints = has_joints || joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1;
   }
   for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || motor_wholes_[0](m) == slot + 1;
@@ -200,7 +200,7 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
 // Releases constraints that have no vertex at another level, and finds the held vertices there.
 void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                       std::map<int32_t, Hanging>* attached) {
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
   }
   for (size_t m = 0; m < kMostMotors; ++m) {
