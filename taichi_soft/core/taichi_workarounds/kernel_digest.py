@@ -1,25 +1,13 @@
-"""Kernels that an earlier process compiled, found without walking through their source.
+"""Digests of kernels: of all that the code of a kernel depends on.
 
-Taichi 1.7 keeps compiled kernels on disk under a hash of what it makes of their source. To get at that hash
-it walks through the source of each kernel at every start, which takes most of a start with a full cache.
-
-Here a kernel that is known from earlier is made with a short body instead. That body holds a digest of all
-that the kernel's source depends on. When the process ends that compiled the kernel, its code is put into the
-file of the short body. There Taichi finds it, by the hash of the short body, which costs next to nothing.
-
-The short body sets a flag. If Taichi does not find the file, it compiles that body, and the flag tells so
-after the launch. Nothing else has happened then: the kernel is made from its source and launched.
+Part of `known_kernels`, and needless with it.
 """
 
 from __future__ import annotations
 
-import ast
 import enum
 import functools
 import hashlib
-import json
-import os
-import re
 import sys
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -28,16 +16,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-PACKAGE = Path(__file__).resolve().parents[1]
-
-INDEX = "taichi_soft.json"
-"""File beside Taichi's own, with the digests of kernels that can be found."""
-
-FLAG = "__flag"
-"""Name in the short body of the field that it sets."""
-
-HEADER = 1 << 17
-"""Bytes at the front of Taichi's file of a kernel, among which the names of its functions stand."""
+PACKAGE = Path(__file__).resolve().parents[2]
 
 
 class UnknownPartError(Exception):
@@ -46,7 +25,8 @@ class UnknownPartError(Exception):
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Of the package's own files, the interpreter and NumPy: what decides how a kernel's source is read."""
+    """Digest of the package's own files, the interpreter and NumPy: they decide how a kernel's source is
+    read."""
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
         found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
@@ -54,13 +34,12 @@ def digest_of_sources() -> str:
 
 
 def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) -> str:
-    """Of a kernel and what it is compiled for.
+    """Digest of a kernel and of what it is compiled for.
 
     Args:
-        function: the Python function.
-        options: those of Taichi's that code depends on.
-        arguments: of each its value, and whether it is a template argument; of others what Taichi tells them
-            apart by.
+        function: the Python function. options: Taichi's options on which code depends. arguments: a pair for
+        each. The second is True for a template argument, and the first is its value then;
+            otherwise the first is that by which Taichi distinguishes such arguments.
     Raises: UnknownPartError.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
@@ -73,7 +52,7 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
 
 
 def _feature(value: Any) -> str:
-    """Type and dimensions of an array, as Taichi tells arrays apart."""
+    """Type and dimensions of an array, by which Taichi distinguishes arrays."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_feature, value))})"
     text = value.to_string() if hasattr(value, "to_string") else str(value)
@@ -83,7 +62,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Add to `parts` all of a template argument that code can be made of."""
+    """Add to `parts` everything in a template argument on which code can depend."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))
@@ -126,7 +105,7 @@ _field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 def _field_text(field: Any) -> str:
-    """What a field is and where, which does not change once it is laid out."""
+    """Type, size and place of a field. They do not change once it is laid out."""
     if field not in _field_texts:
         places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
         size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
@@ -138,8 +117,8 @@ _places: dict[tuple[int, int], str] = {}
 
 
 def _place_of(node: Any) -> str:
-    """Where a number of a field lies in memory: its own place, and those of all that it lies in. It depends
-    on the sizes of other fields too."""
+    """Place of a number of a field in memory: its own, and those of the nodes around it. It depends on the
+    sizes of other fields too."""
     tree, first = node.get_snode_tree_id(), node.id
     if (tree, first) not in _places:
         path = []
@@ -154,70 +133,3 @@ def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, tupl
     parts.append(f"{type(value).__name__} {len(items)}")
     for each in items:
         _describe(each, parts, seen)
-
-
-def short_body(digest: str) -> list[ast.stmt]:
-    """Statements that set the flag, once with each part of the digest. Each takes time at every start."""
-    words = np.frombuffer(bytes.fromhex(digest), np.int32)
-    return ast.parse("\n".join(f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1))).body
-
-
-def name_of(kernel: Any, digest: str) -> str:
-    """Of a kernel that is made from its source, in Taichi's file of it."""
-    return f"{kernel.func.__name__}_{digest}"
-
-
-def short_name_of(digest: str) -> str:
-    """Of one with the short body."""
-    return f"known_{digest}"
-
-
-class KnownKernels:
-    """Those in one folder of Taichi's."""
-
-    def __init__(self, folder: Path, options: str) -> None:
-        """Read which there are. `options`: as `digest_of` takes them."""
-        self.folder, self.options = folder, options
-        self._known = self._read()
-
-    def __contains__(self, digest: object) -> bool:
-        return digest in self._known
-
-    def _read(self) -> set[str]:
-        try:
-            return set(json.loads((self.folder / INDEX).read_text()))
-        except (OSError, ValueError, TypeError):
-            return set()
-
-    def keep(self, names: dict[str, str]) -> None:
-        """Put kernels where the short bodies are found.
-
-        Args:
-            names: by digest, of the kernels that were made from their source. Taichi has written all files.
-        """
-        files = self._files_of({*names.values(), *map(short_name_of, names)})
-        kept = []
-        for digest, name in names.items():
-            code, place = files.get(name), files.get(short_name_of(digest))
-            if code and place:
-                _write(place, code.read_bytes())
-                kept.append(digest)
-        if kept:
-            _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
-
-    def _files_of(self, names: set[str]) -> dict[str, Path]:
-        """Files in which these kernels are, by name."""
-        found = {}
-        for path in self.folder.glob("*.tic"):
-            with path.open("rb") as file:
-                match = re.search(rb'"name":"(\w+?)_kernel_\d+_', file.read(HEADER))
-            if match and match.group(1).decode() in names:
-                found[match.group(1).decode()] = path
-        return found
-
-
-def _write(path: Path, contents: bytes) -> None:
-    """All of a file at once: others may read it meanwhile."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    part.write_bytes(contents)
-    part.replace(path)
