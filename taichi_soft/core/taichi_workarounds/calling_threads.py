@@ -46,7 +46,7 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
         make(self, snode)
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
-    accessor.__init__ = make_in_turn
+    accessor.__init__ = make_in_turn  # its kernels go where Taichi adds others with the GIL released
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
 
