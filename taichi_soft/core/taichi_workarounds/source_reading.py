@@ -36,11 +36,13 @@ def read_sources_once() -> None:
 
 
 def _is_in_class(level_of_class_stackframe: int) -> bool:
-    """True if the function at this level of the stack is defined in the body of a class."""
-    try:
-        return "__qualname__" in sys._getframe(level_of_class_stackframe).f_locals
-    except ValueError:  # there is nothing around a script
-        return False
+    """True if a decorated function is defined in the body of a class.
+
+    Args:
+        level_of_class_stackframe: number of frames between this one and that of the class statement, which
+            Taichi reads. The body of the class is the frame before.
+    """
+    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -9,7 +9,6 @@ import pytest
 from taichi_soft import init
 from taichi_soft.core.runtime import ti
 
-
 KERNELS, TERMS = 30, 50
 
 

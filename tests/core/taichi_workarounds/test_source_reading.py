@@ -1,4 +1,4 @@
-"""Taichi reads a source once, and shows a mistake in its line."""
+"""Taichi reads a source once, knows which kernels are methods, and shows a mistake in its line."""
 
 import inspect
 
@@ -50,3 +50,27 @@ def test_a_mistake_in_a_kernel_is_shown_in_its_line_each_time():
             ask(1)
         assert f'test_source_reading.py", line {line}, in unknown:' in str(failure.value)
         assert "    return y + nowhere  # noqa: F821\n               ^^^^^^^" in str(failure.value)
+
+
+@ti.data_oriented
+class Scale:
+    def __init__(self, factor):
+        self.factor = factor
+
+    @ti.kernel
+    def apply(self, x: ti.i32) -> ti.i32:
+        return self.factor * x
+
+    @ti.func
+    def halved(self, x):
+        return x // 2 * self.factor
+
+    @ti.kernel
+    def apply_to_half(self, x: ti.i32) -> ti.i32:
+        return self.halved(x)
+
+
+def test_kernels_and_functions_of_a_class_are_methods():
+    init()
+    assert [Scale(factor).apply(7) for factor in (2, 3)] == [14, 21]
+    assert [Scale(factor).apply_to_half(8) for factor in (2, 3)] == [8, 12]
