@@ -11,6 +11,7 @@ from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_colli
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
+from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
 from taichi_soft.control.kernels.motors import read_speed
@@ -67,6 +68,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     state, program = context.built.state, context.built.program
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)
+    found["shape_patch"] = _example(shape_patch)
     found["forget_collider"] = _example(forget_collider, contact=state.contact)
     found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}

@@ -5,7 +5,6 @@
 
 #include "barycentric.hpp"
 #include "error.hpp"
-#include "patch.hpp"
 #include "world.hpp"
 
 namespace taichi_soft {
@@ -282,7 +281,7 @@ void World::hold_at(size_t g, const Vector& place) {
     if (!(least > highest)) continue;
     highest = least, weights = shares, corners = asset.tets.data + t;
   }
-  const Patch patch = patch_around(*scene_, asset, corners, weights.data(), 4);
+  const Patch patch = patch_around(asset, corners, weights.data(), 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
     grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
     grab_weights_(g, i) = as_float(weights[i]);

@@ -3,8 +3,8 @@
     .venv/bin/python engine_adapter/web/network/play.py           # in real time
     .venv/bin/python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
 
-Each player is a process and sends UDP datagrams to this process, which simulates the network: it delays, loses,
-copies and reorders datagrams.
+Each player is a process and sends UDP datagrams to this process, which simulates the network: it delays,
+loses, copies and reorders datagrams.
 """
 
 import argparse
