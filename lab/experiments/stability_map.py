@@ -187,16 +187,29 @@ def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> t
 
 def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
     """Whether none collapses or explodes between the thesis's edges."""
+    return all(end in ("whole", "dented") for _, end in _within(numbers, nu, collapsed))
+
+
+def _window_verdict(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> Verdict:
+    """Agrees if every sphere between the thesis's edges is whole; in part if all are whole or dented."""
+    if not (all(_edges_agree(numbers, nu, collapsed)) and _is_calm(numbers, nu, collapsed)):
+        return Verdict.DIFFERS
+    is_whole = all(end == "whole" for _, end in _within(numbers, nu, collapsed))
+    return Verdict.AGREES if is_whole else Verdict.PARTLY
+
+
+def _within(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> list[tuple[float, str]]:
+    """Modulus [Pa] and outcome of each sphere between the thesis's edges."""
+    low, high = WINDOWS[nu]
     ends = zip(numbers["young"], outcomes(numbers, collapsed), strict=True)
-    return all(end in ("whole", "dented") for E, end in ends if WINDOWS[nu][0] <= E <= WINDOWS[nu][1])
+    return [(E, end) for E, end in ends if low <= E <= high]
 
 
 def _other_lines(numbers: Numbers, nu: float) -> str:
     """For which lines between dented and collapsed the verdict is the same."""
 
     def verdict(line: float) -> Verdict:
-        agrees = all(_edges_agree(numbers, nu, line)) and _is_calm(numbers, nu, line)
-        return Verdict.AGREES if agrees else Verdict.DIFFERS
+        return _window_verdict(numbers, nu, line)
 
     same = [line for line in LINES if verdict(line) is verdict(COLLAPSED)]
     others = [line for line in LINES if line not in same]
@@ -228,11 +241,7 @@ def _window_finding(results: Results, nu: float) -> Finding:
     thesis_low, thesis_high = WINDOWS[nu]
     lower_agrees, upper_agrees = _edges_agree(numbers, nu)
     calm = _is_calm(numbers, nu)
-    inside = [
-        end
-        for E, end in zip(numbers["young"], outcomes(numbers), strict=True)
-        if thesis_low <= E <= thesis_high
-    ]
+    inside = [end for _, end in _within(numbers, nu)]
     left = [
         f"{volume:.2f}"
         for E, end, volume in zip(numbers["young"], outcomes(numbers), numbers["volume"], strict=True)
@@ -243,8 +252,18 @@ def _window_finding(results: Results, nu: float) -> Finding:
         f"{high:.2g} Pa and above; within the thesis's interval {inside.count('whole')} of {len(inside)} "
         f"whole, {len(left)} dented" + (f", which keep {', '.join(left)} of their volume" if left else "")
     ) + (_other_lines(numbers, nu) + _unhandled(results, nu))
-    if lower_agrees and upper_agrees and calm:
-        return Finding(f"sphere-window-{nu}", measured, Verdict.AGREES)
+    verdict = _window_verdict(numbers, nu)
+    if verdict is Verdict.AGREES:
+        return Finding(f"sphere-window-{nu}", measured, verdict)
+    if verdict is Verdict.PARTLY:
+        dented = [E for E, end in _within(numbers, nu) if end == "dented"]
+        why = (
+            f"{len(dented)} of {len(inside)} spheres in the thesis's interval stay dented, from "
+            f"{min(dented):.2g} to {max(dented):.2g} Pa, and the first whole one has {first:.2g} Pa. The "
+            f"thesis's {thesis_low:.1g} Pa lies between collapse and whole. The thesis does not say whether "
+            "it calls a dented sphere stable"
+        )
+        return Finding(f"sphere-window-{nu}", measured, verdict, why)
     reasons = []
     limits = {p["mesh"]: n["young"] for p, n in results.where(part="limit", poisson=nu)}
     if not upper_agrees and limits:
