@@ -11,7 +11,7 @@ from typing import Any
 from lab.experiments import CLAIMS, Effort
 from lab.extras import require_report
 from lab.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
-from lab.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
+from lab.report.judgements import Concluded, Judgement, counts, in_words, judge
 from lab.report.law_checks import law_table
 from lab.report.markdown import Literal, escaped
 from lab.report.spreadsheets import csv_of_judgements
@@ -48,7 +48,6 @@ def write_report(
         "judgements": judgements,
         "chapters": list(dict.fromkeys(each.chapter for each in judgements)),
         "counts": counts(judgements),
-        "plural": OF_MANY,
         "exhibits": exhibits,
         "sheets": sheets,
         "seconds": sum(each.seconds for each in exhibits),
@@ -77,7 +76,9 @@ def _filled(name: str, values: dict[str, Any]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(duration=duration, point_line=point_line, file_name=file_name, raw=Literal)
+    environment.filters.update(
+        duration=duration, point_line=point_line, file_name=file_name, in_words=in_words, raw=Literal
+    )
     return environment.get_template(name).render(values)
 
 
