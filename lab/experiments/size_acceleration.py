@@ -95,8 +95,8 @@ def conclude(results: Results) -> Section:
             judged(
                 "size-acceleration",
                 f"at twice the size accelerations are {Span(ratios['acceleration']):.3g} times smaller; "
-                f"forces are {forces:.3g} times larger, masses {masses:.3g} times. Tolerance: {THESIS_RATIO:g} "
-                f"within {TOLERANCE:.0%}",
+                f"forces are {forces:.3g} times larger, masses {masses:.3g} times. Tolerance: "
+                f"{THESIS_RATIO:g} within {TOLERANCE:.0%}",
                 all(abs(ratio / THESIS_RATIO - 1) < TOLERANCE for ratio in ratios["acceleration"]),
                 "the text takes the forces for the same in both bodies. A force is a stress times an area, "
                 "and areas grow with the square of the size",
