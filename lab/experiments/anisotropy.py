@@ -135,11 +135,11 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "Bodies are stretched evenly along many directions, and the work that it takes gives their "
-            "stiffness, for an isotropic material lambda + 2 mu in all. Laws along edges are softer in some "
-            "directions than in others and, but for volume springs, softer than the material in all: what "
-            "happens across an edge does not count for its tension. Volume springs are too stiff instead. "
-            "Laws on tetrahedra have it right.",
+            "Bodies are stretched uniformly along many directions. The work gives their stiffness, which "
+            "for an isotropic material is lambda + 2 mu in every direction. Laws along edges are softer in "
+            "some directions than in others. Except for volume springs they are softer than the material "
+            "in all directions, because strain across an edge does not change its tension. Volume springs "
+            "are too stiff. Laws on tetrahedra are isotropic.",
         ),
         (finding,),
         (

@@ -92,13 +92,12 @@ def conclude(results: Results) -> Section:
     columns = ("undamped [ms]", "damped, run [ms]", "growth [1/s]")
     return Section(
         (
-            "The largest step of leapfrog: 2 over the highest frequency at rest, and, with damping of "
-            f"{DAMPED.damping:.0f} N s/m, by running a body that is shaken a little. E = {DAMPED.young:.0g} "
-            f"Pa, nu = {DAMPED.poisson}, {DAMPED.density:.0f} kg/m^3; a step of 0 stands for a body that "
-            "does "
-            "not stay near its shape at any step.",
-            "Neither law's forces are the derivative of an energy, and so some vibrations may grow however "
-            "short the step: the eigenvalues of M^-1 K are complex. Damping has to stop them.",
+            "The largest step of leapfrog, found in two ways: 2 over the highest frequency at rest, and, "
+            f"with damping of {DAMPED.damping:.0f} N s/m, by running a body that is displaced a little at "
+            f"random. E = {DAMPED.young:.0g} Pa, nu = {DAMPED.poisson}, {DAMPED.density:.0f} kg/m^3. A step "
+            "of 0 means that the body does not stay near its shape with any step.",
+            "The forces of neither law are the derivative of an energy. Some vibrations therefore grow "
+            "however short the step is: the eigenvalues of M^-1 K are complex. Only damping stops them.",
         ),
         (finding,),
         (

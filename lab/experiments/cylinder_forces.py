@@ -204,8 +204,8 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cylinder of 0.5 m height and 2 m diameter, E = 1 MPa, its ends on plates that hold them. The "
-            "plates are driven apart, or sideways; the vertices between them are where no force is left.",
+            "A cylinder of 0.5 m height and 2 m diameter, E = 1 MPa, with both ends attached to plates. The "
+            "plates are moved apart, or sideways. The vertices between them are at rest, without a force.",
         ),
         findings,
         (

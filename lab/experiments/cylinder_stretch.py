@@ -85,10 +85,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cylinder of 4 m and 1.5 m diameter, E = 1 MPa, its ends held by plates that are drawn apart. "
-            "Without plates Hooke's law with the linearised strain asks for a width of "
-            "sqrt(1 - nu (2 s + s^2)) at a stretch s: with nu = 0.4 the volume first grows a little "
-            "and then falls.",
+            "A cylinder of 4 m and 1.5 m diameter, E = 1 MPa, with its ends attached to plates that are "
+            "moved apart. Without plates, Hooke's law with the linearised strain gives the width sqrt(1 - "
+            "nu (2 s + s^2)) at a stretch s: with nu = 0.4 the volume first grows a little and then falls.",
         ),
         (
             judged_but_for(

@@ -106,7 +106,7 @@ def conclude(results: Results) -> Section:
     )  # fmt: skip
     columns = ("body", "damping [N s/m]", "model", "left at the end [1]", "rate [1/s]", "expected [1/s]")
     return Section(
-        (f"Bodies of E = 1 MPa spin freely at {SPIN:g} rad/s about the vertical.",),
+        (f"Bodies of E = 1 MPa spin freely at {SPIN:g} rad/s about the vertical axis.",),
         (Finding("damping-rotation", measured, Verdict.AGREES if agrees else Verdict.DIFFERS, why),),
         (Table("rates", "How fast the spin fades", columns, rows),),
         (

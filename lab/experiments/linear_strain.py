@@ -106,8 +106,8 @@ def conclude(results: Results) -> Section:
     first, end = ({kind: error[row] for kind, error in errors.items()} for row in (small, last))
     return Section(
         (
-            "One tetrahedron with nu = 0 is stretched, and sheared, up to 100 %; its forces tell the strain. "
-            "In closed form the error is s / 2 of a stretch s, and sqrt(1 + s^2 / 4) - 1 of a shear s.",
+            "One tetrahedron with nu = 0 is stretched, and sheared, up to 100 %. Its forces give the strain. "
+            "In closed form the error is s / 2 for a stretch s, and sqrt(1 + s^2 / 4) - 1 for a shear s.",
         ),
         (
             judged(

@@ -109,11 +109,11 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m in irregular Delaunay meshes of more and more "
-            "cells, loaded so that theory is exact up to its ends (see beams): uniform tension, "
+            "cells, with loads for which theory is exact up to the ends (see beams): uniform tension, "
             "Saint-Venant's torsion, uniform bending. Linear tetrahedra reproduce the uniform stress of "
-            "tension on any mesh; what is left there is the size of the strain, 1e-4. In torsion and "
-            "bending the error has the second order of the energy of linear elements, with virial as with "
-            "scikit-fem.",
+            "tension on any mesh. The remaining error there is of the size of the strain, 1e-4. In torsion "
+            "and bending the error has the second order of the energy of linear elements, with virial as "
+            "with scikit-fem.",
         ),
         (
             judged_but_for(

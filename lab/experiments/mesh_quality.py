@@ -138,7 +138,7 @@ def conclude(results: Results) -> Section:
         "broke [s]",
     )
     return Section(
-        ("One tetrahedron in the middle of a cube, or one of its three layers, is flattened on purpose.",),
+        ("One tetrahedron in the middle of a cube, or one of its three layers, is flattened.",),
         (
             Finding(
                 "mesh-quality",

@@ -112,8 +112,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "Both methods of chapter 6 on bodies deformed at random, and a body that falls under each law, "
-            f"of {cost['tets']} tetrahedra and {cost['edges']} edges, on one core.",
+            "Forces of both methods of chapter 6 are compared on bodies deformed at random. Costs are "
+            f"those of a falling body of {cost['tets']} tetrahedra and {cost['edges']} edges under each "
+            "law, on one core.",
         ),
         (
             judged(

@@ -102,9 +102,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cube of irregular tetrahedra is deformed evenly, by strains at random. Hooke's law then asks "
-            "for the same stress everywhere: no force on vertices inside, and on those of the surface a "
-            "third of what the stress does to each triangle.",
+            "A cube of irregular tetrahedra is deformed uniformly, by random strains. Hooke's law then gives "
+            "the same stress everywhere: no force on vertices inside, and on those of the surface a "
+            "third of the force of the stress on each of their triangles.",
         ),
         (
             judged_but_for(

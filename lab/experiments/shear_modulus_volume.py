@@ -95,8 +95,8 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cube of irregular tetrahedra under CMPM, E = 3 MPa, between plates that are drawn apart, "
-            "pressed together and moved sideways, with a shear modulus that is chosen by itself.",
+            "A cube of irregular tetrahedra under CMPM, E = 3 MPa, between plates that are moved apart, "
+            "together and sideways, with a shear modulus that is chosen separately.",
         ),
         (
             Finding(

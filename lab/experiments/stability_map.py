@@ -157,17 +157,17 @@ def conclude(results: Results) -> Section:
     recovering = results.where(part="drop", mesh="thesis", flips="recover", poisson=0.1)
     return Section(
         (
-            "Spheres of 4 m^3 fall from 7 m at 700 steps a second. One is dented if tetrahedra stay inside "
-            "out, collapses if these leave it half of its volume or less, and explodes if it goes "
+            "Spheres of 4 m^3 fall from 7 m at 700 steps a second. A sphere is dented if tetrahedra stay "
+            "inverted, collapses if these leave it half of its volume or less, and explodes if it becomes "
             "non-finite. The thesis does not say whether it calls a dented sphere stable: the lower edge is "
             "a bracket from the last sphere that collapses to the first that is whole.",
             *(
-                f"Driven back from flips (recover) spheres of nu = 0.1 are whole from {window(n)[1]:.2g} "
+                f"With recovery from flips, spheres of nu = 0.1 are whole from {window(n)[1]:.2g} "
                 f"to {window(n)[2]:.2g} Pa."
                 for _, n in recovering
             ),
             "With sigma = 1/(2V) sum x f^T, as printed, forces would be twice as strong and all edges half "
-            "as high. Against that reading speaks figure 6.4, whose forces start with the slope E A.",
+            "as high. Figure 6.4 contradicts that reading: its forces start with the slope E A.",
         ),
         tuple(findings),
         (windows, limits),

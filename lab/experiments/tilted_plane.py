@@ -107,8 +107,8 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "An edge in a ring of particles is sheared, and the direction that the law takes for tension is "
-            "read from the stiffness of the edge. A plane that follows turns by as much as the shear.",
+            "An edge in a ring of particles is sheared. The direction of tension is read from the "
+            "stiffness of the edge. A plane that follows the shear turns by the same angle.",
         ),
         (finding,),
         (

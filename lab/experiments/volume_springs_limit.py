@@ -134,7 +134,7 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             "Small motions of the cube of figures 5.1 and 5.2 between plates at rest, from the gradient of "
-            "the forces: each is a vibration that grows or fades, whatever the integrator does.",
+            "the forces. Each is a vibration that grows or fades, with any integrator.",
         ),
         (
             Finding(

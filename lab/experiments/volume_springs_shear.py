@@ -121,10 +121,11 @@ def conclude(results: Results) -> Section:
     )
     return Section(
         (
-            "A cube of edge 1 m, E = 3 MPa, its lower side held and its upper side moved sideways at its "
-            "height; the other vertices are where no force is left. The thesis used a cube of another work, "
-            "of which no more is known: here a regular grid, and grids with their vertices moved at random "
-            "and connected by Delaunay's rule. Thesis meshes come from a mesher: irregular ones decide.",
+            "A cube of edge 1 m, E = 3 MPa. Its lower side is held and its upper side moves sideways at "
+            "its height. The other vertices are at rest, without a force. The thesis used a cube of "
+            "another work, of which no more is known. Here there are a regular grid, and grids whose "
+            "vertices were moved at random and connected by Delaunay's rule. The thesis's meshes come from "
+            "a mesher: irregular ones decide.",
         ),
         findings,
         (

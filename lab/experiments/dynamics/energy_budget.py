@@ -153,9 +153,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A bar of 1 x 0.2 x 0.2 m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} kg/m^3), held at one "
-            "end, is let go. Energies of strain are those of the laws' papers, what is damped is the sum of "
-            f"b (n . dv)^2 over all edges (eq. 3.9, b = {DAMPING:g} N s/m), integrated over time.",
+            f"A bar of 1 x 0.2 x 0.2 m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} kg/m^3), attached at "
+            "one end, is released. Strain energies are those of the laws' papers. The damped energy is the "
+            f"sum of b (n . dv)^2 over all edges (eq. 3.9, b = {DAMPING:g} N s/m), integrated over time.",
         ),
         (finding,),
         (

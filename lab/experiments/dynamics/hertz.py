@@ -130,16 +130,17 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A sphere of {RADIUS} m (E = 1e6 Pa, nu = 0.3), held above half of its radius, is pressed on "
-            "a rigid plane without friction, and comes to rest at each depth. The force is what holds it. "
-            "Hertz measures the depth from far away; that the cap is held, finite elements know too.",
-            "A sphere of facets touches with single vertices: while few of them do, the force jumps about "
-            f"Hertz's. On an even mesh of {elements['tets']} tetrahedra finite elements have "
-            f"{even.min():.2f} to {even.max():.2f} of it. On the same mesh, drawn to the contact by a "
-            f"Moebius map until its edges are a quarter as long there, they have {drawn.min():.2f} to "
-            f"{drawn.max():.2f}. What is left between them and the laws grows from {at_first:.1%} to "
-            f"{at_last:.1%} with the depth: the strain under the contact is no longer small.",
-            "Laws of chapter 4 are left out: they need a Delaunay mesh.",
+            f"A sphere of {RADIUS} m (E = 1e6 Pa, nu = 0.3), whose upper half is held, is pressed on "
+            "a rigid plane without friction, and comes to rest at each depth. The force is that on the held "
+            "part. Hertz measures the depth from far away. Finite elements have the same held part.",
+            "A sphere of facets touches the plane with single vertices. While only a few of them touch, "
+            f"the force jumps about Hertz's. On an even mesh of {elements['tets']} tetrahedra finite "
+            f"elements have {even.min():.2f} to {even.max():.2f} times his force. On the same mesh, refined "
+            "towards the contact by a Moebius map until its edges there are a quarter as long, they have "
+            f"{drawn.min():.2f} to {drawn.max():.2f} times his force. The difference between finite "
+            f"elements and the laws grows from {at_first:.1%} to {at_last:.1%} with the depth, because the "
+            "strain under the contact is no longer small.",
+            "Laws of chapter 4 are left out, because they need a Delaunay mesh.",
         ),
         (finding,),
         (

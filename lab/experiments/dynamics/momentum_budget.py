@@ -130,9 +130,9 @@ def conclude(results: Results) -> Section:
         (
             f"A box of {' x '.join(map(str, SIZE))} m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} "
             "kg/m^3), stretched and sheared by 5 %, flies, tumbles and vibrates without gravity.",
-            "Opposite forces on the ends of an edge keep the momentum; they turn the body where they do not "
-            "point along it, as the shear force of chapter 4 does not. Its damping (eq. 4.5) cannot "
-            "tell a shear from a turn, and brakes both.",
+            "Opposite forces on the ends of an edge conserve momentum. They turn the body if they do not "
+            "point along the edge, as the shear force of chapter 4. The damping of that chapter (eq. 4.5) "
+            "does not distinguish a shear from a rotation, and brakes both.",
         ),
         (finding,),
         (
