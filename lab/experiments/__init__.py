@@ -1,4 +1,4 @@
-"""Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
+"""Experiments of the thesis, and checks against theory, one file per figure or claim."""
 
 from lab.experiments.anisotropy import ANISOTROPY
 from lab.experiments.bars_bounce import BARS_BOUNCE
@@ -106,7 +106,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         MOMENTUM_BUDGET,
     )
 }
-"""By name, in the order of the report."""
+"""Experiments by name, in the order of the report."""
 
 __all__ = [
     "CLAIMS",

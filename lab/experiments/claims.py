@@ -186,4 +186,4 @@ CLAIMS: dict[str, Claim] = {
     ),
     "momentum-budget": Claim("mechanics", "Momentum and angular momentum of a free body stay."),
 }
-"""By key, in the order of the report."""
+"""Claims by key, in the order of the report."""

@@ -1,4 +1,4 @@
-"""How long the steps of CMPM2 can be, beside CMPM's (thesis section 4.4.1)."""
+"""Largest steps of CMPM2 and of CMPM (thesis section 4.4.1)."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from taichi_soft import Material
 
 UNDAMPED = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 DAMPED = Material(1e6, 0.25, 1000.0, 30.0, damping_ratio=0.0)
-"""So much that it shortens the step by a tenth, and stops most of what grows at every step."""
+"""Material with damping that shortens the step by a tenth, and stops most growing vibrations."""
 
 LAWS = ("cmpm", "cmpm2")
 MESHES = ("another uneven block", "uneven block", "block", "ball")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Both laws on four meshes."""
+    """Points: both laws on four meshes."""
     size = 3 if effort is Effort.QUICK else 5
     return [{"law": law, "mesh": mesh, "size": size} for law in LAWS for mesh in MESHES]
 
 
 def measure(point: Point) -> Numbers:
-    """Largest stable step [s], 2 / w and by running; how fast undamped vibrations grow at rest [1/s]."""
+    """Largest stable step [s], as 2 / w and by running; growth rate of undamped vibrations at rest [1/s]."""
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
     small = vibration(mesh, UNDAMPED, law)
     return {
@@ -48,7 +48,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Steps of CMPM2 over CMPM's."""
+    """Judge the steps of CMPM2 over those of CMPM."""
     found = {(law, mesh): results.one(law=law, mesh=mesh) for law in LAWS for mesh in MESHES}
     ratios = {mesh: found["cmpm2", mesh]["undamped"] / found["cmpm", mesh]["undamped"] for mesh in MESHES}
     runs = [(found["cmpm2", mesh]["run"], found["cmpm", mesh]["run"]) for mesh in MESHES]

@@ -13,7 +13,7 @@ MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, da
 """So stiff that leapfrog needs steps of about 1e-4 s. Without damping this law gains energy at any step."""
 
 RADIUS, HEIGHT = 1.0, 1.5
-"""Of the sphere and of its centre at the start [m]."""
+"""Radius of the sphere, and height of its centre at the start [m]."""
 
 FRAME, FRAMES = 0.06, 12
 TOUCHES = 0.25

@@ -25,15 +25,15 @@ POISSON = (0.0, 0.2, 0.4)  # it shows 0.2 and tells of others
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
 COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about the thesis's, and 2592
 EXACT = 0.01
-"""Of a slope: what is called exact."""
+"""Relative error of a slope that counts as exact."""
 CLOSE = 0.15
-"""Of a slope: what is called close, or a little under."""
+"""Relative error of a slope that counts as close, or a little under."""
 NO_SHEAR = 0.01
 """Shear force over tensile force that counts as none."""
 SHAKEN = 0.2
 """Largest random displacement of a vertex along an axis, over the mean length of an edge."""
 STRAIGHT = 0.05
-"""Change of force over strain along a line that is called straight."""
+"""Change of force over strain up to which a line counts as straight."""
 
 
 def points(effort: Effort) -> list[Point]:

@@ -39,7 +39,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume, and width half way up, over those at rest as the ends are drawn apart; the last shape."""
+    """Volume, and width at half the height, over those at rest, for each stretch; the last shape."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)
     stretch = [FURTHEST * (k + 1) / point["steps"] for k in range(point["steps"])]
@@ -58,7 +58,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """What each nu does to volume and width."""
+    """Judge volume and width for each nu."""
     usual = {"strain": "linear", "mesh": list(COARSE)}
     curves = {nu: results.one(poisson=nu, **usual) for nu in POISSON}
     exact = results.one(poisson=0.4, strain="exact", mesh=list(COARSE))

@@ -78,7 +78,7 @@ def _pull_of(vertices: FloatArray, surface: Any, stress: FloatArray) -> FloatArr
 
 
 def conclude(results: Results) -> Section:
-    """Tetrahedral laws meet Hooke's law as strain goes to zero; laws along edges do not."""
+    """Judge whether the forces tend to those of Hooke's law as the strain goes to zero."""
     worst = {}
     for law in (*TETRAHEDRAL, *ALONG_EDGES):
         rows = [numbers for _, numbers in results.where(law=law)]

@@ -26,7 +26,7 @@ from taichi_soft.render import Camera, Renderer, Surface
 RATE = 40.0
 """Frames per second of real time, the thesis's [Hz]."""
 SUBSTEPS = 18
-"""Of a frame of 1/40 s: 720 a second, about the thesis's 700."""
+"""Substeps of a frame of 1/40 s: 720 a second, about the thesis's 700."""
 SIZE = 640, 480
 HARDLY = 0.1
 """Share of the time up to which drawing hardly affects the simulation."""

@@ -27,7 +27,7 @@ from taichi_soft.core.package_data import ASSETS
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
-"""Of real time, on an AMD XP 1800+ of 1.53 GHz (section 6.6), and the size of the sphere there."""
+"""Simulated over real time on an AMD XP 1800+ of 1.53 GHz (section 6.6), and the size of that sphere."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -36,7 +36,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Seconds that frames took."""
+    """Seconds of each frame."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
@@ -59,7 +59,7 @@ def measure(point: Point) -> Numbers:
 
 
 def real_time_factor(numbers: Numbers) -> float:
-    """Simulated over real time, of all frames together."""
+    """Simulated over real time, for all frames together."""
     return DT * len(numbers["frames"]) / float(np.sum(numbers["frames"]))
 
 

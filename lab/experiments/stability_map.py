@@ -1,4 +1,4 @@
-"""The dropped sphere over Young's modulus and Poisson's ratio (thesis section 6.6): where it stays whole.
+"""The dropped sphere over Young's modulus and Poisson's ratio (thesis section 6.6).
 
 All moduli of one Poisson's ratio fall side by side in one world and do not meet. The linear limit, the
 modulus whose largest stable step is the thesis's, tells how much of the upper edge is the mesh.
@@ -39,13 +39,13 @@ WINDOWS = {0.1: (2e5, 3e6), 0.4: (4e5, 1e6)}
 LEAST, MOST = 1e5, 1e7
 """Range of the moduli tried [Pa]."""
 ROUNDING = 1.5
-"""By what an edge of the window may miss the thesis's, which has one digit: 1e6 may stand for 1.5e6."""
+"""Factor between an edge of the window and the thesis's, which has one digit: 1e6 may mean 1.5e6."""
 EQUAL = 1.1
-"""By what edges may differ that are called the same: less than from one modulus that is tried to the next."""
+"""Factor up to which edges count as the same: less than from one modulus to the next."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
-"""Parts of the volume at which a sphere might be called collapsed instead, to see what hangs on it."""
+"""Other limits of the volume for collapse, to show how the verdict depends on it."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -74,7 +74,7 @@ def sphere_mesh(name: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """How spheres of all moduli end; or the modulus of which 1/700 s is the largest stable step."""
+    """Outcomes of spheres of all moduli; or the modulus for which 1/700 s is the largest stable step."""
     mesh, nu = sphere_mesh(point["mesh"]), point["poisson"]
     if point["part"] == "limit":
         return {"young": _linear_limit(mesh, nu), "tets": len(mesh.tets)}
@@ -110,7 +110,7 @@ def _extent(mesh: TetMesh) -> float:
 
 
 def _linear_limit(mesh: TetMesh, nu: float) -> float:
-    """The step goes with about E^-1/2, so that three corrections find the modulus to a hundredth."""
+    """The step is about proportional to E^-1/2: three corrections find the modulus to a hundredth."""
     young = 1e6
     for _ in range(3):
         step = stable_step(
@@ -121,7 +121,7 @@ def _linear_limit(mesh: TetMesh, nu: float) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """The windows beside the thesis's."""
+    """Judge the windows by the thesis's."""
     drops = results.where(part="drop")
     findings = [_window_finding(results, nu) for nu in WINDOWS] + [_collapse_finding(results)]
     limits = Table(
@@ -176,7 +176,7 @@ def conclude(results: Results) -> Section:
 
 
 def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
-    """Whether the lower and the upper edge of a window are the thesis's."""
+    """True for the lower and for the upper edge if it is the thesis's."""
     low, first, last, high = window(numbers, collapsed)
     thesis_low, thesis_high = WINDOWS[nu]
     return (
@@ -186,7 +186,7 @@ def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> t
 
 
 def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
-    """Whether none collapses or explodes between the thesis's edges."""
+    """True if no sphere collapses or explodes between the thesis's edges."""
     return all(end in ("whole", "dented") for _, end in _within(numbers, nu, collapsed))
 
 
@@ -206,7 +206,7 @@ def _within(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> list[t
 
 
 def _other_lines(numbers: Numbers, nu: float) -> str:
-    """For which lines between dented and collapsed the verdict is the same."""
+    """Limits between dented and collapsed for which the verdict is the same."""
 
     def verdict(line: float) -> Verdict:
         return _window_verdict(numbers, nu, line)
@@ -223,7 +223,7 @@ def _other_lines(numbers: Numbers, nu: float) -> str:
 
 
 def _unhandled(results: Results, nu: float) -> str:
-    """The window of spheres whose flips nobody handles."""
+    """Window of spheres with flips off."""
     for _, numbers in results.where(part="drop", mesh="thesis", flips="off", poisson=nu):
         _, first, last, _ = window(numbers)
         gaps = (thesis / edge for thesis, edge in zip(WINDOWS[nu], (first, last), strict=True))
@@ -284,7 +284,7 @@ def _window_finding(results: Results, nu: float) -> Finding:
 
 
 def _from_the_other(results: Results, nu: float) -> str:
-    """What the thesis's other window lets expect: between two Poisson's ratios the mesh all but cancels."""
+    """Upper edge that the thesis's other window suggests: the ratio hardly depends on the mesh."""
     (other,) = (each for each in WINDOWS if each != nu)
     shares = [
         results.one(part="limit", mesh=p["mesh"], poisson=nu)["young"] / n["young"]
@@ -295,12 +295,12 @@ def _from_the_other(results: Results, nu: float) -> str:
 
 
 def _edge(young: float) -> float | str:
-    """An edge as a table shows it; beyond the moduli that were tried there is none."""
+    """An edge for a table; "none tried" beyond the tried moduli."""
     return "none tried" if young in (0.0, np.inf) else float(f"{young:.3g}")
 
 
 def _on_others(results: Results, nu: float) -> str:
-    """Where spheres of other meshes were whole."""
+    """Windows of spheres of other meshes."""
     windows = [
         f"{p['mesh']} {window(n)[1]:.2g} to {window(n)[2]:.2g} Pa"
         for p, n in results.where(part="drop", flips="tolerant", poisson=nu)

@@ -28,13 +28,13 @@ POISSON = (0.0, 0.3)
 CELLS = 4
 REGULAR = "regular grid"
 TOPS = 0.35, 0.75
-"""Of the shear at which the volume is largest, to count as a drop beyond 0.5."""
+"""Shears between which the volume must be largest, to count as a drop beyond 0.5."""
 HALF = 0.5
 """Shear past which the thesis sees the volume drop."""
 FAR_BELOW = 0.7
-"""Of G A: a slope that is called far below it."""
+"""Slope over G A that counts as far below it."""
 SLIGHT = 0.15
-"""Change of a force that is called slight."""
+"""Relative change of a force that counts as slight."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -45,7 +45,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume and forces on the top as it moves sideways, in the end by the height of the cube."""
+    """Volume and forces on the top, which moves sideways by up to the height of the cube."""
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -67,7 +67,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """What nu = 0.3 changes; irregular meshes decide, the regular one tells how much hangs on the mesh."""
+    """Judge the effect of nu = 0.3 on irregular meshes; the regular one shows the effect of the mesh."""
     for seed in (None, 1):
         results.one(seed=seed, poisson=0.0)
     pairs = {
@@ -177,7 +177,7 @@ def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
 
 
 def _read(without: Numbers, with_3: Numbers) -> dict[str, Any]:
-    """Figures of a mesh, and whether the claims hold on it; no claim of a path that was not finished."""
+    """Figures of a mesh, and whether the claims hold on it."""
     found: dict[str, Any] = {}
     for name, nu, n in (("0", 0.0, without), ("3", 0.3, with_3)):
         shear, volume = np.array(n["shear"]), np.array(n["volume"])

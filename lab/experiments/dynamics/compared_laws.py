@@ -1,4 +1,4 @@
-"""Which laws are compared, and what they need to move for some time."""
+"""Laws that the experiments on motion compare."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Laws on tetrahedra press back as Hertz says, springs do not."""
+    """Judge the forces against Hertz and finite elements."""
     rows = results.where()
     hertz = np.array([hertz_force(RADIUS * depth) for depth in DEPTHS])
     elements = results.one(law=ELEMENTS, pieces=COARSE, grading=GRADED)
@@ -170,7 +170,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
-    """The model where finite elements on the same mesh do better, else the mesh."""
+    """Reason: the model if finite elements on the same mesh are closer, else the mesh."""
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:
         return f"the mesh: finite elements on it are off by up to {left:.1%}, and the laws are near to these"

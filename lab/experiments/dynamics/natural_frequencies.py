@@ -65,7 +65,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Frequencies of both beams [Hz], 0 where they break; a swing over the one a period before."""
+    """Frequencies of both beams [Hz], 0 if they fail; a swing over the one a period before."""
     mesh = beam_mesh(point["cells"])
     numbers: Numbers = {"tets": len(mesh.tets)}
     for support in SUPPORTS:
@@ -141,7 +141,7 @@ def conclude(results: Results) -> Section:
 
 
 def _laws(results: Results) -> list[str]:
-    """Of the coarse mesh, in order."""
+    """Laws of the coarse mesh, in order."""
     return [point["law"] for point, _ in results.where(cells=COARSE) if point["law"] != ELEMENTS]
 
 
