@@ -39,7 +39,7 @@ def test_the_verdict_follows_gain_and_bounce():
 
         return altered(results, change)
 
-    slow = {THESIS: 0.5, "stiff": 1.0}
+    slow = {THESIS: 0.5, "stiff": 1.4}
     assert verdicts(NAME, judged(slow, True)) == {NAME: Verdict.AGREES}
     fast = judged({**slow, "stiff": 5.0}, True)
     assert verdicts(NAME, fast) == {NAME: Verdict.PARTLY}
