@@ -1,5 +1,5 @@
 # make demo: set everything up, drop the thesis's sphere, write out/bounce.mp4
-# make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
+# make test: set everything up, run the tests except the slow ones (minutes); make test-all: run every test (an hour)
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-all test-bounds native test-native test-platforms dist-native lint profile report peers gallery docs clean
@@ -9,24 +9,24 @@ BIN := $(VENV)/bin
 
 help:
 	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
-	@echo "make test     set up, run the tests, but those that take long"
-	@echo "make test-fast  set up, run tests without worlds: for the inner loop"
-	@echo "make test-all set up with every extra, run every test: an hour"
-	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
-	@echo "make native   set up, build the library for engines without Python and its sample, into out/native"
-	@echo "make test-native  set up, build it, play games in it and in Python"
-	@echo "make test-platforms  set up, build it for other platforms, play games on all that run here"
-	@echo "make dist-native  build it for all platforms, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
-	@echo "make profile  set up, measure what a frame costs here"
-	@echo "make report   set up, run the thesis's experiments, write out/report: takes minutes"
-	@echo "make peers    set up with other engines, drop one body in all of them, write out/peers.mp4"
-	@echo "make gallery  set up, film every demo and export worlds to play for the documentation: takes minutes"
+	@echo "make test     set up, run the tests, except the slow ones"
+	@echo "make test-fast  set up, run the tests that build no world (seconds to minutes)"
+	@echo "make test-all set up with every extra, run every test (an hour)"
+	@echo "make test-bounds  set up, run kernels with every index checked (minutes)"
+	@echo "make native   set up, build the C library and its sample into out/native"
+	@echo "make test-native  set up, build the C library, compare its results with those of Python"
+	@echo "make test-platforms  set up, build the C library for all platforms, test those that can run here"
+	@echo "make dist-native  build the C library for all platforms, pack it and a Godot 3 project into dist"
+	@echo "make profile  set up, measure the frame time on this machine"
+	@echo "make report   set up, run the thesis's experiments, write out/report (minutes)"
+	@echo "make peers    set up with other engines, drop one body in each, write out/peers.mp4"
+	@echo "make gallery  set up, film every demo and export playable worlds for the documentation (minutes)"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
 	@echo "make setup    set up with every extra"
-	@echo "make clean    delete the environment and what was written"
+	@echo "make clean    delete the environment and all outputs"
 
-# One environment for all of them; each adds to it what it needs.
+# All targets share one environment. Each target installs what it needs.
 $(VENV)/.%: pyproject.toml taichi_soft/core/version.py setup.sh
 	@sh setup.sh "$(VENV)" $*
 	@touch $@
@@ -49,7 +49,7 @@ test-bounds: $(VENV)/.test
 	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
 
 native: $(VENV)/.export
-	@for tool in cmake g++; do command -v $$tool > /dev/null || { echo "make native needs $$tool: install it first"; exit 1; }; done
+	@for tool in cmake g++; do command -v $$tool > /dev/null || { echo "make native needs $$tool. Install it first."; exit 1; }; done
 	@mkdir -p out
 	@cmake -S engine_adapter/native -B out/native > out/native.log || { cat out/native.log; exit 1; }
 	@cmake --build out/native
@@ -62,8 +62,8 @@ test-native: $(VENV)/.test $(VENV)/.export
 test-platforms: $(VENV)/.test $(VENV)/.export
 	@$(BIN)/python tests/native/platforms.py
 
-# One for each platform, for C, C++ and C#; a package of npm for the web; and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers,
-# where they cannot be fetched.
+# For C, C++ and C# one .zip per platform; for the web an npm package; and a Godot 3 project. If Godot's headers cannot be downloaded,
+# set GODOT_HEADERS= to a folder that contains them.
 dist-native: native
 	@mkdir -p dist out/godot3
 	@for platform in linux-x64 linux-arm64 windows-x64 macos-arm64; do \
@@ -75,11 +75,11 @@ dist-native: native
 	done
 	@mkdir -p out/npm
 	@cp engine_adapter/web/*.js engine_adapter/web/*.ts engine_adapter/web/*.json engine_adapter/web/README.md LICENSE out/npm
-	@cd dist && { npm pack --silent ../out/npm || echo "npm is not here: dist has no package for the web"; }
+	@cd dist && { npm pack --silent ../out/npm || echo "npm is not installed, so dist has no package for the web"; }
 	@cmake -S engine_adapter/godot -B out/godot3 -DTAICHI_SOFT_DIR=$(CURDIR)/out/native -DGODOT_HEADERS="$(GODOT_HEADERS)" \
 	    -DTAICHI_SOFT_GODOT_WORLD=$(CURDIR)/out/godot3/demo.softworld > out/godot3/cmake.log 2>&1 \
 	    || { if grep -q "headers cannot be fetched" out/godot3/cmake.log; \
-	         then echo "no .zip for Godot: its headers cannot be fetched; name a folder of them: make dist-native GODOT_HEADERS="; \
+	         then echo "no .zip for Godot, because its headers cannot be downloaded: set the folder that contains them, make dist-native GODOT_HEADERS="; \
 	         else cat out/godot3/cmake.log; fi; exit 1; }
 	@cmake --build out/godot3
 	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3

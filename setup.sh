@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes the environment in $1, unless it is there, and installs taichi-soft with the extra $2 (demo, lab, test, dev).
-# Uses uv if it is there, else venv + pip. PYTHON=/path/to/python names the interpreter to use.
+# Creates the environment $1 if it does not exist, and installs taichi-soft with the extra $2 (demo, lab, test, dev).
+# Uses uv if it is installed, otherwise venv and pip. PYTHON=/path/to/python sets the interpreter.
 set -eu
 
 venv=$1
@@ -9,14 +9,14 @@ fail() {
     echo "taichi-soft: $1" >&2
     exit 1
 }
-no_install="the packages could not be installed, for the reason above (without a network: give pip an index or a cache)"
+no_install="the packages could not be installed, for the reason above (without a network, configure an index or a cache for pip)"
 supported='import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))'
-installing="installing taichi-soft[$extra] and what it needs (once; some minutes where nothing is in the package cache)"
+installing="installing taichi-soft[$extra] and its dependencies (once; takes minutes if the package cache is empty)"
 
 if [ -z "${PYTHON:-}" ] && command -v uv >/dev/null 2>&1; then
     if [ ! -x "$venv/bin/python" ]; then
-        echo "1/2 making the environment $venv"
-        uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
+        echo "1/2 creating the environment $venv"
+        uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13. Install one."
     fi
     echo "2/2 $installing"
     uv pip install --python "$venv/bin/python" -e ".[$extra]" || fail "$no_install"
@@ -34,24 +34,24 @@ if [ ! -x "$venv/bin/pip" ]; then
         fi
     done
     if [ -z "${python:-}" ]; then
-        [ -n "${found:-}" ] || fail "no Python found: install Python 3.10, 3.11, 3.12 or 3.13"
-        version=$("$found" -c 'import platform; print(platform.python_version())' 2>/dev/null || echo "a broken one")
-        fail "$found is Python $version: install 3.10 to 3.13 (Taichi has wheels for no other), or name one: make PYTHON=python3.12 test"
+        [ -n "${found:-}" ] || fail "no Python found. Install Python 3.10, 3.11, 3.12 or 3.13."
+        version=$("$found" -c 'import platform; print(platform.python_version())' 2>/dev/null || echo "of unknown version")
+        fail "$found is Python $version, for which Taichi has no wheels. Install Python 3.10 to 3.13, or name one: make PYTHON=python3.12 test"
     fi
     "$python" -c 'import venv, ensurepip' >/dev/null 2>&1 ||
-        fail "$python has no venv module: install it (Debian and Ubuntu: apt install python3-venv)"
+        fail "$python has no venv module. Install it (Debian and Ubuntu: apt install python3-venv)."
 
-    echo "1/2 making the environment $venv with $("$python" --version)"
+    echo "1/2 creating the environment $venv with $("$python" --version)"
     rm -rf "$venv"
-    "$python" -m venv --without-pip "$venv" || fail "$python could not make $venv, for the reason above"
-    # The interpreter's own pip installs another with the rest: quicker than ensurepip.
+    "$python" -m venv --without-pip "$venv" || fail "$python could not create $venv, for the reason above"
+    # Faster than ensurepip: the interpreter's own pip installs pip together with the packages.
     if "$python" -m pip --python "$venv/bin/python" --version >/dev/null 2>&1; then
         echo "2/2 $installing"
         "$python" -m pip --python "$venv/bin/python" install --no-compile --disable-pip-version-check pip -e ".[$extra]" ||
             fail "$no_install"
         exit 0
     fi
-    "$venv/bin/python" -m ensurepip >/dev/null || fail "$python could not put pip into $venv, for the reason above"
+    "$venv/bin/python" -m ensurepip >/dev/null || fail "$python could not install pip into $venv, for the reason above"
 fi
 
 echo "2/2 $installing"

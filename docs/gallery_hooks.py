@@ -61,13 +61,13 @@ LINK = """<a href="gallery/play/index.html#{name}" aria-label="Play: {title}">{s
 
 WORLDLESS = """!!! note "Stills instead of worlds"
 
-    This copy of the documentation was built without its worlds. `make gallery` makes them, in some minutes; \
-then `make docs` takes them into the site."""
+    This copy of the documentation was built without its worlds. `make gallery` makes them, which takes \
+minutes. Then `make docs` adds them to the site."""
 
 MISSING = """!!! note "Stills instead of films"
 
-    This copy of the documentation was built without {what}. `make gallery` films every demo, in some \
-minutes; then `make docs` takes the films into the site."""
+    This copy of the documentation was built without {what}. `make gallery` films every demo, which \
+takes minutes. Then `make docs` adds the films to the site."""
 
 SCRIPT = """---
 search:
@@ -75,7 +75,7 @@ search:
 ---
 # demos/{name}.py
 
-{what} See it in [the gallery](../gallery.md#{name}), or make the film yourself: \
+{what} See it in [the gallery](../gallery.md#{name}), or make the film: \
 `taichi-soft demo {name} --out {name}.webm`.
 
 ```python

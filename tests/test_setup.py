@@ -57,9 +57,9 @@ def setup(tmp_path):
 @pytest.mark.parametrize(
     ("programs", "said"),
     [
-        ({}, "no Python found: install Python 3.10, 3.11, 3.12 or 3.13"),
-        ({"python3": OLD}, "python3 is Python 3.9.2: install 3.10 to 3.13"),
-        ({"python3": OLD, "python3.12": NO_VENV}, "python3.12 has no venv module: install it"),
+        ({}, "no Python found. Install Python 3.10, 3.11, 3.12 or 3.13."),
+        ({"python3": OLD}, "python3 is Python 3.9.2, for which Taichi has no wheels. Install Python 3.10"),
+        ({"python3": OLD, "python3.12": NO_VENV}, "python3.12 has no venv module. Install it"),
         ({"uv": 'test "$1" = python'}, "uv found no Python 3.10 to 3.13"),
     ],
 )

@@ -1,8 +1,8 @@
-// A world that a visitor plays, and what was done to it: `taichi-soft replay` makes that again on a PC.
+// A world with a record of the visitor's actions, which `taichi-soft replay` repeats on a PC.
 
-const MOST_STEPS = 36_000; // of what is recorded: ten minutes
+const MOST_STEPS = 36_000; // length of the record: ten minutes
 
-const PLAIN = { gravity: 1, damping: 0 }; // that a new body has
+const PLAIN = { gravity: 1, damping: 0 }; // values of a new body
 
 const slotOf = (body) => Number(body.handle & 0xffffffffn) - 1;
 const plus = (a, b, scale = 1) => a.map((each, i) => each + scale * b[i]);
@@ -34,9 +34,9 @@ export class Game {
   reset() {
     const { handles, controls } = this.facts;
     this.world.restore(this.first);
-    this.entries = []; // as in a recording of Python
+    this.entries = []; // in the form of a recording made by Python
     this.steps = 0;
-    this.serials = [...handles.body]; // numbers by which a recording names bodies, by slot
+    this.serials = [...handles.body]; // handle numbers of the bodies, by slot
     this.next = handles.next; // number of the next handle
     this.spawned = [];
     this.grabs = new Set();

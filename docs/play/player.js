@@ -1,4 +1,4 @@
-// The page that plays worlds: scenes by the part of its address behind #, what is pulled, pushed and set, the meter.
+// The page that runs worlds. It opens the scene named after # in its address, handles input, and shows the meter.
 import { loadScene } from "./taichi-soft.js";
 import { Game } from "./game.js";
 import { Stage } from "./stage.js";
@@ -6,9 +6,9 @@ import { Stage } from "./stage.js";
 const find = (id) => document.getElementById(id);
 const [canvas, words, play, verdict] = ["view", "words", "play", "verdict"].map(find);
 const wantsStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
-const LONGEST = 0.1; // that a frame lets pass [s]: after a hidden tab the world goes on from where it was
-const MOST_STEPS = 4; // in a frame
-// A module of one function that has an instruction of SIMD.
+const LONGEST = 0.1; // longest time of a frame [s]: the world does not catch up after its tab was hidden
+const MOST_STEPS = 4; // per frame
+// A module of one function with a SIMD instruction.
 const WITH_SIMD = Uint8Array.of(
   ...[0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11],
 );
@@ -18,12 +18,12 @@ let stage = null;
 let game = null;
 let isPlaying = false;
 let end = Infinity; // number of steps after which it pauses
-let opened = 0; // how many scenes: one that is loaded too late is dropped
-let [last, due] = [0, 0]; // time of the last frame [ms], and what the world is behind [s]
-let frames = []; // of the last second: { at, costs }, each step's cost [ms]
-let [since, framed] = [0, 0]; // from when on frames are counted for `Stage.ease` [ms]
-let told = 0; // when the meter was written [ms]
-const held = new Map(); // what pointers pull
+let opened = 0; // number of opened scenes: a scene that finishes loading after the next was opened is dropped
+let [last, due] = [0, 0]; // time of the last frame [ms]; simulated time still to be made [s]
+let frames = []; // frames of the last second: { at, costs }, with the cost of each step [ms]
+let [since, framed] = [0, 0]; // start of the count of frames for `Stage.ease` [ms]; the count
+let told = 0; // time of the last update of the meter [ms]
+const held = new Map(); // grabs by pointer
 
 /** Something in place of the picture; nothing shows the picture. */
 function say(text, still = "") {
@@ -33,12 +33,12 @@ function say(text, still = "") {
 }
 
 function whyNot() {
-  if (typeof WebAssembly === "undefined") return "This browser has no WebAssembly, in which the worlds run.";
+  if (typeof WebAssembly === "undefined") return "This browser has no WebAssembly, which the worlds need.";
   if (!WebAssembly.validate(WITH_SIMD)) {
     return "This browser's WebAssembly has no SIMD, which the worlds need: Chrome and Edge have it since 91, Firefox since 89, Safari since 16.4.";
   }
   if (!document.createElement("canvas").getContext("webgl2")) {
-    return "This browser has no WebGL to draw with: switch its hardware acceleration on.";
+    return "This browser has no WebGL, which the page needs to draw: switch its hardware acceleration on.";
   }
   return "";
 }
@@ -173,14 +173,14 @@ async function open() {
     await stage.show(game, name);
     if (number !== opened) return undefined;
   } catch (error) {
-    if (number === opened) say(`This scene cannot be played: ${error.message}`, name);
+    if (number === opened) say(`This scene cannot be opened: ${error.message}`, name);
     throw error;
   }
   fill();
   say("");
   stage.isStale = true;
   setPlaying(!wantsStill);
-  if (wantsStill) verdict.textContent = "Paused, as your system asks for less motion: press Play.";
+  if (wantsStill) verdict.textContent = "Paused, because your system is set to reduce motion. Press Play.";
   return undefined;
 }
 
@@ -215,7 +215,7 @@ function tell(now) {
 /** Make the steps that are due. Returns the cost of each [ms]. */
 function steps(seconds) {
   const { dt } = game.facts;
-  // A screen of about as many frames a second as the world makes steps has one step in each.
+  // If the screen's frame rate is close to the rate of steps, make one step per frame.
   due += Math.abs(seconds - dt) < 0.06 * dt ? dt : seconds;
   const costs = [];
   while (due > 0.999 * dt && costs.length < MOST_STEPS && game.steps < end) {
@@ -224,7 +224,7 @@ function steps(seconds) {
     costs.push(performance.now() - begin);
     due -= dt;
   }
-  if (due > dt) due = 0; // time that this machine has no steps for is dropped
+  if (due > dt) due = 0; // drop time that this machine cannot simulate
   return costs;
 }
 
@@ -249,13 +249,13 @@ function frame(now) {
   }
 }
 
-/** The step at which a PC's hash is known was reached. */
+/** Compare the hash of this step with that of a PC. */
 function finish() {
   setPlaying(false);
   const { steps: count, hash } = game.facts.proof;
-  const is = game.hash === hash ? "the same as on the PC that made this page" : `and the PC that made this page had ${hash}`;
+  const is = game.hash === hash ? "the same as on the PC that built this page" : `but the PC that built this page had ${hash}`;
   const what = `Step ${count} has the hash ${game.hash}`;
-  verdict.textContent = game.isTouched ? `${what}. You changed the world on the way.` : `${what}, ${is}.`;
+  verdict.textContent = game.isTouched ? `${what}. You changed the world before that step, so it cannot be compared.` : `${what}, ${is}.`;
 }
 
 async function save() {
@@ -271,12 +271,12 @@ async function save() {
     verdict.textContent = `This cannot be saved, because ${name}.recording cannot be read: ${error.message}`;
     return;
   }
-  // Only now, because the world went on meanwhile: the file and the hash are of one moment.
+  // Record after the download, so that the file and the hash belong to the same step.
   const [text, hash] = [playing.recording(start), playing.recordedHash];
   const href = URL.createObjectURL(new Blob([text], { type: "application/json" }));
   Object.assign(document.createElement("a"), { href, download: file }).click();
   URL.revokeObjectURL(href);
-  if (playing === game) verdict.textContent = `On a PC, taichi-soft replay ${file} makes the same steps and prints ${hash}.`;
+  if (playing === game) verdict.textContent = `On a PC, taichi-soft replay ${file} repeats these steps and prints ${hash}.`;
 }
 
 const KEYS = {

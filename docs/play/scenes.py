@@ -1,7 +1,7 @@
-"""Scenes that visitors of the documentation play: each public function makes one.
+"""Playable scenes of the documentation. Each public function makes one.
 
-Its `controls` are plain data that `game.js` reads: sliders that set gravity, damping or wind, or move a thing
-`along` or `about` a direction, and buttons that spawn bodies or push them.
+`controls` are plain data for `game.js`: sliders that set gravity, damping or wind, or move an object `along`
+or `about` a direction, and buttons that spawn or push bodies.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from taichi_soft.render import PALETTE, Camera
 
 CORAL, TEAL, HONEY, PERIWINKLE, LEAF, ROSE, SKY, CLAY = PALETTE
 STEPS = 300
-"""Length of the recording with which a browser is compared."""
+"""Length of the recording with which a browser compares its results."""
 
 
 @dataclass
 class Scene:
-    """A world with all that a page needs to show it. Docstrings have its title, and what to do in it."""
+    """A world and the data that a page needs to show it. Its function's docstring is the title and text."""
 
     world: World  # built, made with `record=STEPS`
     camera: Camera
@@ -81,8 +81,7 @@ def _damping(value: float = 0.0) -> dict[str, Any]:
 def jelly() -> Scene:
     """Pull a jelly.
 
-    Take hold of the pudding and pull, or drop berries on it. Its foot is fixed, and its Young's modulus is
-    20 kPa.
+    Pull the pudding, or drop berries on it. Its bottom is fixed, and its Young's modulus is 20 kPa.
     """
     world = World(soft_contact=True, friction=0.8, record=STEPS)
     contact = Contact(friction=0.8, thickness=0.01)
@@ -114,7 +113,7 @@ def _assets(world: World) -> list[SoftBodyAsset]:
 
 
 def _pudding() -> TetMesh:
-    """A cylinder made narrower towards its top, with flutes."""
+    """A fluted cylinder that narrows towards its top."""
     height, flutes = 0.7, 8
     mesh = cylinder(0.55, height, rings=4, layers=6)
     x, y, z = mesh.vertices.T
@@ -127,7 +126,7 @@ def _pudding() -> TetMesh:
 def bowl() -> Scene:
     """Tip the bowl.
 
-    Tip the bowl with its sliders until it is empty, or take a body out by hand.
+    Tip the bowl with its sliders until it is empty, or pull a body out.
     """
     world = World(soft_contact=True, friction=0.5, record=STEPS)
     material = Material(young=1e5, poisson=0.3, density=500.0, damping_ratio=0.1)
@@ -165,7 +164,7 @@ def bowl() -> Scene:
 
 
 def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
-    """Half a hollow ball with a round rim, open at the top, about the middle of that."""
+    """Half a hollow ball with a round rim, open at the top; the origin is the centre of the opening."""
     angles = np.linspace(0, np.pi / 2, 17)
     outer = (radius + wall) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = radius * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
@@ -177,7 +176,7 @@ def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
 def elephant() -> Scene:
     """Drop an elephant.
 
-    Drop elephants onto the steps. There is room for four: a fifth one takes the place of the first.
+    Drop elephants onto the steps. There is room for four; a fifth replaces the first.
     """
     world = World(soft_contact=True, friction=0.8, record=STEPS)
     depth, rise, width = 0.6, 0.24, 2.4
@@ -220,7 +219,7 @@ def elephant() -> Scene:
 def flag() -> Scene:
     """Let the wind blow.
 
-    Set the wind along and across the flag, and pull at its corners.
+    Set the wind along and across the flag, and pull its corners.
     """
     cells = (22, 16)
     mesh = cloth((1.65, 1.2), cells, 0.3)
@@ -306,7 +305,7 @@ def stiffness() -> Scene:
 def hand() -> Scene:
     """Swing and twist.
 
-    Move the plate from which the bar hangs, turn it, or pull at the bar.
+    Move or turn the plate from which the bar hangs, or pull the bar.
     """
     size = (0.26, 0.26, 1.6)
     mesh = box(size, (3, 3, 16))

@@ -1,11 +1,11 @@
-// Draws a game: bodies and colliders in light and shadow on a floor that ends in the colour of the page.
+// Draws a game: bodies and colliders with shadows, on a floor that fades into the colour of the page.
 import * as THREE from "three";
 import { OrbitControls } from "./OrbitControls.js";
 import { SoftMesh } from "./three.js";
 
-const FRAMED = 1.6; // width over height that the cameras of the scenes frame
-const [LOWEST, FINEST] = [0.5, 2]; // pixels drawn along one of CSS: fewer where drawing is slow, more for smooth edges
-const WANTED = 60; // frames a second
+const FRAMED = 1.6; // aspect ratio for which the scenes' cameras are placed
+const [LOWEST, FINEST] = [0.5, 2]; // drawn pixels per CSS pixel: fewer if drawing is slow, more for smooth edges
+const WANTED = 60; // target frame rate [1/s]
 
 export class Stage {
   constructor(canvas) {
@@ -44,7 +44,7 @@ export class Stage {
     ];
     this.strings = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ depthTest: false }));
     this.strings.frustumCulled = false;
-    this.strings.renderOrder = 1; // over the body that is pulled
+    this.strings.renderOrder = 1; // in front of the grabbed body
     this.scene.add(this.strings);
     Object.assign(this.camera, { near: this.distance / 50, far: 30 * this.distance });
     Object.assign(this.controls, { minDistance: this.distance / 4, maxDistance: 2.5 * this.distance, maxPolarAngle: 1.54 });
@@ -86,7 +86,7 @@ export class Stage {
     const geometry = new THREE.CircleGeometry(0.75 * this.distance, 48);
     this.floor = new THREE.Mesh(geometry, new THREE.ShadowMaterial({ opacity: 0.3 }));
     this.floor.receiveShadow = true;
-    this.floor.position.set(x, y, -0.002); // what lies on it is not within it
+    this.floor.position.set(x, y, -0.002); // below objects that lie on it, against z-fighting
     this.scene.add(this.floor);
   }
 

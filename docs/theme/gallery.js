@@ -1,12 +1,12 @@
-// Plays the films of the gallery that are in view, unless the reader's system asks for less motion.
+// Plays the films of the gallery that are in view, unless the reader's system is set to reduce motion.
 const films = [...document.querySelectorAll("video.film")];
 const button = document.querySelector("#films");
 const inView = new Set();
-const held = new Set(); // what the reader has stopped
+const held = new Set(); // films that the reader has paused
 let arePlaying = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 function start(film) {
-  if (arePlaying && inView.has(film) && !held.has(film)) film.play().catch(() => {}); // a browser may refuse
+  if (arePlaying && inView.has(film) && !held.has(film)) film.play().catch(() => {}); // a browser can refuse to play
 }
 
 function tell() {
@@ -21,7 +21,7 @@ const observer = new IntersectionObserver((seen) => {
   }
 }, { threshold: 0.3 });
 
-/** A button at the corner of an entry: a browser's own controls would cover the still. */
+/** Add a button at the corner of an entry, because a browser's own controls would cover the still. */
 function addButton(film) {
   const its = Object.assign(document.createElement("button"), { type: "button" });
   const name = () => {

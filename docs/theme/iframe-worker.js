@@ -1,5 +1,5 @@
-// Pages that are opened from a folder may not start workers, and the search runs in one. There a hidden frame
-// takes the worker's place: it loads the same script, and messages pass between the two as events.
+// The search runs in a worker, which pages opened from a folder cannot start. There a hidden frame replaces the
+// worker: it loads the same script, and both exchange messages as events.
 if (location.protocol === "file:") {
   class FrameWorker extends EventTarget {
     constructor(script) {

@@ -292,7 +292,7 @@ def test_who_wants_no_motion_has_a_still_until_they_press_play(browser, site):
     page, complaints, _ = playing(
         browser, site, reduced_motion="reduce", viewport={"width": 640, "height": 480}
     )
-    page.get_by_text("your system asks for less motion").wait_for()
+    page.get_by_text("your system is set to reduce motion").wait_for()
     still = pixels_of(page, "#view")
     page.wait_for_timeout(1000)
     assert steps_of(page) == 0
@@ -312,10 +312,10 @@ def test_who_wants_no_motion_has_a_still_until_they_press_play(browser, site):
     [
         ("WebAssembly.validate = () => false", "WebAssembly has no SIMD"),
         ("delete globalThis.WebAssembly", "has no WebAssembly"),
-        ("HTMLCanvasElement.prototype.getContext = () => null", "no WebGL to draw with"),
+        ("HTMLCanvasElement.prototype.getContext = () => null", "no WebGL, which the page needs"),
         (
             "WebAssembly.compile = async () => { throw new Error('broken') }",
-            "cannot be played: .*SIMD: broken",
+            "cannot be opened: .*SIMD: broken",
         ),
     ],
 )

@@ -439,7 +439,7 @@ def test_these_tests_call_every_such_function_of_the_node():
 def test_the_script_of_the_page_runs(run, project):
     """Its elephant falls, and is drawn; the mouse takes it, and it is hung up."""
     text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
-    sections = text.split("\n## From a script\n")[1].split("\n## Rigid bodies\n")[0]
+    sections = text.split("\n## Script reference\n")[1].split("\n## Rigid bodies\n")[0]
     scripts = re.findall(r"^```gdscript\n(.*?)^```", sections, re.DOTALL | re.MULTILINE)
     assert len(scripts) == 3
     (project / "page.gd").write_text("\n".join(["extends Spatial", *scripts]), encoding="utf-8")

@@ -82,7 +82,7 @@ def test_a_newcomer_plays_in_godot_with_the_zip_alone(engine, libraries, tmp_pat
         return done.stdout
 
     page = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
-    commands, _ = blocks(page, "From nothing to falling elephants")
+    commands, _ = blocks(page, "Tutorial: falling elephants")
     found = told(entered(commands))
     demo = place / package.stem
     licences = {"LICENSE", "LICENSE-godot-headers"}
