@@ -25,7 +25,7 @@ PARTLY = {
     "energy-budget",
     *("sphere-window-0.1", "cylinder-0.4", "split-ring-normal", "large-strain"),
 }
-"""Theory that laws along edges, or the virial law, do not meet; and claims that hold for a part of the range."""
+"""Theory that laws along edges, or the virial law, do not meet; and claims that hold in a part of a range."""
 
 
 @pytest.fixture(scope="module")
