@@ -121,8 +121,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
-        integrator = INTEGRATORS[settings.integrator]
-        if integrator.takes_solves and settings.schedule is Schedule.FLAT:
+        model = INTEGRATORS[settings.integrator]
+        if model.takes_solves and settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' does not support implicit_euler: use 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
@@ -137,7 +137,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         pools: Pools[SoftBody] = Pools()
         substeps = Substeps(
             pools,
-            has_stable_step=integrator.has_stable_step,
+            has_stable_step=model.has_stable_step,
             soft_contact=touching.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
