@@ -37,10 +37,10 @@ STEP = FixedStep(dt=1 / 50)
 
 
 class Hand:
-    """Reaches, lifts, swings, and releases the body when it would fly into the crate."""
+    """Reaches, lifts, swings, and releases the body when its velocity carries it into the crate."""
 
     def __init__(self, frame: Frame) -> None:
-        """Start at rest without a body."""
+        """Create a hand at rest that holds nothing."""
         self.frame, self.rest = frame, frame.position.astype(np.float64)
         self.taken = 0
         self.grab: Grab | None = None

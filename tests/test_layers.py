@@ -255,10 +255,10 @@ def test_meshes_and_materials_need_no_taichi():
 
 
 def test_the_engine_adapter_knows_only_the_public_names():
-    """And the checks of arguments and of callers, and how a missing extra is named."""
+    """And checks of arguments and callers, the error for a missing extra, and the warning for an old name."""
     inner = {n for m in FILES if m.startswith("engine_adapter") for n in IMPORTS[m]}
     known = {name for name in inner if name.startswith("taichi_soft")}
-    known_core = (f"taichi_soft.core.{name}" for name in ("checks", "extras", "handles", "threads"))
+    known_core = (f"taichi_soft.core.{name}" for name in ("checks", "extras", "handles", "renamed", "threads"))
     assert known <= {"taichi_soft", *known_core}
 
 

@@ -28,7 +28,7 @@ from taichi_soft.core.serialisation import below
 Floats = NDArray[np.float64]
 
 SHORTEST, PERIODS = 0.5, 8.0
-"""Duration of a change: SHORTEST [s], or PERIODS times the slowest mode's period over 2 pi if longer."""
+"""Duration of a change: the larger of SHORTEST [s] and PERIODS / omega, omega of the slowest mode [rad/s]."""
 
 HELD = 6.4
 """Ratio of a free beam's frequency to that of a beam held at one end (roots of the bending equation,

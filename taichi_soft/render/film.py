@@ -39,8 +39,8 @@ class FilmReport:
     frames: int  # number of frames
     fps: float  # frames per second
     simulated: float  # world time that passed [s]
-    step_times: NDArray[np.float64]  # stepping and reading of each frame but the first [s]
-    draw_times: NDArray[np.float64]  # drawing of each frame [s]; empty if nothing is drawn
+    step_times: NDArray[np.float64]  # time to step and read each frame except the first [s]
+    draw_times: NDArray[np.float64]  # time to draw each frame [s]; empty if nothing is drawn
     slow: float = 1.0  # slow-motion factor of the film
 
     @property

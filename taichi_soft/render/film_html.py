@@ -1,4 +1,4 @@
-"""Show a film in a notebook: HTML with the file embedded, and a table of figures below."""
+"""Show a film in a notebook: HTML with the file embedded, and a table of measurements below."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from taichi_soft.render.backdrop_kernels import pixel_ray
 from taichi_soft.render.kernel_types import TILE, ints, reals, rows, vec3
 
 HALF = TILE // 2
-"""Points along the edge of a tile."""
+"""Number of occlusion points along the edge of a tile."""
 
 TAPS = 10
 """Depth samples around a point."""
