@@ -22,7 +22,7 @@ class Listener:
     """A function that receives events until `remove` is called."""
 
     def __init__(self, kind: type[Event], function: Callable[[Any], object]) -> None:
-        """Made by `World.on`."""
+        """Use `World.on` instead."""
         self.kind = kind
         self.function = function
         self.is_active = True
