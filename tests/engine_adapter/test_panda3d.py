@@ -484,7 +484,7 @@ def test_what_was_put_back_with_the_world_moves_on_as_before(base, play):
     np.testing.assert_allclose(ways[0], ways[1], atol=1e-4)
     assert np.ptp(np.array(ways[0])[:, 2]) > 1e-3
     coupling.remove(crate)
-    with pytest.raises(OptionError, match="other rigid bodies"):
+    with pytest.raises(OptionError, match=r"rigid bodies were .*same set"):
         coupling.restore(kept[1])
 
 
@@ -528,7 +528,7 @@ def test_a_node_is_coupled_once_and_only_rigid_bodies_are(base, play):
     crate = make_crate(base, rigid, (0, 0, 5))
     coupling = BulletCoupling(play, rigid)
     coupling.add(crate)
-    with pytest.raises(OptionError, match="'crate' was added before"):
+    with pytest.raises(OptionError, match="'crate' was already added"):
         coupling.add(crate)
     with pytest.raises(OptionError, match=r"'ghost' must be a BulletRigidBodyNode, got BulletGhostNode"):
         coupling.add(base.render.attach_new_node(bullet.BulletGhostNode("ghost")))

@@ -66,7 +66,8 @@ def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
 def test_what_calls_cost_is_told_of_a_step_a_mesh_and_a_bare_call(export, compiled, run):
     told = run(compiled("Cost", "TaichiSoft.cs", "Cost.cs"), export("heap"))
     assert [text.split(" ")[0] for text in told] == ["a", "reading", "a"]
-    assert told[0].startswith("a step: ") and told[2].startswith("a trivial call: ")
+    assert told[0].startswith("a step: ")
+    assert told[2].startswith("a trivial call: ")
 
 
 REFUSED = {
