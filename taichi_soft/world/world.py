@@ -50,11 +50,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 to 1; None leaves bodies their own elasticity. In a world with colliders
-            or soft contact it works as in `add_collider`. Otherwise the floor reflects each vertex
-            separately: at 0, the default there, bodies keep their own elasticity, and a damped body can
-                bounce lower at 1
-            than at 0.
+        restitution: of the floor, 0 to 1, as in `add_collider`; None leaves bodies their own elasticity. With
+            the schedule "flat" the floor reflects each vertex separately: at 0, the default there, bodies
+            keep their own elasticity, and a damped body can bounce lower at 1 than at 0.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". The last one is stable
             for every step, but solves a linear system per step and has damping that grows with the step. It
