@@ -30,7 +30,7 @@ soft.build()
 
 
 def step_bullet(soft):
-    """Apply the impulses of the last soft step to the crates; colliders follow them (docs/coupling.md)."""
+    """Apply the impulses of the last soft step to the crates. Colliders follow (docs/coupling.md)."""
     now = np.array([(collider.impulse, collider.angular_impulse) for _, collider in crates])
     for (crate, _), (impulse, angular) in zip(crates, 1.5 * now - 0.5 * last, strict=True):
         crate.node().set_active(True)

@@ -95,7 +95,7 @@ class DocstringSections(griffe.Extension):
     def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
         """List the fields of a dataclass whose docstring does not; hide how a world makes its handles."""
         doc, init = cls.docstring, cls.members.get("__init__")
-        if init is not None and init.docstring is not None and init.docstring.value.startswith("Made by"):
+        if init is not None and init.docstring is not None and init.docstring.value.startswith("Use `"):
             del cls.members["__init__"]
         for member in cls.members.values():
             if member.is_attribute and "dataclass" in cls.labels and isinstance(member.value, griffe.Expr):

@@ -78,9 +78,11 @@ def _head() -> str:
     """When and how the report was made, and how many claims hold."""
     text = (REPORT / "report.md").read_text(encoding="utf-8")
     facts = dict(re.findall(r"^- (\w+): (.*)$", text, re.MULTILINE))
-    counts = re.search(r"^Of \d+ claims: .*$", text, re.MULTILINE)
-    assert counts is not None
-    return f"It was made on {facts['Made']} by `{facts['Command']}`, on {facts['processor']}. {counts[0]}"
+    counts = re.findall(r"^Of \d+ (?:claims of the thesis|statements of theory): .*$", text, re.MULTILINE)
+    assert len(counts) == 2
+    return (
+        f"It was made on {facts['Made']} by `{facts['Command']}`, on {facts['processor']}. {' '.join(counts)}"
+    )
 
 
 def _verdicts() -> str:

@@ -1,4 +1,4 @@
-"""Extras of a checkout: packages that only the lab needs, and how to get them where one is missing."""
+"""Extras of a checkout: packages that only the lab needs, and how to install them."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ EXTRAS = {
     },
     "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
-"""By extra: its modules, and the packages that have them, as in pyproject.toml."""
+"""For each extra its modules, and the packages that contain them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """Packages of the extra, or those of these modules, that are not installed."""
+    """Packages of the extra, or of the given modules, that are not installed."""
     return missing_among(EXTRAS[extra], *modules)
 
 
 def how_to_install(extra: str) -> str:
-    """The command that installs an extra, in the folder of the checkout."""
+    """Command that installs an extra, for the folder of the checkout."""
     return f"pip install -e '.[{extra}]'"
 
 
 def require_report() -> None:
-    """Raises: MissingExtraError in one line where a package is missing that a report needs."""
+    """Raise a MissingExtraError if a package is missing that a report needs."""
     missing = missing_packages("lab")
     if missing:
         names = ", ".join(missing)

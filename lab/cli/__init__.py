@@ -9,10 +9,10 @@ from taichi_soft.core.extras import require_extra
 
 
 def main(*arguments: str) -> None:
-    """Run the command line; an error of ours is one line and exit code 1, a wrong option 2.
+    """Run the command line. Errors of this package end it by one line and exit code 1, wrong options by 2.
 
     Args:
-        arguments: to run with; without any, those of the process.
+        arguments: of the command; without any, those of the process.
     """
     try:
         require_extra("cli", "the command line needs")

@@ -1,4 +1,4 @@
-"""What breaks: random drops, and the sweep."""
+"""`python -m lab drop-test`: random drops, and the sweep."""
 
 from __future__ import annotations
 
@@ -21,30 +21,34 @@ def drop_test(
     cases: Annotated[
         int | None,
         typer.Option(
-            min=1, max=100_000, help="How many random cases, 1000 by default; of a sweep, of each group."
+            min=1, max=100_000, help="Number of random cases, 1000 by default; in a sweep, of each group."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all random numbers.")] = 0,
-    first: Annotated[int, typer.Option(min=0, help="Number of the first case: repeats it alone.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")] = 0,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first case, to repeat one.")] = 0,
     law: Annotated[
         str | None,
-        typer.Option(help="Force law, virial by default; of a sweep, or default, and all if left out."),
+        typer.Option(help="Force law, virial by default. In a sweep: a law, or default; all by default."),
     ] = None,
     flips: Annotated[
-        str | None, typer.Option(help="tolerant, recover or off; recover by default, where the law takes it.")
+        str | None, typer.Option(help="tolerant, recover or off; recover by default, if the law supports it.")
     ] = None,
-    worst: Annotated[int, typer.Option(min=0, help="Failed cases to list of each kind; a page has all.")] = 5,
+    worst: Annotated[
+        int, typer.Option(min=0, help="Failed cases to list of each kind; a page lists all.")
+    ] = 5,
     sweep: Annotated[
-        bool, typer.Option("--sweep", help="Instead, drop or wreck one body at a time, by every law.")
+        bool, typer.Option("--sweep", help="Instead, drop or deform one body at a time, by every law.")
     ] = False,
     only: Annotated[
         list[str] | None,
         typer.Option(help="Group of a sweep: foreign, own, cells or wrecked; may be repeated."),
     ] = None,
-    damping: Annotated[str | None, typer.Option(help="Damping of a sweep, by name; all if left out.")] = None,
-    wrecks: Annotated[int, typer.Option(min=0, max=100_000, help="Random wrecks to add to a sweep.")] = 0,
+    damping: Annotated[str | None, typer.Option(help="Damping of a sweep, by name; all by default.")] = None,
+    wrecks: Annotated[
+        int, typer.Option(min=0, max=100_000, help="Random deformed bodies to add to a sweep.")
+    ] = 0,
     out: Annotated[
-        Path, typer.Option(help="Markdown page of a sweep; its results are kept in out/sweep.")
+        Path, typer.Option(help="Markdown page of a sweep; its results are stored in out/sweep.")
     ] = Path("out/sweep/sweep.md"),
     workers: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes of a sweep; one per core by default.")
@@ -53,16 +57,16 @@ def drop_test(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Drop random bodies onto random courses and count what breaks; exit code 1 where anything did.
+    """Drop random bodies onto random courses and count the failures; exit code 1 if there are any.
 
-    With --sweep: bodies of many meshes and materials onto a floor, and wrecked ones, each as a game gets it
-    by default and by every law. What was interrupted goes on from there.
+    With --sweep: drop bodies of many meshes and materials onto a floor, and release strongly deformed ones,
+    each with the default law and with every law. A sweep that was interrupted resumes.
     """
     if not sweep and (only or damping or wrecks or workers):
-        raise OptionError("--only, --damping, --wrecks and --workers belong to a sweep: add --sweep")
+        raise OptionError("--only, --damping, --wrecks and --workers are options of a sweep: add --sweep")
     if sweep:
         if seed or first or threads:
-            raise OptionError("--seed, --first and --threads belong to random cases: leave out --sweep")
+            raise OptionError("--seed, --first and --threads are options of random cases: leave out --sweep")
         asked = {"law": law, "flips": flips, "damping": damping, "count": cases, "wrecks": wrecks}
         _sweep(asked, only, out, worst, workers, arch, as_json=as_json)
         return

@@ -1,4 +1,4 @@
-"""One drop here, in other engines and in a fine reference."""
+"""`python -m lab peers`: one drop here, in other engines and in a fine reference."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from taichi_soft.core.checks import as_positive
 from taichi_soft.core.runtime import init
 
 SECONDS = 6.0
-"""Length of the film where none is given [s]."""
+"""Default length of the film [s]."""
 
 
 def peers(
@@ -25,13 +25,13 @@ def peers(
     seconds: Seconds = None,
     fps: Fps = 50.0,
     size: Size = "1280x720",
-    video: Annotated[bool, typer.Option(help="Write a film, or only print the numbers.")] = True,
+    video: Annotated[bool, typer.Option(help="Write a film; without, print the numbers only.")] = True,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
     """Drop one body here, in a fine reference, and in each other engine that is installed.
 
-    Prints the cost and the error of each, and films them side by side, slowed down.
+    Print the cost and the error of each, and film them side by side in slow motion.
     """
     from lab.peers import Drop, compare, missing_peers
     from lab.peers.wall import captions, film_wall

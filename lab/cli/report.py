@@ -1,4 +1,4 @@
-"""The thesis's experiments."""
+"""`python -m lab report`: the thesis's experiments."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ def report(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder to write the page into; out/report by default. With names and no folder, tables are "
-            "printed instead."
+            help="Folder for the page; out/report by default. With names and no folder, print tables instead."
         ),
     ] = None,
     quick: Annotated[
@@ -30,14 +29,12 @@ def report(
         int | None, typer.Option(min=1, max=256, help="Processes; one per core by default.")
     ] = None,
     arch: Arch = "auto",
-    show_list: Annotated[
-        bool, typer.Option("--list", help="List the experiments, and compute nothing.")
-    ] = False,
+    show_list: Annotated[bool, typer.Option("--list", help="List the experiments and end.")] = False,
 ) -> None:
-    """Run the thesis's experiments and judge its claims; exit code 1 where a point could not be computed.
+    """Run the thesis's experiments and judge its claims; exit code 1 if a point could not be computed.
 
-    Every number is kept at once, in the folder data beside the page. What was interrupted goes on from there,
-    and points that failed are computed again; without that folder everything is.
+    Every number is stored at once, in the folder data beside the page. A report that was interrupted resumes
+    from there, and computes points that failed again.
     """
     from lab.experiments import Effort
     from lab.report.machine import machine_facts
@@ -79,5 +76,5 @@ def report(
         say(f"wrote {escape(str(page))}")
     failed = sum(len(results.failed) for _, results, _ in concluded)
     if failed:
-        say(f"{failed} points could not be computed: the same command tries them again")
+        say(f"{failed} points could not be computed. Run the same command to retry them.")
         raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""Random bodies dropped onto random courses: what breaks, and how often."""
+"""Random bodies dropped onto random courses: which failures occur, and how often."""
 
 from lab.drop_test.case import make_case
 from lab.drop_test.summary import Summary

@@ -1,4 +1,4 @@
-"""One random body and where it is dropped: all of it follows from two whole numbers."""
+"""One random body and its course, both determined by two integers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from taichi_soft.elements.laws import LAWS
 Floats = NDArray[np.float64]
 
 SHAPES = ("box", "sphere", "cylinder", "torus", "beam")
-"""Case n is of kind n modulo 5, so that all are tried alike."""
+"""Case n has the kind n modulo 5, so that all kinds are tried equally often."""
 
 SMALLEST, LARGEST = 0.05, 10.0
 """Longest edge of the body's box [m]."""
@@ -26,10 +26,10 @@ SOFTEST, STIFFEST = 1e4, 1e8
 """Young's modulus [Pa]."""
 
 MOST_SAG = 0.1
-"""density * g * size / E, at most: what is softer lies flat under its own weight."""
+"""Largest density * g * size / E: softer bodies lie flat under their own weight."""
 
 FASTEST, FASTEST_RIM = 50.0, 10.0
-"""Speed of the centre and, from the spin, of the rim [m/s]."""
+"""Largest speed of the centre, and of the rim by the spin [m/s]."""
 
 STEPS_PER_SECOND = 60
 
@@ -56,12 +56,12 @@ class Case:
 
     @property
     def unit_time(self) -> float:
-        """In which the body falls half its size [s]."""
+        """Time in which the body falls half its size [s]."""
         return math.sqrt(self.size / GRAVITY_EARTH)
 
     @property
     def mach(self) -> float:
-        """Speed over that of sound in the body: above 1 nothing but its mass resists an impact."""
+        """Speed over the speed of sound in the body: above 1 only its mass resists an impact."""
         wave = math.sqrt(float(np.max(self.material.young / self.material.density)))
         return float(np.linalg.norm(self.velocity)) / wave
 
@@ -79,10 +79,9 @@ class Case:
 
 
 def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName | None = None) -> Case:
-    """Case `number` of `seed`, by a law and its treatment of flips: "recover" where none is given and the law
-    lets one choose.
+    """Make case `number` of `seed` for a law and its flips: "recover" by default, if the law has a choice.
 
-    Damping is `edge_damping` with a share of 0.1 to 0.5, evenly.
+    Damping is `edge_damping` with a ratio from 0.1 to 0.5, uniformly.
     """
     if flips is None and law in LAWS and Flips.RECOVER in LAWS[law].flips:
         flips = Flips.RECOVER.value
@@ -119,14 +118,19 @@ def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName 
 
 
 def edge_damping(mesh: TetMesh, young: float, density: float, share: float) -> float:
-    """Damping b of an edge [N s/m]: a share of l^2 sqrt(E density), l being the mean edge. That is about so
-    much of critical damping for the fastest vibrations; for the slowest, of wave length L, l/L of it."""
+    """Damping b of an edge [N s/m]: `share` times l^2 sqrt(E density), with the mean length l of an edge.
+
+    This is about that share of critical damping for the fastest vibrations, and l/L of it for those of wave
+    length L.
+    """
     return share * float(mesh.edge_lengths.mean()) ** 2 * math.sqrt(young * density)
 
 
 def shape_mesh(shape: str, size: float, parts: Floats) -> TetMesh:
-    """A mesh whose box has longest edge `size` [m], its proportions from two numbers of 0 to 1; the same
-    number of everything for all of one shape, so that worlds of them share kernels."""
+    """A mesh whose box has the longest edge `size` [m], with proportions from two numbers between 0 and 1.
+
+    All meshes of one shape have the same counts, so that their worlds share kernels.
+    """
     a, b = (float(part) for part in parts)
     if shape == "box":
         return box((size, size * (0.5 + 0.5 * a), size * (0.5 + 0.5 * b)), (3, 3, 3))
@@ -148,6 +152,6 @@ def _direction(rng: np.random.Generator) -> Floats:
 
 
 def _rounded(substeps: float) -> int:
-    """The next of 1, 2, 3, 4, 6, 8, 12, 16, ...: cases with the same number go in one world."""
+    """Round up to 1, 2, 3, 4, 6, 8, 12, 16, ...: cases with the same number share a world."""
     whole = 1 << max(0, math.ceil(math.log2(max(substeps, 1.0))))
     return whole * 3 // 4 if whole >= 4 and whole * 3 / 4 >= substeps else whole

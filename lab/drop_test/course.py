@@ -1,4 +1,4 @@
-"""Random courses: a closed room, and solids in it that stand in the way."""
+"""Random courses: a closed room with solids in it."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from taichi_soft.core.math.rotations import matrix_of
 Floats = NDArray[np.float64]
 
 HALF, HEIGHT, BELOW = 3.0, 8.0, 3.0
-"""Of the room, over the size of the body: half its width, up to the lid, and how far walls reach down."""
+"""Dimensions of the room over the size of the body: half its width, height of the lid, depth of the walls."""
 
 THINNEST = 0.02
-"""Of walls, lids and floors [m]."""
+"""Thickness of walls, lids and floors [m]."""
 
 STEEPEST = 0.35
-"""Of a tilted floor [rad]."""
+"""Largest angle of a tilted floor [rad]."""
 
 CELLS = 24
-"""Of the grid of a mesh, along its longest side."""
+"""Cells of the grid of a mesh along its longest side."""
 
 
 @dataclass(frozen=True)
 class Solid:
-    """Something to hit, and an independent formula for how far a point is from it."""
+    """A collider, and an independent formula for the distance of a point from it."""
 
     name: str
     shape: Shape
@@ -51,20 +51,22 @@ class Solid:
     restitution: float | None
 
     def depth(self, points: Floats) -> float:
-        """How deep inside the deepest of the points (n, 3) lies [m]; negative outside."""
+        """Penetration depth of the deepest of the points (n, 3) [m]; negative outside."""
         return -float(self.distance((points - self.position) @ self.rotation).min())
 
 
 def random_rotation(rng: np.random.Generator) -> Floats:
-    """Of all rotations with equal chance, (3, 3)."""
+    """Uniformly random rotation, (3, 3)."""
     quaternion = rng.normal(size=4)
     matrix: Floats = matrix_of(quaternion / np.linalg.norm(quaternion))
     return matrix
 
 
 def make_course(rng: np.random.Generator, size: float) -> tuple[Solid, ...]:
-    """A room of 6 x 6 x 8 sizes of the body [m], and one to four solids in its lower half. Every other course
-    leaves bodies their own restitution."""
+    """Make a room of 6 x 6 x 8 sizes of the body [m] with one to four solids in its lower half.
+
+    Every other course leaves the restitution of the bodies unchanged.
+    """
     friction, restitution = rng.uniform(0.2, 1.0), rng.choice([0.0, rng.uniform(0.0, 0.9)])
     surface = {"friction": float(friction), "restitution": float(restitution) or None}
     room = [_floor(rng, size, surface), *_walls(rng, size, surface)]

@@ -1,6 +1,6 @@
 """Signed distances of points (n, 3) from solids in their own frames [m]: float64, written from the formulas.
 
-They judge what the kernels do, so they share nothing with them.
+They check the kernels, and therefore share no code with them.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ Distance = Callable[[Floats], Floats]
 
 
 def half_space(normal: Floats, offset: float = 0.0) -> Distance:
-    """All below the plane with that unit normal (3,), `offset` from the origin along it [m]."""
+    """Half space below the plane with that unit normal (3,), `offset` from the origin along it [m]."""
     return lambda x: np.asarray(x @ normal - offset)
 
 
 def ball(radius: float) -> Distance:
-    """About the origin."""
+    """Ball about the origin."""
     return lambda x: np.asarray(np.linalg.norm(x, axis=1) - radius)
 
 
 def cuboid(size: Floats) -> Distance:
-    """About the origin, edges (3,) along the axes."""
+    """Cuboid about the origin with edges (3,) along the axes."""
 
     def distance(x: Floats) -> Floats:
         beyond = np.abs(x) - size / 2
@@ -36,7 +36,7 @@ def cuboid(size: Floats) -> Distance:
 
 
 def capsule(radius: float, length: float) -> Distance:
-    """Round a piece of the z axis about the origin."""
+    """Capsule around a segment of the z axis about the origin."""
 
     def distance(x: Floats) -> Floats:
         axis = x - np.outer(np.clip(x[:, 2], -length / 2, length / 2), (0.0, 0.0, 1.0))
@@ -56,8 +56,10 @@ def ring(major: float, minor: float) -> Distance:
 
 
 def ground(heights: Floats, spacing: float) -> Distance:
-    """Height above a height field whose cells are parted from node (i, j) to (i + 1, j + 1), times the cosine
-    of the steepest slope: no more than the distance."""
+    """Lower bound of the distance from a height field, whose cells are split from (i, j) to (i + 1, j + 1).
+
+    It is the height above the field times the cosine of the steepest slope.
+    """
     nx, ny = heights.shape
     along, across = (np.abs(np.diff(heights, axis=axis)).max() / spacing for axis in (0, 1))
     cosine = 1.0 / np.sqrt(1.0 + along**2 + across**2)

@@ -1,4 +1,4 @@
-"""What became of a case."""
+"""Outcome of a case."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lab.drop_test.case import Case
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended."""
+    """Measurements of a case."""
 
     case: Case
     frozen_at: float | None  # [s], where something went non-finite
@@ -23,7 +23,7 @@ class Outcome:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What went wrong, worst first; empty where all went well."""
+        """Failures, worst first; empty without any."""
         found = (
             ("non-finite", self.frozen_at is not None),
             ("through the room", self.out_through is not None),
@@ -34,7 +34,7 @@ class Outcome:
         return tuple(name for name, is_so in found if is_so)
 
     def badness(self, fault: str) -> float:
-        """How bad a fault is, to sort by: the earlier, farther, deeper, faster or more."""
+        """Severity of a fault, for sorting: earlier, farther, deeper, faster or more is worse."""
         share = self.flipped / len(self.case.mesh.tets)
         early = -(self.frozen_at or 0.0)
         return dict(zip(FAULTS, (early, self.out, self.inside, self.speed, share), strict=True))[fault]
@@ -55,4 +55,4 @@ class Outcome:
 
 
 FAULTS = ("non-finite", "through the room", "in an obstacle", "not at rest", "inside out")
-"""All kinds, worst first."""
+"""All kinds of faults, worst first."""

@@ -1,4 +1,4 @@
-"""Many outcomes in a few lines."""
+"""Summary of many outcomes."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ CRITERION = (
 
 @dataclass(frozen=True)
 class Summary:
-    """Of all cases of one run."""
+    """Outcomes of all cases of a run."""
 
     outcomes: tuple[Outcome, ...]
 
     @property
     def failed(self) -> tuple[Outcome, ...]:
-        """Those with a fault."""
+        """Outcomes with a fault."""
         return tuple(outcome for outcome in self.outcomes if outcome.faults)
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many cases have each fault; one case may have several."""
+        """Number of cases with each fault; a case can have several."""
         return {name: sum(name in each.faults for each in self.outcomes) for name in FAULTS}
 
     def lines(self, worst: int) -> Iterator[str]:
-        """For people, with the `worst` cases of each fault and how to repeat them."""
+        """Lines to print, with the `worst` cases of each fault and the commands that repeat them."""
         total = len(self.outcomes)
         yield f"{total} cases, {total - len(self.failed)} of them sound"
         yield CRITERION
@@ -63,7 +63,7 @@ class Summary:
             )
 
     def rows(self) -> dict[str, Any]:
-        """For programs."""
+        """Rows for JSON."""
         return {
             "cases": len(self.outcomes),
             "criterion": CRITERION,

@@ -1,4 +1,4 @@
-"""Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
+"""Experiments of the thesis, and checks against theory, one file per figure or claim."""
 
 from lab.experiments.anisotropy import ANISOTROPY
 from lab.experiments.bars_bounce import BARS_BOUNCE
@@ -42,14 +42,18 @@ from lab.experiments.fig_4_7 import FIG_4_7
 from lab.experiments.finite_elements import FINITE_ELEMENTS
 from lab.experiments.flips_dent import FLIPS_DENT
 from lab.experiments.implicit_step import IMPLICIT_STEP
+from lab.experiments.implicit_tetrahedra import IMPLICIT_TETRAHEDRA
 from lab.experiments.integrator_orders import INTEGRATOR_ORDERS
+from lab.experiments.large_strain import LARGE_STRAIN
 from lab.experiments.leapfrog_reversal import REVERSAL
 from lab.experiments.linear_strain import LINEAR_STRAIN
 from lab.experiments.mesh_convergence import CONVERGENCE
 from lab.experiments.mesh_quality import MESH_QUALITY
 from lab.experiments.methods_cost import METHODS_COST
 from lab.experiments.patch_test import PATCH_TEST
+from lab.experiments.refresh_rate import REFRESH_RATE
 from lab.experiments.shear_modulus_volume import SHEAR_MODULUS_VOLUME
+from lab.experiments.size_acceleration import SIZE_ACCELERATION
 from lab.experiments.sphere_real_time import SPHERE_REAL_TIME
 from lab.experiments.stability_map import STABILITY_MAP
 from lab.experiments.tilted_plane import TILTED_PLANE
@@ -78,12 +82,16 @@ EXPERIMENTS: dict[str, Experiment] = {
         CYLINDER_FORCES,
         CYLINDER_STRETCH,
         LINEAR_STRAIN,
+        LARGE_STRAIN,
         METHODS_COST,
+        IMPLICIT_TETRAHEDRA,
+        SIZE_ACCELERATION,
         ENERGY_DRIFT,
         DAMPING_ROTATION,
         STABILITY_MAP,
         MESH_QUALITY,
         SPHERE_REAL_TIME,
+        REFRESH_RATE,
         BARS_BOUNCE,
         FLIPS_DENT,
         DENSITY_BOUNCE,
@@ -98,7 +106,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         MOMENTUM_BUDGET,
     )
 }
-"""By name, in the order of the report."""
+"""Experiments by name, in the order of the report."""
 
 __all__ = [
     "CLAIMS",

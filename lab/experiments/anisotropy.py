@@ -1,4 +1,4 @@
-"""How stiff bodies are in different directions under every law (thesis sections 4.3 and 4.4.1)."""
+"""Stiffness of bodies in different directions under every law (thesis sections 4.3 and 4.4.1)."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
-"""Of an isotropic material [Pa]."""
+"""Stiffness of an isotropic material [Pa]."""
 
 COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
-"""Of a quick report: each takes seconds to compile, and claims nothing of its own."""
+"""Laws of a quick report: each takes seconds to compile."""
 
 LEAST_SPREAD = 1e-3
-"""Below it a mesh hides what a law does."""
+"""Spread below which the mesh hides the anisotropy of a law."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:
-    """A Delaunay mesh of a cube of 1 m whose inner vertices have been moved about at random."""
+    """Delaunay mesh of a cube of 1 m with inner vertices moved at random."""
     grid = box((1.0, 1.0, 1.0), (cells,) * 3)
     inner = (np.abs(grid.vertices - grid.bounds.mean(axis=0)) < 0.499).all(axis=1)
     move = np.random.default_rng(seed).uniform(-0.25, 0.25, grid.vertices.shape) / cells
@@ -44,7 +44,7 @@ def jittered_block(cells: int, seed: int = 0) -> TetMesh:
 
 
 def mesh_of(name: str, size: int) -> TetMesh:
-    """The body of that name; `size` counts what it is long in elements, but of the last."""
+    """Body of that name; `size` is the number of elements along it, except for the beam with a hole."""
     shapes = {
         "block": lambda: box((1.0, 1.0, 1.0), (size,) * 3),
         "cylinder": lambda: cylinder(1.0, 2.0, rings=size - 1, layers=size),
@@ -60,7 +60,7 @@ MESHES = ("uneven block", "block", "cylinder", "ball")
 
 
 def points(effort: Effort) -> list[Point]:
-    """CMPM and CMPM2 on all meshes, the other laws on the block."""
+    """Points: CMPM and CMPM2 on all meshes, the other laws on the block."""
     size, count = (3, 24) if effort is Effort.QUICK else (6, 200)
     others = [law for law in LAWS if law not in (*COMPARED, *(LEFT_OUT if effort is Effort.QUICK else ()))]
     pairs = [(law, mesh) for law in COMPARED for mesh in MESHES] + [(law, "block") for law in others]
@@ -74,7 +74,7 @@ def in_plane(count: int) -> NDArray[np.float64]:
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness over lambda + 2 mu, all round and in the plane of x and z."""
+    """Stiffness over lambda + 2 mu, in all directions and in the plane of x and z."""
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
 
     def stiffness(rows: NDArray[np.float64]) -> list[float]:
@@ -84,7 +84,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Spreads of CMPM and CMPM2 side by side, and of all laws on one mesh."""
+    """Judge the spreads of CMPM and CMPM2, and compare all laws on one mesh."""
     spreads = {
         (law, mesh): spread(results.one(law=law, mesh=mesh)["around"]) for law in COMPARED for mesh in MESHES
     }
@@ -135,11 +135,11 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "Bodies are stretched evenly along many directions, and the work that it takes gives their "
-            "stiffness, for an isotropic material lambda + 2 mu in all. Laws along edges are softer in some "
-            "directions than in others and, but for volume springs, softer than the material in all: what "
-            "happens across an edge does not count for its tension. Volume springs are too stiff instead. "
-            "Laws on tetrahedra have it right.",
+            "Bodies are stretched uniformly along many directions. The work gives their stiffness, which "
+            "for an isotropic material is lambda + 2 mu in every direction. Laws along edges are softer in "
+            "some directions than in others. Except for volume springs they are softer than the material "
+            "in all directions, because strain across an edge does not change its tension. Volume springs "
+            "are too stiff. Laws on tetrahedra are isotropic.",
         ),
         (finding,),
         (

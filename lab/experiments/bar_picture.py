@@ -1,4 +1,4 @@
-"""A picture of bars under their loads, far exaggerated."""
+"""Picture of bars under their loads, with exaggerated displacements."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SIZE = (960, 540)
 def bar_picture(
     length: float, cells: int, displacements: dict[str, ArrayLike], factor: float
 ) -> NDArray[np.uint8]:
-    """One bar above the other, coloured by how far each vertex has moved, over the furthest.
+    """Bars one above the other, coloured by the displacement of each vertex over the largest.
 
     Args:
         length, cells: of the bars, as in `irregular_block`.
         displacements: (n, 3) [m] by name.
-        factor: by which they are drawn larger.
+        factor: exaggeration of the displacements.
     """
     mesh = irregular_block(length, WIDTH, cells)
     apart = 2.2 * WIDTH

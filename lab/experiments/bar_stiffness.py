@@ -1,4 +1,4 @@
-"""Stiffness of a bar under loads of which theory knows the answer, by a law or by finite elements."""
+"""Stiffness of a bar under loads with a known theory, by a law or by finite elements."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
-    """Ratio by load, and the size of the mesh; displacements, (n, 3) [m] by load, where the point is "drawn".
+    """Ratio by load, and the size of the mesh; displacements, (n, 3) [m] by load, if the point is "drawn".
 
     Args:
         point: "law" (or `LINEAR`, `QUADRATIC`), "strain", and "cells" across the bar.

@@ -1,4 +1,4 @@
-"""What is to be judged: the claims of the thesis, and statements of theory that its models should meet."""
+"""Statements that the report judges: claims of the thesis, and theory that its models should meet."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement. `source`: section or figure of the thesis, or the theory it comes from."""
+    """One statement.
+
+    Args:
+        source: section or figure of the thesis, or the theory that the statement comes from.
+        text: the statement, one sentence.
+    """
 
     source: str
     text: str
+
+    @property
+    def is_of_thesis(self) -> bool:
+        """True for a claim of the thesis, False for a statement of theory."""
+        return self.source.startswith(("chapter", "section", "figure"))
 
 
 CLAIMS: dict[str, Claim] = {
@@ -60,6 +70,11 @@ CLAIMS: dict[str, Claim] = {
     "best-fitting-plane-cost": Claim(
         "section 4.4.2", "The best fitting plane is slower and less stable than CMPM."
     ),
+    "split-ring-normal": Claim(
+        "section 4.4.2",
+        "A cheap normal, from a ring of particles split into halves twice, represents that of the plane.",
+    ),
+    "split-ring-cost": Claim("section 4.4.2", "A model with this normal costs little, and might work."),
     "tilted-plane": Claim(
         "section 4.4.3",
         "A plane tilted by eq. 4.11 and 4.12 follows a shear (never implemented in the thesis).",
@@ -81,6 +96,13 @@ CLAIMS: dict[str, Claim] = {
     ),
     "volume-springs-limit": Claim("section 5.2", "Above nu = 0.3 it becomes unstable."),
     # Chapter 6
+    "implicit-tetrahedra": Claim(
+        "section 6.5",
+        "For the laws of chapter 6 implicit Euler does not pay: gradients cost what its longer steps save.",
+    ),
+    "size-acceleration": Claim(
+        "section 6.6", "In a body twice as large the same deformation gives accelerations 8 times smaller."
+    ),
     "sphere-window-0.1": Claim(
         "section 6.6", "With nu = 0.1 the dropped sphere is stable for E from 2e5 to 3e6 Pa."
     ),
@@ -91,6 +113,7 @@ CLAIMS: dict[str, Claim] = {
     "sphere-real-time": Claim(
         "section 6.6", "A sphere of 955 tetrahedra reaches 45 % of real time (a PC of 2002)."
     ),
+    "refresh-rate": Claim("section 6.6", "Drawing at 40 Hz hardly affects the speed of the simulation."),
     "bars-bounce": Claim(
         "figure 6.2", "The bars of a complex object bend on impact, and vibrate after they lift off."
     ),
@@ -112,6 +135,7 @@ CLAIMS: dict[str, Claim] = {
     "tension-poisson": Claim(
         "figure 6.4", "A higher nu gives a higher slope, and takes the force further from E A s."
     ),
+    "tension-shear": Claim("section 6.6", "A stretched cylinder shows no shear force."),
     "shear-slope": Claim("figure 6.4", "The shear force is straight, its slope a little under G A."),
     "shear-tension": Claim("figure 6.4", "Sheared, a tensile force starts with slope zero and grows."),
     "shear-poisson": Claim("figure 6.4", "A higher nu lowers the shear force and raises the tensile one."),
@@ -130,6 +154,10 @@ CLAIMS: dict[str, Claim] = {
     "mesh-quality": Claim("section 6.6", "Small angles of tetrahedra destabilise, and so does a high nu."),
     "linear-strain": Claim(
         "section 6.1", "The linearised strain (eq. 6.7) is close to the exact one while it is small."
+    ),
+    # Chapter 7
+    "large-strain": Claim(
+        "chapter 7", "The model allows strains of over 100 %, though less close to reality."
     ),
     # Beyond the thesis: theory
     "patch-test": Claim(
@@ -158,4 +186,4 @@ CLAIMS: dict[str, Claim] = {
     ),
     "momentum-budget": Claim("mechanics", "Momentum and angular momentum of a free body stay."),
 }
-"""By key, in the order of the report."""
+"""Claims by key, in the order of the report."""

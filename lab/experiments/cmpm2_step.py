@@ -1,4 +1,4 @@
-"""How long the steps of CMPM2 can be, beside CMPM's (thesis section 4.4.1)."""
+"""Largest steps of CMPM2 and of CMPM (thesis section 4.4.1)."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from taichi_soft import Material
 
 UNDAMPED = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 DAMPED = Material(1e6, 0.25, 1000.0, 30.0, damping_ratio=0.0)
-"""So much that it shortens the step by a tenth, and stops most of what grows at every step."""
+"""Material with damping that shortens the step by a tenth, and stops most growing vibrations."""
 
 LAWS = ("cmpm", "cmpm2")
 MESHES = ("another uneven block", "uneven block", "block", "ball")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Both laws on four meshes."""
+    """Points: both laws on four meshes."""
     size = 3 if effort is Effort.QUICK else 5
     return [{"law": law, "mesh": mesh, "size": size} for law in LAWS for mesh in MESHES]
 
 
 def measure(point: Point) -> Numbers:
-    """Largest stable step [s], 2 / w and by running; how fast undamped vibrations grow at rest [1/s]."""
+    """Largest stable step [s], as 2 / w and by running; growth rate of undamped vibrations at rest [1/s]."""
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
     small = vibration(mesh, UNDAMPED, law)
     return {
@@ -48,7 +48,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Steps of CMPM2 over CMPM's."""
+    """Judge the steps of CMPM2 over those of CMPM."""
     found = {(law, mesh): results.one(law=law, mesh=mesh) for law in LAWS for mesh in MESHES}
     ratios = {mesh: found["cmpm2", mesh]["undamped"] / found["cmpm", mesh]["undamped"] for mesh in MESHES}
     runs = [(found["cmpm2", mesh]["run"], found["cmpm", mesh]["run"]) for mesh in MESHES]
@@ -92,13 +92,12 @@ def conclude(results: Results) -> Section:
     columns = ("undamped [ms]", "damped, run [ms]", "growth [1/s]")
     return Section(
         (
-            "The largest step of leapfrog: 2 over the highest frequency at rest, and, with damping of "
-            f"{DAMPED.damping:.0f} N s/m, by running a body that is shaken a little. E = {DAMPED.young:.0g} "
-            f"Pa, nu = {DAMPED.poisson}, {DAMPED.density:.0f} kg/m^3; a step of 0 stands for a body that "
-            "does "
-            "not stay near its shape at any step.",
-            "Neither law's forces are the derivative of an energy, and so some vibrations may grow however "
-            "short the step: the eigenvalues of M^-1 K are complex. Damping has to stop them.",
+            "The largest step of leapfrog, found in two ways: 2 over the highest frequency at rest, and, "
+            f"with damping of {DAMPED.damping:.0f} N s/m, by running a body that is displaced a little at "
+            f"random. E = {DAMPED.young:.0g} Pa, nu = {DAMPED.poisson}, {DAMPED.density:.0f} kg/m^3. A step "
+            "of 0 means that the body does not stay near its shape with any step.",
+            "The forces of neither law are the derivative of an energy. Some vibrations therefore grow "
+            "however short the step is: the eigenvalues of M^-1 K are complex. Only damping stops them.",
         ),
         (finding,),
         (

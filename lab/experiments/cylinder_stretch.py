@@ -18,7 +18,7 @@ from lab.experiments.experiment import (
     Section,
     Table,
 )
-from lab.experiments.judgement import judged
+from lab.experiments.judgement import judged, judged_but_for
 from taichi_soft import Material, cylinder, internal_forces
 
 RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # the thesis's
@@ -26,7 +26,7 @@ POISSON = (0.4, 0.0, -0.4)  # of the negative one the thesis tells the sign alon
 COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra, the thesis has 492; and 2592
 FURTHEST, MODERATE = 0.5, 0.25
 KEPT = 0.05
-"""Change of volume, at `MODERATE` strain, up to which it is called kept."""
+"""Largest change of volume, over that at rest, that counts as kept."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -39,7 +39,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume, and width half way up, over those at rest as the ends are drawn apart; the last shape."""
+    """Volume, and width at half the height, over those at rest, for each stretch; the last shape."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)
     stretch = [FURTHEST * (k + 1) / point["steps"] for k in range(point["steps"])]
@@ -58,11 +58,12 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """What each nu does to volume and width."""
+    """Judge volume and width for each nu."""
     usual = {"strain": "linear", "mesh": list(COARSE)}
     curves = {nu: results.one(poisson=nu, **usual) for nu in POISSON}
     exact = results.one(poisson=0.4, strain="exact", mesh=list(COARSE))
     kept, lost, wide = (curves[nu] for nu in POISSON)
+    slim = "the strain of eq. 6.7 makes the cylinder too slim; the exact strain keeps more of the volume"
 
     def tell(key: str, numbers: Numbers, nu: float) -> str:
         finer = results.where(poisson=nu, strain="linear", mesh=list(FINE))
@@ -84,19 +85,20 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cylinder of 4 m and 1.5 m diameter, E = 1 MPa, its ends held by plates that are drawn apart. "
-            "Without plates Hooke's law with the linearised strain asks for a width of "
-            "sqrt(1 - nu (2 s + s^2)) at a stretch s: with nu = 0.4 the volume first grows a little "
-            "and then falls.",
+            "A cylinder of 4 m and 1.5 m diameter, E = 1 MPa, with its ends attached to plates that are "
+            "moved apart. Without plates, Hooke's law with the linearised strain gives the width sqrt(1 - "
+            "nu (2 s + s^2)) at a stretch s: with nu = 0.4 the volume first grows a little and then falls.",
         ),
         (
-            judged(
+            judged_but_for(
                 "cylinder-0.4",
                 f"volume over that at rest {tell('volume', kept, 0.4)}; with the exact strain "
-                f"{_at(exact, 'volume', MODERATE):.3f} and {exact['volume'][-1]:.3f}; kept is called what "
-                f"changes by less than {KEPT:.0%} at {MODERATE:.0%}",
+                f"{_at(exact, 'volume', MODERATE):.3f} and {exact['volume'][-1]:.3f}. Tolerance: a volume "
+                f"that changes by less than {KEPT:.0%} counts as kept",
                 abs(_at(kept, "volume", MODERATE) - 1) < KEPT,
-                "the model: the strain of eq. 6.7 makes the cylinder too slim; the exact one keeps more",
+                slim,
+                [] if abs(kept["volume"][-1] - 1) < KEPT else [f"a stretch of {kept['stretch'][-1]:.0%}"],
+                slim,
             ),
             judged(
                 "cylinder-0",

@@ -30,7 +30,7 @@ YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # rad/s, so slow that not
 DT, SUBSTEPS = 1 / 60, 12
 MODELS = ("edge", "tet_mean")
 KEPT, RATE_ERROR = 1e-3, 0.05
-"""Share of the angular momentum that edge damping may take, and of the rate by which the other may differ."""
+"""Loss of angular momentum that edge damping may cause, and relative deviation of the other's rate."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -51,7 +51,7 @@ def body_mesh(name: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Angular momentum about the axis of spin over time, over that at the start, and the rate expected."""
+    """Angular momentum about the axis over time, relative to the start, and the expected rate."""
     mesh = body_mesh(point["mesh"])
     world = World(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
@@ -73,14 +73,14 @@ def measure(point: Point) -> Numbers:
 
 
 def rate(numbers: Numbers) -> float:
-    """Of the fading, over the part in which more than a tenth is left [1/s]."""
+    """Decay rate while more than a tenth is left [1/s]."""
     time, left = np.array([0.0, *numbers["time"]]), np.array([1.0, *numbers["left"]])
     seen = left > 0.1
     return 0.0 if seen.sum() < 2 else -float(np.polyfit(time[seen], np.log(left[seen]), 1)[0])
 
 
 def conclude(results: Results) -> Section:
-    """What is left of the spin."""
+    """Judge the remaining spin."""
     edge, mean = (results.one(mesh="cube", damping=10.0, model=model) for model in MODELS)
     lost = max(abs(1.0 - left) for left in edge["left"])
     keeps, brakes = lost < KEPT, mean["left"][-1] < 0.5
@@ -106,7 +106,7 @@ def conclude(results: Results) -> Section:
     )  # fmt: skip
     columns = ("body", "damping [N s/m]", "model", "left at the end [1]", "rate [1/s]", "expected [1/s]")
     return Section(
-        (f"Bodies of E = 1 MPa spin freely at {SPIN:g} rad/s about the vertical.",),
+        (f"Bodies of E = 1 MPa spin freely at {SPIN:g} rad/s about the vertical axis.",),
         (Finding("damping-rotation", measured, Verdict.AGREES if agrees else Verdict.DIFFERS, why),),
         (Table("rates", "How fast the spin fades", columns, rows),),
         (

@@ -34,19 +34,19 @@ TOUCH = 1e-3  # height below which a vertex lies on the floor [m]
 
 
 def points(effort: Effort) -> list[Point]:
-    """Growing density and the same everywhere; for a full report on a finer mesh too."""
+    """Points: growing and uniform density; for a full report on a finer mesh too."""
     cells = (4,) if effort is Effort.QUICK else (4, 6)
     return [{"density": kind, "cells": count} for count in cells for kind in ("grows", "mean")]
 
 
 def block(cells: int) -> TetMesh:
-    """About its centre, so many cells high."""
+    """Block about its centre with the given number of cells along its height."""
     mesh = box(SIZE, (2 * cells, cells, cells))
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
 
 def density_of(mesh: TetMesh, kind: str) -> NDArray[np.float64]:
-    """Of each tetrahedron [kg/m^3]."""
+    """Density of each tetrahedron [kg/m^3]."""
     right = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] / SIZE[0] + 0.5
     share = right if kind == "grows" else np.full(len(mesh.tets), 0.5)
     return LIGHT + (HEAVY - LIGHT) * share
@@ -105,7 +105,7 @@ def side(numbers: Numbers, end: str) -> dict[str, float]:
 
 
 def conclude(results: Results) -> Section:
-    """Which side is pressed more, leaves later, and rises less."""
+    """Judge which side is compressed more, leaves later, and rises less."""
     grows, even = (results.one(density=kind, cells=4) for kind in ("grows", "mean"))
     light, heavy = side(grows, "left"), side(grows, "right")
     most = heavy["pressed"] > light["pressed"]

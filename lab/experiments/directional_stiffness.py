@@ -1,4 +1,4 @@
-"""How stiff a body is against an even stretch along any direction, by the work that the stretch takes."""
+"""Stiffness of a body against a uniform stretch along any direction, from the work of the stretch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_soft.core.types import LawName
 Floats = NDArray[np.float64]
 
 STRETCH = 0.002
-"""Small: the stiffness at rest is wanted."""
+"""Stretch; small, for the stiffness at rest."""
 
 
 def directions(count: int) -> Floats:
@@ -25,7 +25,7 @@ def directions(count: int) -> Floats:
 def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: Floats) -> float:
     """Twice the work per volume and squared strain [Pa]: lambda + 2 mu of an isotropic material.
 
-    Nothing moves across the direction. The work is that of the forces half way.
+    There is no displacement across the direction. The work is that of the forces at half the stretch.
     """
     move = STRETCH * np.outer(mesh.vertices @ direction, direction)
     forces = internal_forces(mesh, material, mesh.vertices + move / 2, law=law)

@@ -147,7 +147,7 @@ def conclude(results: Results) -> Section:
     )
     return Section(
         (
-            "A floating cube is let go stretched and twisted."
+            "A floating cube starts stretched and twisted."
             + "".join(
                 f" With steps a quarter as long, at nu = {p['poisson']}: {_words(n)}."
                 for p, n in results.where(law="virial", substeps=24)

@@ -1,7 +1,7 @@
-"""What an experiment is: points to measure, one by one, and what follows from all of them.
+"""Experiments: points to measure one by one, and a conclusion from all of them.
 
-A point is plain data, and so is what is measured there: points can be computed in other processes, kept in a
-file and taken up again. All that people look at is made afterwards, in one place, from these numbers.
+A point is plain data, and so are its numbers. Points can therefore be computed in other processes, and stored
+in a file. The pages, plots and tables are made afterwards from these numbers.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from taichi_soft.core.errors import TaichiSoftError
 from taichi_soft.core.types import Choice
 
 Point = dict[str, Any]
-"""Names and values of what is varied: numbers, strings, booleans."""
+"""Names and values of the varied quantities: numbers, strings, booleans."""
 
 Numbers = dict[str, Any]
-"""What was measured: numbers, strings, booleans and lists of these, in SI units."""
+"""Measured numbers, strings, booleans and lists of these, in SI units."""
 
 
 class MissingPointError(TaichiSoftError):
-    """A conclusion asks for a point that failed."""
+    """A conclusion needs a point that failed."""
 
 
 class Effort(Choice):
-    """How much to compute: a coarse answer to every claim within minutes, or all of it."""
+    """Extent of a report: a coarse answer to every claim within minutes, or everything."""
 
     QUICK = "quick"
     FULL = "full"
 
 
 class Verdict(Choice):
-    """What a measurement says about a claim."""
+    """Result of a measurement for a claim."""
 
     AGREES = "agrees"
     PARTLY = "agrees in part"
@@ -45,14 +45,13 @@ class Verdict(Choice):
 
 @dataclass(frozen=True)
 class Finding:
-    """What was measured about one claim.
+    """Measurement and verdict for one claim.
 
     Args:
         claim: its key in `CLAIMS`.
-        measured: a sentence with the figures and their units.
-        verdict: whether they agree with the claim.
-        why: where they do not agree, or not for all laws: whether model, mesh or reading of the text is the
-            likely cause, and the evidence.
+        measured: a sentence with the figures and their units, and the tolerance of the verdict.
+        verdict: whether the figures agree with the claim.
+        why: reason if they do not, or only in part: model, mesh or reading of the text, and the evidence.
     """
 
     claim: str
@@ -66,7 +65,7 @@ class Table:
     """Rows of numbers and words.
 
     Args:
-        name: of its file, unique within the experiment.
+        name: name of its file, unique within the experiment.
         columns: headings, with the unit in brackets: "force [N]".
     """
 
@@ -81,8 +80,8 @@ class Plot:
     """A plot.
 
     Args:
-        name: of its file, unique within the experiment.
-        caption: a sentence or two: what is drawn, and what to see in it.
+        name: name of its file, unique within the experiment.
+        caption: one or two sentences: what is drawn, and what it shows.
         draw: draws into an empty figure of matplotlib, with units on every axis.
         size: width and height [inches].
     """
@@ -104,10 +103,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """What follows from an experiment.
+    """Conclusion of an experiment.
 
     Args:
-        text: paragraphs for a reader who knows the thesis: what was done, and what was learned.
+        text: paragraphs for a reader who knows the thesis: the set-up, and the result.
     """
 
     text: tuple[str, ...]
@@ -134,7 +133,7 @@ class Results:
     rows: tuple[Result, ...] = field(default=())
 
     def where(self, **values: Any) -> list[tuple[Point, Numbers]]:
-        """Points with these values that were measured, in order, and their numbers."""
+        """Measured points with these values, in order, and their numbers."""
         return [
             (row.point, row.numbers)
             for row in self.rows
@@ -144,7 +143,7 @@ class Results:
     def one(self, **values: Any) -> Numbers:
         """Numbers of the only point with these values.
 
-        Raises: MissingPointError where there is none, or more than one.
+        Raises: MissingPointError if there is none, or more than one.
         """
         found = self.where(**values)
         if len(found) != 1:
@@ -163,12 +162,12 @@ class Experiment:
 
     Args:
         name: short and unique, as in `python -m lab report NAME`.
-        source: where the thesis has it, or what it is beyond the thesis.
-        claims: keys in `CLAIMS` that its section has a finding for, each.
-        points: what to measure for a quick or a full report.
-        measure: measures one point, in any process: a function of a module. The device was chosen before.
-        conclude: from the points that were measured; MissingPointError where one that it needs is missing.
-        is_timing: its points measure time: they run alone, one after the other.
+        source: section or figure of the thesis, or the theory beyond it.
+        claims: keys in `CLAIMS`; its section has one finding for each.
+        points: points of a quick or a full report.
+        measure: function of a module that measures one point, in any process. The device was chosen before.
+        conclude: function of the measured points. Raises: MissingPointError if a needed point is missing.
+        is_timing: True if its points measure time: they run alone, one after the other.
     """
 
     name: str
@@ -182,7 +181,7 @@ class Experiment:
 
 
 def section_of(experiment: Experiment, results: Results) -> Section:
-    """What follows from the results; of what is missing, nothing can be told."""
+    """Conclusion from the results. If points are missing, its claims cannot be told."""
     try:
         return experiment.conclude(results)
     except MissingPointError as error:

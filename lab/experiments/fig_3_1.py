@@ -109,11 +109,11 @@ def conclude(results: Results) -> Section:
     )
     return Section(
         (
-            "A particle that is braked in proportion to its velocity obeys y' = lambda y. The text says "
-            "that explicit Euler overshoots the curve and implicit Euler undershoots it. As heights of "
-            "curves it is the other way round: explicit Euler falls below the exact one, implicit Euler "
-            "stays above. Read as how far the decay goes, the text is right.",
-            f"Beyond h lambda = -1 explicit Euler overshoots zero itself: at {RATES[-1]} one step leaves "
+            "A particle with a drag proportional to its velocity obeys y' = lambda y. The text says "
+            "that explicit Euler overshoots the curve and implicit Euler undershoots it. For the heights of "
+            "the curves the opposite is true: explicit Euler falls below the exact one, implicit Euler "
+            "stays above. For the extent of the decay the text is right.",
+            f"Beyond h lambda = -1 explicit Euler overshoots zero: at {RATES[-1]} one step leaves "
             f"{crossing:.2f}.",
         ),
         tuple(findings),

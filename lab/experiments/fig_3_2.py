@@ -131,10 +131,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A row of {MOVING} particles between two fixed ones is let go in the shape of its first mode. "
-            "Its energy should stay. Explicit Euler adds to it at every step and implicit Euler takes "
-            "away, both "
-            "by the factor that theory gives; leapfrog does neither.",
+            f"A row of {MOVING} particles between two fixed ones starts in the shape of its first mode. "
+            "Its energy should stay constant. Explicit Euler adds energy at every step and implicit Euler "
+            "removes it, both by the factor of theory. Leapfrog does neither.",
         ),
         tuple(findings),
         (

@@ -104,11 +104,10 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "Each point is an oscillator whose stiffness and damping give it that eigenvalue. From its "
-            "motion over three steps follows by what factor a step multiplies it. Right of the imaginary "
-            "axis an "
-            "oscillator would be driven instead of damped, which no material of this package is: there only "
-            "the closed form is drawn.",
+            "Each point is an oscillator whose stiffness and damping give it that eigenvalue. Its motion "
+            "over three steps gives the factor by which a step multiplies it. To the right of the "
+            "imaginary axis an oscillator would be driven instead of damped. No material of this package "
+            "does that: only the closed form is drawn there.",
         ),
         (
             Finding(

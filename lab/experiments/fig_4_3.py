@@ -149,16 +149,14 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "An edge in a ring of four vertices is turned against the stretch of its body, and what CMPM "
-            "takes for its strain is read from its stiffness. The thesis expects the stretch alone to turn "
-            "up, as tension. But an edge at an angle is pulled and sheared, and CMPM reads both as the "
-            "strain "
-            "tensor has them.",
-            "What it makes of them is another matter. Hooke's law takes the strains across the edge into "
-            "account as well, E times the strain along it does not. So in a bar in tension a face at an "
-            "angle "
-            "carries too little, and one along the bar is pressed, by nu E s, where nothing should be. With "
-            "nu = 0 and G = E / 2 the stresses are right at every angle.",
+            "An edge in a ring of four vertices is turned relative to the stretch of its body. The strain "
+            "that CMPM computes for it is read from its stiffness. The thesis expects only tension, equal "
+            "to the stretch. But an edge at an angle is stretched and sheared, and CMPM computes both "
+            "components of the strain tensor correctly.",
+            "The stress is another matter. Hooke's law includes the strains across the edge, and E times the "
+            "strain along it does not. In a bar in tension a face at an angle therefore carries too little, "
+            "and one along the bar is compressed by nu E s, where there should be no stress. With nu = 0 and "
+            "G = E / 2 the stresses are right at every angle.",
         ),
         (finding,),
         (

@@ -149,16 +149,15 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A regular tetrahedron is stretched evenly along directions all round, and the work that it "
-            "takes "
-            "gives its stiffness. An isotropic material has the same in all; with CMPM and its variant it "
-            "depends on where the edges point.",
-            "Anisotropy comes from weighing strains with E and G alone: it is proportional to E - 2 G, which "
-            "is 0 for nu = 0, and largest where E and G are set apart.",
-            "As in figure 4.5 the particle on top is then pulled away, from tetrahedra slender and flat, and "
-            "what CMPM2 takes for the strains of an edge there (eq. 4.9) is read from its stiffness. The "
-            "thesis expects tension above all. But an edge at an angle to the pull turns as well, and reads "
-            "the components that the strain has in its own frame (see fig-4.3).",
+            "A regular tetrahedron is stretched uniformly along directions all round, and the work gives its "
+            "stiffness. An isotropic material has the same stiffness in all directions. With CMPM and its "
+            "variant the stiffness depends on the directions of the edges.",
+            "The anisotropy comes from multiplying strains by E and G only. It is proportional to E - 2 G, "
+            "which is 0 for nu = 0, and largest if E and G are chosen separately.",
+            "As in figure 4.5 the particle on top is then pulled away, from slender and flat tetrahedra. The "
+            "strains that CMPM2 computes for an edge there (eq. 4.9) are read from its stiffness. The thesis "
+            "expects mostly tension. But an edge at an angle to the pull turns as well, and has the "
+            "components of the strain in its own frame (see fig-4.3).",
         ),
         (finding, _reading(results)),
         (

@@ -1,4 +1,4 @@
-"""How far best fitting planes are from perpendicular to their edges (thesis section 4.4.2, figure 4.7)."""
+"""Angles of best fitting planes and of split rings to their edges (thesis section 4.4.2, figure 4.7)."""
 
 from __future__ import annotations
 
@@ -19,17 +19,24 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import plane_angles
+from lab.experiments.judgement import judged_but_for
+from taichi_soft import Material, plane_angles
+from taichi_soft.elements.laws.best_fitting_plane import best_fitting_plane_bonds
+from taichi_soft.elements.laws.split_ring_plane import split_ring_plane_bonds
 from taichi_soft.meshing import EdgeRings
 
 BEAM = "beam with hole"
 THESIS_COUNTS = {2: 140, 3: 1386, 4: 2091, 5: 1874, 6: 1820, 7: 1449, 8: 753, 9: 250, 10: 60, 11: 10, 12: 2}
 """Edges by the number of particles round them, of the thesis's beam with a hole (1679 particles)."""
 
-LAWS = {"best_fitting_plane": "best fitting plane", "cmpm2": "subfaces (CMPM2)"}
+FITTED, SPLIT = "best_fitting_plane", "split_ring_plane"
+LAWS = {FITTED: "best fitting plane", SPLIT: "split ring", "cmpm2": "subfaces (CMPM2)"}
 FAR, MANY = 30.0, 0.1
-"""What is called far from perpendicular [degrees], and which part of the edges many. The thesis has a box
-plot without figures."""
+"""Angle that counts as far from perpendicular [degrees], and share of the edges that counts as many. The
+thesis has a box plot without figures."""
+NEAR, FEW = 10.0, 0.1
+"""Angle between the normals up to which a cheap one represents a fitted one [degrees], and share of the edges
+that may lie beyond it."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -39,12 +46,26 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Angles between edges and normals [degrees] in percentiles, without edges of two particles."""
+    """Angles between edges and normals, and between fitted and cheap normals, in percentiles [degrees].
+
+    Edges with two particles around them are left out. With three, both normals are the same: the angles
+    between the normals leave these out too.
+    """
     mesh = mesh_of(point["mesh"], point["size"])
     edge, _ = EdgeRings.of(mesh).neighbours
     around = np.bincount(edge)
     sizes, counts = np.unique(around, return_counts=True)
     found: Numbers = {"edges": len(mesh.edges), "sizes": sizes.tolist(), "counts": counts.tolist()}
+    material = Material(young=1.0, poisson=0.0, density=1.0)
+    fitted, cheap = (
+        bonds(mesh, material).normals for bonds in (best_fitting_plane_bonds, split_ring_plane_bonds)
+    )
+    assert fitted is not None
+    assert cheap is not None
+    cosine = np.abs(np.einsum("ka,ka->k", fitted, cheap))[around > 3]
+    between = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+    found["between"] = [round(float(q), 3) for q in np.percentile(between, (25, 50, 75, 95))]
+    found["apart"] = float((between > NEAR).mean())
     for law in LAWS:
         angles = plane_angles(mesh, law)[around > 2]
         found[law] = {
@@ -56,10 +77,10 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Share of planes that are far off, on the mesh like the thesis's and on others."""
-    beam = results.one(mesh=BEAM)["best_fitting_plane"]
+    """Judge the share of planes that are far off, on a mesh like the thesis's and on others."""
+    beam = results.one(mesh=BEAM)[FITTED]
     rows = [(point["mesh"], numbers) for point, numbers in results.where()]
-    shares = ", ".join(f"{name} {100 * n['best_fitting_plane']['far']:.0f} %" for name, n in rows)
+    shares = ", ".join(f"{name} {100 * n[FITTED]['far']:.0f} %" for name, n in rows)
     agrees = beam["far"] > MANY
     finding = Finding(
         "best-fitting-plane-angles",
@@ -68,6 +89,25 @@ def conclude(results: Results) -> Section:
         f"called what is more than {MANY:.0%}",
         Verdict.AGREES if agrees else Verdict.DIFFERS,
         "" if agrees else "the mesh: that of the thesis is not known, and the shares above differ by mesh",
+    )
+
+    apart = {name: n["apart"] for name, n in rows}
+    few = {name: share for name, share in apart.items() if share <= FEW}
+    told = "; ".join(
+        f"{name} {n['between'][1]:.1f}, {n['between'][2]:.1f} and {n['between'][3]:.1f} degrees, "
+        f"{n['apart']:.0%} beyond {NEAR:.0f}"
+        for name, n in rows
+    )
+    split = judged_but_for(
+        "split-ring-normal",
+        "angle between the cheap and the fitted normal of edges with more than three particles, below which "
+        f"half, three quarters and 95 % of the edges lie: {told}. Tolerance: up to {NEAR:.0f} degrees for "
+        f"all but {FEW:.0%} of the edges. Beyond {FAR:.0f} degrees from perpendicular to the edge are: "
+        + ", ".join(f"{name} {n[SPLIT]['far']:.0%} (fitted {n[FITTED]['far']:.0%})" for name, n in rows),
+        bool(few),
+        "the ring is too uneven for its halves to span its plane",
+        [name for name in apart if name not in few],
+        f"more than {FEW:.0%} of the normals are more than {NEAR:.0f} degrees apart",
     )
 
     def draw(figure: Any) -> None:
@@ -81,8 +121,8 @@ def conclude(results: Results) -> Section:
                 )
             drawn = axes.bxp(
                 boxes,
-                positions=np.arange(len(rows)) + (i - 0.5) * 0.4,
-                widths=0.3,
+                positions=np.arange(len(rows)) + (i - 1) * 0.28,
+                widths=0.22,
                 showfliers=False,
                 patch_artist=True,
                 manage_ticks=False,
@@ -101,15 +141,18 @@ def conclude(results: Results) -> Section:
         (
             "For every edge with more than two particles round it, the angle between the edge and the normal "
             "of the plane that fits these particles best. The Voronoi faces of CMPM have 0 degrees by "
-            "construction. The barycentric subfaces of CMPM2 are off by about as much.",
+            "construction. The barycentric subfaces of CMPM2 are off by about as much. The cheap normal that "
+            "the section considers is the cross product of two vectors between the means of halves of the "
+            "ring. It is compared with the fitted one.",
         ),
-        (finding,),
+        (finding, split),
         (
             Table(
                 "angles",
-                "Angle from perpendicular, best fitting plane",
+                "Angle from perpendicular",
                 (
                     "mesh",
+                    "normal",
                     "edges",
                     "5 % [deg]",
                     "25 % [deg]",
@@ -119,14 +162,23 @@ def conclude(results: Results) -> Section:
                     "largest [deg]",
                 ),
                 tuple(
-                    (
-                        name,
-                        n["edges"],
-                        *n["best_fitting_plane"]["percentiles"],
-                        round(n["best_fitting_plane"]["most"], 1),
-                    )
+                    (name, LAWS[law], n["edges"], *n[law]["percentiles"], round(n[law]["most"], 1))
                     for name, n in rows
+                    for law in (FITTED, SPLIT)
                 ),
+            ),
+            Table(
+                "between",
+                "Angle between the cheap and the fitted normal",
+                (
+                    "mesh",
+                    "25 % [deg]",
+                    "50 % [deg]",
+                    "75 % [deg]",
+                    "95 % [deg]",
+                    f"beyond {NEAR:.0f} deg [1]",
+                ),
+                tuple((name, *n["between"], round(n["apart"], 3)) for name, n in rows),
             ),
             Table(
                 "rings",
@@ -149,7 +201,7 @@ FIG_4_7 = Experiment(
     "fig-4.7",
     "Angles of best fitting planes",
     "section 4.4.2, figure 4.7",
-    ("best-fitting-plane-angles",),
+    ("best-fitting-plane-angles", "split-ring-normal"),
     points,
     measure,
     conclude,

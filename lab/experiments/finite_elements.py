@@ -105,18 +105,18 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             f"A beam of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m and a cube of {WIDTH:g} m (E = {YOUNG:g} Pa) "
-            "are held at both ends as if glued to plates, of which one is pulled away, moved sideways or "
-            "twisted, or both are tilted, by strains of 1e-4. The equilibrium is found by Newton's method in "
+            "are attached to plates at both ends. One plate is moved away, moved sideways or "
+            "twisted, or both are tilted, by strains of 1e-4. Newton's method finds the equilibrium in "
             f"float64, without time stepping, on an irregular Delaunay mesh ({numbers['vertices']} vertices "
             f"and {numbers['tets']} tetrahedra of many directions). "
-            "The same mesh is solved by scikit-fem: linear elasticity, linear displacements.",
-            "Laws on tetrahedra have the tangent of linear finite elements at rest: all of thesis chapter 6 "
-            "is, at small strain, a finite element method. Laws along edges take their constants from the "
+            "scikit-fem solves the same mesh: linear elasticity, linear displacements.",
+            "Laws on tetrahedra have the tangent of linear finite elements at rest: at small strain, all of "
+            "thesis chapter 6 is a finite element method. Laws along edges take their constants from the "
             "same E, and G = E / (2 (1 + nu)): k = E a / l (eq. 5.1), with the area a of each edge's face "
             "from the mesh (barycentric subfaces, or the Voronoi graph for cmpm). Nothing is fitted. A "
-            "network of springs whose faces lie across their edges, in all directions alike, and which "
-            "deforms uniformly, has Young's modulus E / 2 and Poisson's ratio 1/4, whatever nu is asked for; "
-            "it is softer still where it does not deform uniformly.",
+            "network of springs whose faces are perpendicular to their edges, with edges in all directions "
+            "alike and a uniform deformation, has Young's modulus E / 2 and Poisson's ratio 1/4, whatever nu "
+            "is requested. It is softer still if it does not deform uniformly.",
         ),
         (
             Finding(

@@ -151,9 +151,9 @@ def conclude(results: Results) -> Section:
                "of these where most was pressed [1]", "volume [1]", "largest extent [1]")  # fmt: skip
     return Section(
         (
-            "The thesis's sphere, E = 1 MPa, hits the floor harder than after the fall of 7 m. At "
-            f"{SPEED:g} m/s, with flips tolerated, it {said['tolerant']}; not handled (off) it "
-            f"{said['off']}; driven back (recover) it {said['recover']}.",
+            "The thesis's sphere, E = 1 MPa, hits the floor faster than after the fall of 7 m. At "
+            f"{SPEED:g} m/s, with flips tolerated, it {said['tolerant']}; with flips off it "
+            f"{said['off']}; with recovery it {said['recover']}.",
         ),
         (Finding("flips-dent", measured, verdict, why),),
         (Table("fates", "The sphere after the impact", columns, rows),),

@@ -135,11 +135,10 @@ def conclude(results: Results) -> Section:
     )
     return Section(
         (
-            "Velocity and position of lazy leapfrog belong to times half a step apart, which counts as an "
-            "error of first order; but it does not grow. From a velocity changed by half a kick, "
-            f"leapfrog moves the same particle to within {same:.1g} of the amplitude: but for its start, "
-            "lazy "
-            "leapfrog is leapfrog.",
+            "Velocity and position of lazy leapfrog belong to times half a step apart. This counts as an "
+            "error of first order, but it does not grow. From a velocity changed by half a kick, "
+            f"leapfrog moves the same particle to within {same:.1g} of the amplitude: except for its start, "
+            "lazy leapfrog is leapfrog.",
         ),
         findings,
         (

@@ -1,4 +1,4 @@
-"""A finding from a yes or no, or from one on each of several meshes; and how several numbers are told."""
+"""Findings from booleans, for a claim as a whole, for its parts or for several meshes; ranges of numbers."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from lab.experiments.experiment import Finding, Verdict
 
 @dataclass(frozen=True)
 class Span:
-    """Several numbers, which an f-string tells as one, or as the least and the largest."""
+    """Several numbers, which an f-string prints as one, or as the smallest and the largest."""
 
     values: Collection[float]
 
     def __format__(self, how: str) -> str:
-        """As each number alone; one where they look alike."""
+        """Format both ends; one number if they look the same."""
         low, high = format(min(self.values), how), format(max(self.values), how)
         return low if low == high else f"{low} to {high}"
 
 
 def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
-    """Agrees, or differs for the reason given."""
+    """Finding that agrees, or differs for the given reason."""
     if agrees:
         return Finding(claim, measured, Verdict.AGREES)
     return Finding(claim, measured, Verdict.DIFFERS, why)
@@ -30,7 +30,12 @@ def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
 def judged_but_for(
     claim: str, measured: str, agrees: bool, why: str, exceptions: Collection[str], because: str
 ) -> Finding:
-    """Agrees, agrees but for `exceptions`, such as some of the laws, or differs for the reason `why`."""
+    """Finding that agrees, agrees except for `exceptions`, or differs for the reason `why`.
+
+    Args:
+        exceptions: names for which the claim does not hold, such as laws.
+        because: reason for the exceptions.
+    """
     if not agrees or not exceptions:
         return judged(claim, measured, agrees, why)
     return Finding(
@@ -39,7 +44,10 @@ def judged_but_for(
 
 
 def judged_on_meshes(claim: str, measured: str, agrees: Collection[bool], why: str) -> Finding:
-    """Agrees on every mesh, differs on every mesh, or depends on the mesh, which the thesis leaves open."""
+    """Finding that agrees if it does on every mesh, differs on none, and else cannot be told.
+
+    The thesis does not publish its meshes.
+    """
     if all(agrees) or not any(agrees):
         return judged(claim, measured, all(agrees), why)
     on = f"it holds on {sum(agrees)} of {len(agrees)} meshes, and the thesis's is not known: {why}"

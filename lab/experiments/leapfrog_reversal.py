@@ -73,7 +73,7 @@ def conclude(results: Results) -> Section:
         axes.set_ylabel("way left, over way out [1]")
 
     return Section(
-        ("A stretched cube is let go, and after some steps all velocities are turned round.",),
+        ("A stretched cube is released, and after some steps all velocities are reversed.",),
         (
             Finding(
                 "leapfrog-reversible",

@@ -1,4 +1,4 @@
-"""How far the linearised strain of eq. 6.7 is from the exact one (thesis 6.1 and chapter 7)."""
+"""Error of the linearised strain of eq. 6.7 (thesis 6.1 and chapter 7)."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ KINDS = ("stretch", "shear")
 YOUNG = 1e6
 TET = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
 SMALL = 0.1
-"""A strain that is called small."""
+"""Strain that counts as small."""
 CLOSE = 0.1
-"""Error, over the exact strain, that is called close."""
+"""Relative error that counts as close."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -37,7 +37,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Strain that the forces on a tetrahedron tell of, linearised and exact, and in closed form.
+    """Strain from the forces on a tetrahedron, linearised and exact, and in closed form.
 
     Where nu is 0 stress is E times the strain, and the force on a vertex is the stress times a third of the
     area vector of the face opposite to it. Told is the strain along the stretch, or the largest entry across.
@@ -53,7 +53,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _told(kind: str, amount: float, strain: StrainName) -> float:
-    """From the forces of the code."""
+    """Strain from the forces of the library."""
     x = TET.vertices @ _deformation(kind, amount).T
     forces = internal_forces(TET, Material(YOUNG, 0.0, 1000.0, damping_ratio=0.0), x, strain=strain)
     arms = x[1:] - x[0]
@@ -79,7 +79,7 @@ def _exact(kind: str, e: float) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """The error against the exact strain, and that the code computes both."""
+    """Judge the error against the exact strain, and check that the library computes both."""
     numbers = {kind: results.one(kind=kind) for kind in KINDS}
     amount = np.array(numbers["stretch"]["amount"])
     errors = {kind: np.array(n["linear"]) / np.array(n["exact"]) - 1 for kind, n in numbers.items()}
@@ -106,8 +106,8 @@ def conclude(results: Results) -> Section:
     first, end = ({kind: error[row] for kind, error in errors.items()} for row in (small, last))
     return Section(
         (
-            "One tetrahedron with nu = 0 is stretched, and sheared, up to 100 %; its forces tell the strain. "
-            "In closed form the error is s / 2 of a stretch s, and sqrt(1 + s^2 / 4) - 1 of a shear s.",
+            "One tetrahedron with nu = 0 is stretched, and sheared, up to 100 %. Its forces give the strain. "
+            "In closed form the error is s / 2 for a stretch s, and sqrt(1 + s^2 / 4) - 1 for a shear s.",
         ),
         (
             judged(

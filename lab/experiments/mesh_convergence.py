@@ -1,4 +1,4 @@
-"""Errors against the density of the mesh (beyond the thesis)."""
+"""Errors against the resolution of the mesh (beyond the thesis)."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from lab.experiments.judgement import judged_but_for
 
 LENGTH = 2.0
 LOADS = ("tension", "torsion", "bending")
-"""Those of which theory is exact up to the ends."""
+"""Loads for which theory is exact up to the ends."""
 SOLID, SPRINGS = "virial", "springs"
 EXACT = 1e-3
-"""Error of tension on any mesh: what is left is the strain's size."""
+"""Error of tension on any mesh, of the size of the strain."""
 ORDERS = (1.5, 2.5)
 """Linear tetrahedra are of second order in energy, and so in stiffness."""
 
@@ -45,7 +45,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Errors of tetrahedra fall with the square of the cells' size; springs go elsewhere."""
+    """Judge whether errors fall with the square of the size of the cells."""
     order = (SOLID, SPRINGS, LINEAR).index
     ordered = sorted(results.rows, key=lambda row: (order(row.point["law"]), row.point["cells"]))
     results = Results(tuple(ordered))
@@ -109,11 +109,11 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m in irregular Delaunay meshes of more and more "
-            "cells, loaded so that theory is exact up to its ends (see beams): uniform tension, "
+            "cells, with loads for which theory is exact up to the ends (see beams): uniform tension, "
             "Saint-Venant's torsion, uniform bending. Linear tetrahedra reproduce the uniform stress of "
-            "tension on any mesh; what is left there is the size of the strain, 1e-4. In torsion and "
-            "bending the error has the second order of the energy of linear elements, with virial as with "
-            "scikit-fem.",
+            "tension on any mesh. The remaining error there is of the size of the strain, 1e-4. In torsion "
+            "and bending the error has the second order of the energy of linear elements, with virial as "
+            "with scikit-fem.",
         ),
         (
             judged_but_for(
@@ -155,12 +155,12 @@ def conclude(results: Results) -> Section:
 
 
 def _falls(errors: list[float]) -> bool:
-    """Whether each is smaller than the one before."""
+    """True if each error is smaller than the one before."""
     return all(abs(after) < abs(before) for before, after in pairwise(errors))
 
 
 def _order(cells: list[int], errors: list[float]) -> float:
-    """Slope of -log error over log cells, by least squares; NaN where an error is zero."""
+    """Slope of -log error over log cells, by least squares; NaN if an error is zero."""
     sizes = np.log(np.array(cells, float))
     with np.errstate(divide="ignore"):
         logs = np.log(np.abs(errors))

@@ -30,12 +30,12 @@ from taichi_soft.elements.laws import element_model
 YOUNG, DENSITY = 1e6, 1000.0
 KINDS = ("tetrahedron", "layer")
 SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
-"""Of the height at rest that is left of what is flattened."""
+"""Height of the flattened part over that of the regular mesh."""
 STEPS = np.geomspace(3e-4, 9e-3, 44)  # [s], 8 % apart
 RUN, GROWN = 400, 100.0
-"""Substeps of a run, and growth of the kinetic energy that shows that the step is too long."""
+"""Substeps of a run, and growth of the kinetic energy beyond which the step is too long."""
 HALVED = 0.8
-"""A step that falls below this share of the best one shows that stability is lost."""
+"""Share of the best step below which stability counts as lost."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -60,7 +60,7 @@ def spoilt_cube(kind: str, share: float) -> TetMesh:
 
 
 def cubes() -> list[tuple[str, float, TetMesh]]:
-    """Every kind and share, the sound cube first."""
+    """Cubes of every kind and share, the regular one first."""
     spoilt = [(kind, share, spoilt_cube(kind, share)) for kind in KINDS for share in SHARES[1:]]
     return [("sound", 1.0, spoilt_cube("layer", 1.0)), *spoilt]
 
@@ -105,7 +105,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """The largest stable step against the smallest angle, and against Poisson's ratio."""
+    """Judge the largest stable step by the smallest angle, and by Poisson's ratio."""
     ratios = sorted(point["poisson"] for point, _ in results.where())
     by_ratio = {nu: results.one(poisson=nu) for nu in ratios}
     names = [(kind, share) for kind, share, _ in cubes()]
@@ -138,7 +138,7 @@ def conclude(results: Results) -> Section:
         "broke [s]",
     )
     return Section(
-        ("One tetrahedron in the middle of a cube, or one of its three layers, is flattened on purpose.",),
+        ("One tetrahedron in the middle of a cube, or one of its three layers, is flattened.",),
         (
             Finding(
                 "mesh-quality",

@@ -1,4 +1,4 @@
-"""Forces by faces and by the virial theorem, and what they cost beside springs (thesis 6.6, 6.7)."""
+"""Forces by faces and by the virial theorem, and their cost beside springs (thesis 6.6, 6.7)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 SUBSTEPS, SUBSTEP = 20, 1e-5  # [s], far below every limit: the bodies just fall
 SAME = 1e-9
-"""Difference of forces, over the largest of them, that round-off explains in float64."""
+"""Largest relative difference of forces that round-off explains in float64."""
 ALIKE = 1.25
-"""Times over each other, either way, that are called alike."""
+"""Ratio of times up to which they count as alike."""
 CLEARLY = 1.5
-"""Times over each other that are called clearly faster."""
+"""Ratio of times from which one counts as clearly faster."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -89,7 +89,7 @@ def _cost(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Ratios turn by turn, so that a machine that slows down slows both."""
+    """Judge the ratios turn by turn, so that a slow moment of the machine slows both."""
     forces = results.where(kind="forces")
     cost = results.one(kind="cost")
     virial = np.array(cost["seconds"]["virial"])
@@ -112,8 +112,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "Both methods of chapter 6 on bodies deformed at random, and a body that falls under each law, "
-            f"of {cost['tets']} tetrahedra and {cost['edges']} edges, on one core.",
+            "Forces of both methods of chapter 6 are compared on bodies deformed at random. Costs are "
+            f"those of a falling body of {cost['tets']} tetrahedra and {cost['edges']} edges under each "
+            "law, on one core.",
         ),
         (
             judged(
@@ -158,4 +159,4 @@ METHODS_COST = Experiment(
     conclude,
     is_timing=True,
 )
-"""What the laws of chapter 6 cost."""
+"""Cost of the laws of chapter 6."""

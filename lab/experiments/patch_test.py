@@ -78,7 +78,7 @@ def _pull_of(vertices: FloatArray, surface: Any, stress: FloatArray) -> FloatArr
 
 
 def conclude(results: Results) -> Section:
-    """Tetrahedral laws meet Hooke's law as strain goes to zero; laws along edges do not."""
+    """Judge whether the forces tend to those of Hooke's law as the strain goes to zero."""
     worst = {}
     for law in (*TETRAHEDRAL, *ALONG_EDGES):
         rows = [numbers for _, numbers in results.where(law=law)]
@@ -102,9 +102,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cube of irregular tetrahedra is deformed evenly, by strains at random. Hooke's law then asks "
-            "for the same stress everywhere: no force on vertices inside, and on those of the surface a "
-            "third of what the stress does to each triangle.",
+            "A cube of irregular tetrahedra is deformed uniformly, by random strains. Hooke's law then gives "
+            "the same stress everywhere: no force on vertices inside, and on those of the surface a "
+            "third of the force of the stress on each of their triangles.",
         ),
         (
             judged_but_for(

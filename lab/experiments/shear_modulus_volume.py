@@ -1,4 +1,4 @@
-"""What the shear modulus of CMPM does to the volume of a deformed body (thesis chapter 5, introduction)."""
+"""Effect of the shear modulus of CMPM on the volume of a deformed body (thesis chapter 5, introduction)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume over that at rest of a cube whose ends are held by plates that are driven."""
+    """Volume over that at rest of a cube whose ends are attached to moving plates."""
     mesh = cube(3, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, 0.3, DENSITY, shear_modulus=point["modulus"] * YOUNG, damping_ratio=0.0)
@@ -52,7 +52,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Whether a larger modulus leaves less change of volume, for each way on each mesh."""
+    """Judge whether a larger modulus changes the volume less, for each deformation on each mesh."""
     changes: dict[tuple[str, int], dict[float, float]] = {}
     for point, numbers in results.where():
         curve = changes.setdefault((point["way"], point["seed"]), {})
@@ -95,8 +95,8 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "A cube of irregular tetrahedra under CMPM, E = 3 MPa, between plates that are drawn apart, "
-            "pressed together and moved sideways, with a shear modulus that is chosen by itself.",
+            "A cube of irregular tetrahedra under CMPM, E = 3 MPa, between plates that are moved apart, "
+            "together and sideways, with a shear modulus that is chosen separately.",
         ),
         (
             Finding(

@@ -1,4 +1,4 @@
-"""What became of dropped spheres of many moduli, and between which moduli they stayed whole."""
+"""Outcomes of dropped spheres of many moduli, and the interval of moduli in which they stay whole."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from lab.experiments.experiment import Numbers
 OUTCOMES = ("collapses", "dented", "whole", "explodes")
 
 COLLAPSED = 0.5
-"""Part of its volume, or less, that is left of a sphere that has collapsed. The thesis has no number."""
+"""Volume over that at rest up to which a sphere counts as collapsed. The thesis has no number."""
 
 Window = tuple[float, float, float, float]
 """Edges as `window` gives them [Pa]."""
 
 
 def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
-    """What became of each sphere.
+    """Outcome of each sphere.
 
-    One explodes if it goes non-finite or doubles in extent, and is dented if more than a hundredth of its
-    tetrahedra stay inside out; where these leave it this part of its volume or less it has collapsed.
+    A sphere explodes if it becomes non-finite or doubles in extent. It is dented if more than a hundredth of
+    its tetrahedra stay inverted, and collapses if it then keeps `collapsed` of its volume or less.
     """
     ends = []
     for volume, flipped, frozen, extent in zip(
@@ -52,7 +52,7 @@ def window(numbers: Numbers, collapsed: float = COLLAPSED) -> Window:
 
 
 def _longest_row(values: Iterable[bool]) -> tuple[int, int]:
-    """Where the longest row of true values begins and ends; the end lies before the beginning if none is."""
+    """First and last index of the longest row of true values; the last is smaller if there is none."""
     best, start, at = (0, -1), 0, -1
     for at, value in enumerate(values):
         if not value:

@@ -1,7 +1,6 @@
-"""How fast the thesis's sphere runs here (section 6.6): simulated time over the time that it takes.
+"""Rate of the thesis's sphere on this machine (section 6.6): simulated time over real time.
 
-Timed are whole frames of 1/50 s, as a program makes them: 14 steps of 1/700 s, and the positions read for
-drawing.
+The times are those of whole frames of 1/50 s: 14 steps of 1/700 s, and reading the positions for drawing.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from taichi_soft.core.package_data import ASSETS
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
-"""Of real time, on an AMD XP 1800+ of 1.53 GHz (section 6.6), and the size of the sphere there."""
+"""Simulated over real time on an AMD XP 1800+ of 1.53 GHz (section 6.6), and the size of that sphere."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -37,7 +36,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Seconds that frames took."""
+    """Seconds of each frame."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
@@ -60,7 +59,7 @@ def measure(point: Point) -> Numbers:
 
 
 def real_time_factor(numbers: Numbers) -> float:
-    """Simulated over real time, of all frames together."""
+    """Simulated over real time, for all frames together."""
     return DT * len(numbers["frames"]) / float(np.sum(numbers["frames"]))
 
 
@@ -70,24 +69,22 @@ def nanoseconds(factor: float, tets: int) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Whether it runs at least as fast."""
+    """Compare the rate with that of the thesis; a verdict on its processor is not possible."""
     numbers = results.one()
     factor, tets = real_time_factor(numbers), numbers["tets"]
     here, there = nanoseconds(factor, tets), nanoseconds(THESIS_FACTOR, THESIS_TETS)
     threads = "one thread" if numbers["threads"] == 1 else f"{numbers['threads']} threads"
     measured = (
         f"{factor:.3g} times real time here on {threads} ({tets} tetrahedra), {factor / THESIS_FACTOR:.3g} "
-        f"times the thesis's {THESIS_FACTOR}; compared is only whether it reaches that rate"
+        f"times the thesis's {THESIS_FACTOR}"
     )
-    reaches = factor >= THESIS_FACTOR and not numbers["frozen"]
-    if reaches:
-        finding = Finding("sphere-real-time", measured, Verdict.AGREES)
-    elif numbers["frozen"]:
-        why = "the sphere went non-finite while it was timed"
-        finding = Finding("sphere-real-time", measured, Verdict.UNKNOWN, why)
-    else:
-        why = f"this machine or build is slower: {here:.3g} ns a tetrahedron and step, there {there:.3g}"
-        finding = Finding("sphere-real-time", measured, Verdict.DIFFERS, why)
+    why = (
+        "the sphere became non-finite during the run"
+        if numbers["frozen"]
+        else "the claim is about an AMD XP 1800+ of 2002, and no rate on another processor can confirm it or "
+        f"contradict it. A tetrahedron and step takes {here:.3g} ns here, and took {there:.3g} ns there"
+    )
+    finding = Finding("sphere-real-time", measured, Verdict.UNKNOWN, why)
     median = float(np.median(numbers["frames"]))
     rows = (
         ("here", tets, float(f"{factor:.3g}"), float(f"{here:.3g}"), float(f"{1e3 * median:.3g}")),
@@ -102,8 +99,8 @@ def conclude(results: Results) -> Section:
     )
     return Section(
         (
-            "A processor of 2002 is not at hand: what the method costs there is not tested by this, only "
-            "that the sphere runs at the thesis's rate or faster.",
+            "The thesis's sphere falls and bounces in frames of 20 ms, as in a program that draws it. A "
+            "processor of 2002 is not at hand, so that this compares rates and does not test the claim.",
         ),
         (finding,),
         (Table("rates", "Simulated over real time", columns, rows),),

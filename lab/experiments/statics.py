@@ -21,7 +21,7 @@ from taichi_soft.elements.laws.bonds import Ring
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
-"""Of the differences, over the shortest edge: truncation and rounding err by some 1e-10 of the stiffness."""
+"""Of the differences, over the shortest edge: truncation and rounding err by about 1e-10 of the stiffness."""
 SLOW = 0.5
 """Where a step leaves more of the residual than this, the stiffness is taken anew, and steps are halved."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
@@ -35,7 +35,7 @@ class NoEquilibriumError(TaichiSoftError):
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """What is done to a body.
+    """Loads and driven coordinates of a body.
 
     Args:
         driven: (n, 3), coordinates that are held.
@@ -50,7 +50,7 @@ class Loading:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """Where forces balance.
+    """State in which the forces balance.
 
     Args:
         displacement: (n, 3) from rest [m].
@@ -94,10 +94,10 @@ class StaticBody:
         return self._at_rest
 
     def equilibrium(self, loading: Loading, tolerance: float = 1e-7) -> Equilibrium:
-        """Where the body settles.
+        """Find the equilibrium.
 
         Args:
-            tolerance: of `Equilibrium.residual`; "best_fitting_plane" knows its planes to some 1e-8 only.
+            tolerance: largest `Equilibrium.residual`; "best_fitting_plane" is exact to about 1e-8 only.
         Raises: NoEquilibriumError.
         """
         free = ~loading.driven.ravel()
@@ -141,7 +141,7 @@ class StaticBody:
 
 
 def factorised(matrix: Any) -> Any:
-    """A function from right-hand sides to solutions. Raises: NoEquilibriumError where there are none."""
+    """Function from right-hand sides to solutions. Raises: NoEquilibriumError for a singular matrix."""
     from scipy.sparse.linalg import splu
 
     try:
@@ -152,7 +152,7 @@ def factorised(matrix: Any) -> Any:
 
 
 def _dependence(mesh: TetMesh, material: Material, law: LawName) -> Any:
-    """Which vertices' forces depend on where which vertices are: sparse, symmetric (n, n)."""
+    """Sparsity pattern of the gradient, symmetric (n, n): forces of a vertex on positions of another."""
     from scipy.sparse import coo_matrix
 
     chosen = LAWS[law]

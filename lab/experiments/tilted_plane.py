@@ -1,4 +1,4 @@
-"""The tilted plane (thesis section 4.4.3), which the thesis never built: does it follow a shear?"""
+"""The tilted plane (thesis section 4.4.3), which the thesis did not implement, under shear."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from taichi_soft import Material, TetMesh
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 LAWS = {"tilted_plane_printed": "as printed", "tilted_plane": "c = beta / pi"}
 ANGLES = (0.01, 0.05, 0.1, 0.2, 0.4)
-"""Of shear [rad]."""
+"""Angles of shear [rad]."""
 
 SMALL = ANGLES[0]
 FOLLOWS = 0.05
-"""Part of the shear by which the plane may miss it and still follow."""
+"""Relative error up to which a plane counts as following the shear."""
 
 UNEVEN = ((0.0, 40.0, 130.0, 170.0, 260.0), (0.0, 110.0, 150.0, 240.0, 265.0, 330.0))
-"""Where the particles of two uneven rings stand [degrees]."""
+"""Angles of the particles of two uneven rings [degrees]."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -67,7 +67,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """How much of a small shear the planes follow."""
+    """Judge the share of a small shear that the planes follow."""
     rings = [point["ring"] for point, _ in results.where(law="tilted_plane")]
     share = {
         (law, ring): results.one(law=law, ring=ring)["tilt"][0] / SMALL for law in LAWS for ring in rings
@@ -107,8 +107,8 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            "An edge in a ring of particles is sheared, and the direction that the law takes for tension is "
-            "read from the stiffness of the edge. A plane that follows turns by as much as the shear.",
+            "An edge in a ring of particles is sheared. The direction of tension is read from the "
+            "stiffness of the edge. A plane that follows the shear turns by the same angle.",
         ),
         (finding,),
         (

@@ -1,4 +1,4 @@
-"""Times of two calls in turns: a machine that slows down for a while then slows both."""
+"""Times of two calls in turns, so that a slow moment of the machine slows both."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from time import perf_counter
 
 
 def seconds_of(call: Callable[[], object]) -> float:
-    """What one call takes [s]."""
+    """Duration of one call [s]."""
     start = perf_counter()
     call()
     return perf_counter() - start
@@ -16,6 +16,6 @@ def seconds_of(call: Callable[[], object]) -> float:
 def in_turns(
     one: Callable[[], object], other: Callable[[], object], repeats: int
 ) -> tuple[list[float], list[float]]:
-    """Times of both [s], call by call, after one of each to warm up."""
+    """Durations of both calls [s] in turns, after one call of each to warm up."""
     pairs = [(seconds_of(one), seconds_of(other)) for _ in range(repeats + 1)][1:]
     return [pair[0] for pair in pairs], [pair[1] for pair in pairs]

@@ -1,4 +1,4 @@
-"""Up to which nu springs that keep volume are stable (thesis section 5.2)."""
+"""Largest nu with which springs that keep volume are stable (thesis section 5.2)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from taichi_soft.meshing.arrays import FloatArray
 YOUNG, DENSITY = 3e6, 4e3  # the thesis's; it tells neither damping nor step
 CELLS = 3
 STEADY = 0.1
-"""Growth [1/s] of a motion that is called steady: a tenth in a second, or round-off."""
+"""Growth rate [1/s] up to which a motion counts as steady: a tenth in a second, or round-off."""
 THESIS_LIMIT, CLOSE = 0.3, 0.05
 
 
@@ -81,7 +81,7 @@ def _edge_matrix(mesh: TetMesh) -> FloatArray:
 
 
 def conclude(results: Results) -> Section:
-    """The largest nu at which nothing grows, for each damping."""
+    """Judge the largest nu at which no motion grows, for each damping."""
     results.one(seed=1, damping=0.0)
     limits: dict[tuple[int | None, float], float] = {}
     for point, numbers in results.where():
@@ -134,7 +134,7 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             "Small motions of the cube of figures 5.1 and 5.2 between plates at rest, from the gradient of "
-            "the forces: each is a vibration that grows or fades, whatever the integrator does.",
+            "the forces. Each is a vibration that grows or fades, with any integrator.",
         ),
         (
             Finding(

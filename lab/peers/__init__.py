@@ -1,4 +1,4 @@
-"""The same drop here, in other engines, and in a fine reference: what each costs, and how far off it is."""
+"""One drop here, in other engines, and in a fine reference: cost and error of each."""
 
 from lab.peers.comparison import Entry, compare, missing_peers
 from lab.peers.course import Course

@@ -1,4 +1,4 @@
-"""One drop in every engine that is installed, beside the reference."""
+"""The drop in every engine that is installed, and in the reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OURS, REFERENCE = "taichi-soft", "reference"
 
 @dataclass(frozen=True)
 class Entry:
-    """What came out in one engine, or in the reference."""
+    """Result of one engine, or of the reference."""
 
     name: str
     course: Course
@@ -29,7 +29,7 @@ class Entry:
 
     @property
     def is_reference(self) -> bool:
-        """Whether the others are measured by it."""
+        """True for the reference of the others."""
         return self.name == REFERENCE
 
     @property
@@ -39,12 +39,12 @@ class Entry:
 
     @property
     def squash_error(self) -> float:
-        """Relative, above 0 where it is squashed too much."""
+        """Relative error of the squash, positive if it is too large."""
         return self.outcome.squash / self.reference.squash - 1.0
 
     @property
     def bounce_error(self) -> float:
-        """Relative, above 0 where it bounces too high."""
+        """Relative error of the bounce, positive if it is too high."""
         return self.outcome.bounce / self.reference.bounce - 1.0
 
 
@@ -56,10 +56,10 @@ def missing_peers() -> list[str]:
 def compare(
     drop: Drop | None = None, on_frame: Callable[[str, int, int], object] | None = None
 ) -> list[Entry]:
-    """The drop here, in the reference, and in every engine that is installed, in this order.
+    """Simulate the drop here, in the reference, and in every engine that is installed, in this order.
 
     Args:
-        on_frame: called with (name, frames made, frames in all).
+        on_frame: called with (name, frames done, total frames).
     """
     drop = Drop() if drop is None else drop
     there = [peer for peer in PEERS if not missing_packages("peers", peer.module)]

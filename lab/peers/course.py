@@ -1,4 +1,4 @@
-"""The way of a body through a drop, and what its engine took for that."""
+"""Motion of a body in a drop, and the time that its engine needs."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 RATE = 120
-"""Positions are noted so often [1/s]: twice a frame, for the moment of deepest squash."""
+"""Rate at which positions are recorded [1/s]: twice a frame, to resolve the deepest squash."""
 
 FRAME = 1 / 60
-"""What the cost is told of [s]."""
+"""Time step for which the cost is reported [s]."""
 
 FARTHEST = 3.0
-"""A body whose vertices are farther off than so many heights of its start has exploded."""
+"""Distance of a vertex, over the height at the start, beyond which the body counts as exploded."""
 
 MOST_HALVINGS = 6
-"""Of a step, before an engine is given up."""
+"""Largest number of times that a step is halved before an engine counts as failed."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """Where the vertices were, and how long each frame took."""
+    """Positions of the vertices, and the time of each frame."""
 
     positions: Floats  # (k, n, 3), each 1 / RATE s from the start on [m]
     frame_times: Floats  # of stepping each FRAME [s]
     step: float  # of the engine [s]
 
     def at(self, time: float) -> Floats:
-        """The vertices at a time [s], (n, 3), between the positions noted; at the end they stay."""
+        """Vertices at a time [s], (n, 3), interpolated between recorded positions; constant after the end."""
         place = min(max(time * RATE, 0.0), len(self.positions) - 1.0)
         before = min(int(place), len(self.positions) - 2)
         share = place - before
@@ -48,7 +48,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Simulation:
-    """A body in an engine, at its start."""
+    """A body in an engine at the start of the drop."""
 
     advance: Callable[[], None]  # by 1 / RATE s
     positions: Callable[[], Floats]  # (n, 3) [m]
@@ -58,13 +58,13 @@ class Simulation:
 def record(
     drop: Drop, make: Callable[[int], Simulation], first: int, on_frame: Progress | None = None
 ) -> Course:
-    """The course of a drop with the longest step that holds.
+    """Simulate a drop with the longest stable step.
 
     Args:
-        make: an engine that takes so many steps in 1 / RATE s.
-        first: as many as its makers advise. They are doubled until the body holds together.
-        on_frame: called with (frames made, frames in all).
-    Raises: StateError where no step holds.
+        make: returns an engine that makes the given number of steps in 1 / RATE s.
+        first: number of steps that the engine's authors recommend. It is doubled until the body stays whole.
+        on_frame: called with (frames done, total frames).
+    Raises: StateError if no step is stable.
     """
     for doubling in range(MOST_HALVINGS + 1):
         steps = first << doubling
@@ -77,7 +77,7 @@ def record(
 
 
 def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Course | None:
-    """A whole course; None where the body flies apart."""
+    """Course of the whole drop; None if the body explodes."""
     frames = round(drop.seconds / FRAME)
     positions, times = [np.array(engine.positions(), dtype=np.float64)], []
     reach = FARTHEST * np.abs(drop.start).max()

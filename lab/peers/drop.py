@@ -1,4 +1,4 @@
-"""What every engine is given: a mesh, an elastic material, and how high it is dropped from."""
+"""The drop for every engine: mesh, elastic material, and height."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Drop:
-    """A body that falls onto a level floor at z = 0. Nothing damps it, and the floor has no friction.
+    """A body that falls onto a level floor at z = 0, without damping and friction.
 
-    The sphere of 1,280 tetrahedra is squashed by a sixth. With that the usual laws of materials agree: what
-    is left between engines is how they solve.
+    The sphere of 1,280 tetrahedra is squashed by a sixth. Up to there the usual material laws agree, so that
+    differences between engines come from their solvers.
     """
 
     mesh: TetMesh = field(default_factory=lambda: sphere(0.5, 4))
@@ -32,21 +32,21 @@ class Drop:
 
     @property
     def start(self) -> Floats:
-        """Where the vertices are at first, (n, 3) [m]."""
+        """Positions of the vertices at the start, (n, 3) [m]."""
         lift = self.height - float(self.mesh.vertices[:, 2].min())
         rows: Floats = self.mesh.vertices + np.array([0.0, 0.0, lift])
         return rows
 
     @property
     def volumes(self) -> Floats:
-        """Of the tetrahedra, (m,) [m^3]."""
+        """Volumes of the tetrahedra, (m,) [m^3]."""
         corners = self.mesh.vertices[self.mesh.tets]
         volumes: Floats = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
         return volumes
 
     @property
     def masses(self) -> Floats:
-        """Of the vertices, a quarter of each tetrahedron's, (n,) [kg]."""
+        """Masses of the vertices, a quarter of each adjacent tetrahedron, (n,) [kg]."""
         quarters = np.repeat(self.density * self.volumes / 4.0, 4)
         masses: Floats = np.bincount(self.mesh.tets.ravel(), quarters, len(self.mesh.vertices)).astype(
             np.float64

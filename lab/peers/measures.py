@@ -1,4 +1,4 @@
-"""What a drop is judged by: how far the body was squashed, and how high it bounced."""
+"""Measures of a drop: squash and bounce."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Two numbers of a course."""
+    """Squash and bounce of a drop."""
 
     squash: float  # how much lower its highest vertex stands at the deepest moment, in its own heights
     bounce: float  # how high the centre of mass rises again, in the height that it fell from
 
 
 def measure(drop: Drop, course: Course) -> Outcome:
-    """Both, between the moments noted: through the three about an extreme goes a parabola.
+    """Measure both, with a parabola through the three recorded values about each extreme.
 
-    The centre of mass weighs vertices as the drop does, whatever the engine gave them.
+    The centre of mass has the masses of the drop, whatever masses the engine uses.
     """
     tops = course.positions[:, :, 2].max(axis=1)
     centers = course.positions[:, :, 2] @ drop.masses / drop.masses.sum()
@@ -39,7 +39,7 @@ def measure(drop: Drop, course: Course) -> Outcome:
 
 
 def _extreme(values: Floats, index: int) -> float:
-    """Of the parabola through a value and its neighbours."""
+    """Extreme of the parabola through a value and its neighbours."""
     if not 0 < index < len(values) - 1:
         return float(values[index])
     before, here, after = (float(value) for value in values[index - 1 : index + 2])

@@ -1,7 +1,7 @@
 """The drop in MuJoCo (Apache-2.0): a flex with a body per vertex, by St. Venant and Kirchhoff's law.
 
 Contact has the stiffness of the flex in MuJoCo's page on modeling. Its own flex gives all vertices the same
-mass; here they have theirs.
+mass; here each vertex has the mass of the drop.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import GRAVITY, Drop
 
 FIRST = 4
-"""Steps in 1 / RATE s: some 2 ms each, which is MuJoCo's default."""
+"""Steps in 1 / RATE s: about 2 ms each, which is MuJoCo's default."""
 
 MODEL = """
 <mujoco>
@@ -36,17 +36,17 @@ CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 
 def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Course:
-    """By the integrator that MuJoCo advises for flexes: implicit, together with contact."""
+    """Simulate with the integrator that MuJoCo recommends for flexes: implicit, together with contact."""
     return _simulate(drop, "discrete", on_frame)
 
 
 def simulate_euler(drop: Drop, on_frame: Progress | None = None) -> Course:
-    """By its explicit integrator, which takes less time where the material is soft."""
+    """Simulate with its explicit integrator, which is faster for soft materials."""
     return _simulate(drop, "Euler", on_frame)
 
 
 def _simulate(drop: Drop, integrator: str, on_frame: Progress | None) -> Course:
-    """Without the file that MuJoCo writes its warnings to, in the folder that it is called from."""
+    """Simulate without the file of warnings that MuJoCo writes into the current folder."""
     import mujoco
 
     mujoco.set_mju_user_warning(lambda _: None)
@@ -86,9 +86,9 @@ def _advance(model: Any, data: Any, steps: int) -> None:
 
 
 def _positions(model: Any, data: Any) -> NDArray[np.float64]:
-    """Where the vertices are, worked out anew: after a step MuJoCo has the places of before it.
+    """Positions of the vertices, recomputed: after a step MuJoCo has those before the step.
 
-    Where it found itself unstable it has begun anew, which counts as an explosion.
+    If MuJoCo detects instability it resets, which counts as an explosion.
     """
     import mujoco
 

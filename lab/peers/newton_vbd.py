@@ -16,14 +16,14 @@ FIRST = 5
 """Steps in 1 / RATE s: 1/600 s each, as in Newton's examples of soft bodies."""
 
 ITERATIONS = 10
-"""Of the solver, as there."""
+"""Iterations of the solver, as in Newton's examples."""
 
 CONTACT, RADIUS = 1e7, 1e-3
 """Stiffness [N/m] and radius [m] of a vertex in contact."""
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
-    """The course of the drop."""
+    """Simulate the drop."""
     import warp
 
     warp.config.log_level = warp.LOG_WARNING

@@ -1,4 +1,4 @@
-"""The drop in taichi-soft, with what a user gets who says nothing: its law, its integrator, its substeps."""
+"""The drop in taichi-soft with its defaults: law, integrator and substeps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from taichi_soft import Material, World
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
-    """The course of the drop."""
+    """Simulate the drop."""
     material = Material(drop.young, drop.poisson, drop.density, damping=0.0, damping_ratio=0.0)
 
     def make(steps: int) -> Simulation:

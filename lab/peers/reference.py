@@ -1,9 +1,9 @@
-"""The drop in NumPy: float64, a textbook's law, steps far finer than any engine's.
+"""The drop in NumPy: float64, a textbook's law, and much shorter steps than any engine's.
 
 psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984) is the law of none of the engines. The
-floor is a stiff spring under each vertex, so contact takes no energy: the skin of a body has no mass, and
-what a vertex would lose in a blow depends on the mesh alone. Steps of half the length and a floor four times
-as stiff change squash and bounce by 0.6 % at most.
+floor is a stiff spring under each vertex, so that contact dissipates no energy: the surface of a body has no
+mass, and the energy that a vertex would lose in an impact depends on the mesh only. Steps of half the length
+and a floor four times as stiff change squash and bounce by 0.6 % at most.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from lab.peers.drop import GRAVITY, Drop
 Floats = NDArray[np.float64]
 
 FLOOR = 1.6e7
-"""Stiffness of the floor over the mass of a vertex [1/s^2]: it sinks in by some millimetres."""
+"""Stiffness of the floor over the mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
 
 FRACTION = 0.05
-"""Of the time that sound takes through the lowest tetrahedron."""
+"""Step over the time in which sound crosses the lowest tetrahedron."""
 
 
 class Reference:
-    """A body by Verlet's method. Tensors of tetrahedra are (3, 3, m): rows, columns, and which."""
+    """A body with Verlet's method. Tensors of tetrahedra are (3, 3, m): rows, columns, tetrahedra."""
 
     def __init__(self, drop: Drop, steps: int) -> None:
-        """`steps` are made in 1 / RATE s."""
+        """Prepare for `steps` steps in 1 / RATE s."""
         self.drop, self.steps, self.h = drop, steps, 1.0 / (RATE * steps)
         self.masses, self.volumes = drop.masses, drop.volumes
         self.corners = drop.mesh.tets.T  # (4, m)
@@ -37,7 +37,7 @@ class Reference:
         self._accelerations = self.accelerations()
 
     def advance(self) -> None:
-        """By 1 / RATE s."""
+        """Advance by 1 / RATE s."""
         for _ in range(self.steps):
             self.velocities += self.h / 2 * self._accelerations
             self.positions = self.positions + self.h * self.velocities
@@ -45,7 +45,7 @@ class Reference:
             self.velocities += self.h / 2 * self._accelerations
 
     def energy(self) -> float:
-        """Of motion, of height above the floor, of shape and of contact [J]."""
+        """Kinetic energy, and potential energy of height, deformation and contact [J]."""
         (lam, mu), F = self.drop.lame, self._deformations()
         log = np.log(_cofactor(F)[1])
         shape = mu / 2 * ((F**2).sum(axis=(0, 1)) - 3.0 - 2.0 * log) + lam / 2 * log**2
@@ -54,7 +54,7 @@ class Reference:
         return float(self.volumes @ shape + self.masses @ single)
 
     def accelerations(self) -> Floats:
-        """Of the vertices where they are, (n, 3) [m/s^2]."""
+        """Accelerations of the vertices, (n, 3) [m/s^2]."""
         (lam, mu), F = self.drop.lame, self._deformations()
         across, J = _cofactor(F)
         P = mu * F + (lam * np.log(J) - mu) / J * across
@@ -72,7 +72,7 @@ class Reference:
 
 
 def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Course:
-    """The course that engines are measured by."""
+    """Simulate the drop that is the reference of the engines."""
 
     def make(steps: int) -> Simulation:
         body = Reference(drop, steps)
@@ -84,14 +84,14 @@ def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Course:
 
 
 def _edges(positions: Floats, corners: NDArray[np.int32]) -> Floats:
-    """From the first vertex to the others, as columns, (3, 3, m)."""
+    """Edges from the first vertex to the others, as columns, (3, 3, m)."""
     places = positions.T[:, corners]
     edges: Floats = places[:, 1:] - places[:, :1]
     return edges
 
 
 def _cofactor(F: Floats) -> tuple[Floats, Floats]:
-    """Of each tensor, and its determinant, (m,)."""
+    """Cofactor of each tensor, and its determinant, (m,)."""
     cofactor = np.empty_like(F)
     for row, column in np.ndindex(3, 3):
         i, j, k, l = (row + 1) % 3, (row + 2) % 3, (column + 1) % 3, (column + 2) % 3  # noqa: E741
@@ -106,7 +106,7 @@ def _inverse(F: Floats) -> Floats:
 
 
 def _least_altitude(drop: Drop) -> float:
-    """Of all tetrahedra [m]: an altitude is the inverse of the gradient of a vertex's weight."""
+    """Least altitude of all tetrahedra [m]: the inverse of the gradient of a barycentric coordinate."""
     inverse = _inverse(_edges(drop.mesh.vertices, drop.mesh.tets.T))
     gradients = np.concatenate([-inverse.sum(axis=0, keepdims=True), inverse])
     return 1.0 / float(np.linalg.norm(gradients, axis=1).max())

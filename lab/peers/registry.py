@@ -1,4 +1,4 @@
-"""The engines that the drop is made in, beside this one."""
+"""Other engines that simulate the drop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lab.peers.drop import Drop
 
 @dataclass(frozen=True)
 class Peer:
-    """An engine of others, or one of its integrators."""
+    """Another engine, or one of its integrators."""
 
     name: str
     module: str  # of Python, as in the extra `peers`

@@ -1,4 +1,4 @@
-"""The comparison as one film: a panel for each engine, with what it costs and how far off it is."""
+"""The comparison as one film: a panel for each engine, with its cost and its error."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_text
 
 GAP = 4
-"""Between panels [pixels]."""
+"""Gap between panels [pixels]."""
 
 DARK = 24
-"""Of what lies between panels and where there is none, of 255."""
+"""Grey value of the gaps and of empty panels, of 255."""
 
 REFERENCE_COLOR = (0.93, 0.92, 0.88)
 
@@ -37,8 +37,8 @@ def film_wall(
     """Film courses side by side, each from its beginning to its end, and return the number of frames.
 
     Args:
-        drop: that they are courses of.
-        entries: as `compare` gives them.
+        drop: the drop of the courses.
+        entries: results of `compare`.
         writer: of the film.
         seconds: length of the film: what lasts shorter is shown slowed down.
         on_frame: called with (frames made, frames in all) after each.
@@ -59,12 +59,12 @@ def film_wall(
 
 
 def draw_wall(drop: Drop, entries: Sequence[Entry], time: float, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """The picture of one moment [s] of such a film, sRGB, uint8 (height, width, 3)."""
+    """Frame of the film at a time of the drop [s], sRGB, uint8 (height, width, 3)."""
     return _Wall(drop, entries, size, "").draw(time)
 
 
 class _Wall:
-    """Panels in rows of three at most; in each a line at the height of the reference's top."""
+    """Panels in rows of at most three, each with a line at the height of the reference's top."""
 
     def __init__(self, drop: Drop, entries: Sequence[Entry], size: tuple[int, int], pace: str) -> None:
         self.entries, self.size, self.pace = entries, size, pace
@@ -89,7 +89,7 @@ class _Wall:
         ]
 
     def draw(self, time: float) -> NDArray[np.uint8]:
-        """The picture of a moment of the drop [s]."""
+        """Draw the frame at a time of the drop [s]."""
         picture = np.full((self.size[1], self.size[0], 3), DARK, dtype=np.uint8)
         width, height = self.renderer.width, self.renderer.height
         for i, (entry, surface) in enumerate(zip(self.entries, self.surfaces, strict=True)):
@@ -108,7 +108,7 @@ class _Wall:
         return picture
 
     def _height_of_reference(self, time: float) -> int:
-        """The row of pixels at which its top is."""
+        """Row of pixels of the reference's top."""
         reference = next(entry for entry in self.entries if entry.is_reference)
         top = [(0.0, 0.0, reference.course.at(time)[:, 2].max())]
         row = self.renderer.camera.project(top, self.renderer.width, self.renderer.height)[0, 1]
@@ -116,7 +116,7 @@ class _Wall:
 
 
 def captions(entry: Entry) -> list[str]:
-    """What stands beneath a body: its engine, what that costs, and how far off it is."""
+    """Lines below a body: its engine, cost and error."""
     squash = f"squashed by {entry.outcome.squash:.1%}"
     bounce = f"bounces back to {entry.outcome.bounce:.0%}"
     if entry.is_reference:
@@ -130,7 +130,7 @@ def captions(entry: Entry) -> list[str]:
 
 
 def _milliseconds(time: float) -> str:
-    """In two digits or more."""
+    """Milliseconds with at least two digits."""
     ms = time * 1e3
     return f"{ms:.{0 if ms >= 10 else 1 if ms >= 1 else 2}f} ms"
 

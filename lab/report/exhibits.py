@@ -1,4 +1,4 @@
-"""A section as the page shows it: images as files, tables as words, names fit for files and links."""
+"""Sections ready for the page: images as files, tables as text, names for files and links."""
 
 from __future__ import annotations
 
@@ -26,16 +26,21 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.render.opencv import cv2
 
 LONG = 12
-"""Rows; a longer table is folded."""
+"""Rows; longer tables are folded."""
 
 WIDE = 640
-"""Pixels; two wider images do not lie side by side."""
+"""Pixels; wider images have a row of their own."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """A plot or picture. `path`: of its file beside the page; `png` is empty, and `error` says why, where a
-    plot needs a point that failed."""
+    """A plot or picture.
+
+    Args:
+        path: of its file, relative to the page.
+        png: empty if a plot needs a point that failed.
+        error: the reason then.
+    """
 
     path: str
     caption: str
@@ -46,18 +51,18 @@ class Image:
 
     @property
     def is_wide(self) -> bool:
-        """Whether it has a row for itself, so that its words can still be read."""
+        """True if it has a row of its own, so that its text stays readable."""
         return self.width > WIDE
 
     @property
     def uri(self) -> str:
-        """Its bytes, as an address."""
+        """The image as a data URI."""
         return "data:image/png;base64," + base64.b64encode(self.png).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table. `right`: whether a column holds numbers and so belongs to the right."""
+    """A table. `right`: True for each column of numbers, which is aligned to the right."""
 
     path: str
     title: str
@@ -68,23 +73,23 @@ class Sheet:
 
     @property
     def is_long(self) -> bool:
-        """Whether it is folded."""
+        """True if it is folded."""
         return len(self.rows) > LONG
 
     @property
     def shown(self) -> tuple[tuple[str, ...], ...]:
-        """The rows that are not left out where nothing can be folded."""
+        """The first rows, for a format that cannot fold."""
         return self.rows[:LONG]
 
     @property
     def uri(self) -> str:
-        """Its CSV, as an address."""
+        """The CSV as a data URI."""
         return "data:text/csv;charset=utf-8;base64," + base64.b64encode(self.csv.encode()).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Exhibit:
-    """An experiment with all that its section shows."""
+    """An experiment with the contents of its section."""
 
     experiment: Experiment
     section: Section
@@ -99,12 +104,12 @@ class Exhibit:
 
     @property
     def anchor(self) -> str:
-        """Of its heading."""
+        """Anchor of its heading."""
         return "experiment-" + file_name(self.experiment.name)
 
 
 def exhibit_of(experiment: Experiment, results: Results, section: Section) -> Exhibit:
-    """Draw and word all of a section. Raises: OptionError for names used twice or rows of a wrong length."""
+    """Draw plots and format tables. Raises: OptionError for duplicate names or rows of a wrong length."""
     name = file_name(experiment.name)
     for kind in (section.tables, section.plots, section.pictures):
         require_distinct((each.name for each in kind), experiment.name)
@@ -123,12 +128,12 @@ def exhibit_of(experiment: Experiment, results: Results, section: Section) -> Ex
 
 
 def file_name(name: str) -> str:
-    """A name with nothing in it that a file or a link could mind."""
+    """A name without characters that files or links do not allow."""
     return re.sub(r"[^A-Za-z0-9_.]+", "-", name).strip("-.") or "unnamed"
 
 
 def require_distinct(names: Iterable[str], whose: str) -> None:
-    """Raises: OptionError where two would have the same file."""
+    """Raise an OptionError if two names would have the same file."""
     seen: set[str] = set()
     for name in names:
         if file_name(name).lower() in seen:
@@ -157,7 +162,7 @@ def _encoded(picture: Picture, path: str) -> Image:
 
 
 def sheet_of(table: Table, path: str) -> Sheet:
-    """A table in words. Raises: OptionError for rows of a wrong length."""
+    """A table as text. Raises: OptionError for rows of a wrong length."""
     for row in table.rows:
         if len(row) != len(table.columns):
             raise OptionError(

@@ -1,4 +1,4 @@
-"""All claims, each with what was found about it, in one list."""
+"""All claims with their findings, and how many of them agree."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from lab.experiments import CLAIMS, Claim, Experiment, Finding, Results, Section
 from taichi_soft.core.errors import OptionError
 
 Concluded = tuple[Experiment, Results, Section]
-"""An experiment, its points and what follows from them."""
+"""An experiment, its results, and its section of the report."""
 
 NOT_MEASURED = "not measured"
 OUTCOMES = (*(verdict.value for verdict in Verdict), NOT_MEASURED)
-"""What can be said of a claim, in words."""
+"""Outcomes of a claim, in words."""
 
-OF_MANY = {name: name for name in OUTCOMES} | {
-    "agrees": "agree",
-    "agrees in part": "agree in part",
-    "differs": "differ",
-}
-"""The same of several claims."""
+PLURAL = {"agrees": "agree", "agrees in part": "agree in part", "differs": "differ"}
+"""Outcomes of several claims, if the words differ from those of one."""
+
+KINDS = {True: "claims of the thesis", False: "statements of theory"}
+"""Names of the two kinds of claims, by `Claim.is_of_thesis`."""
 
 CHAPTERS = {
     "3": "Chapter 3, Computational physics",
     "4": "Chapter 4, CMPM",
     "5": "Chapter 5, Shear by volume preservation",
     "6": "Chapter 6, Three-dimensional springs",
+    "7": "Chapter 7, Conclusion",
 }
 THEORY = "Beyond the thesis: theory"
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim and all findings about it, each with the experiment that it comes from."""
+    """A claim and all findings about it, each with its experiment."""
 
     key: str
     claim: Claim
@@ -42,7 +42,7 @@ class Judgement:
 
     @property
     def outcome(self) -> str:
-        """One of `OUTCOMES`; of several findings the least favourable one decides."""
+        """One of `OUTCOMES`. The least favourable of several findings decides."""
         verdicts = [finding.verdict for _, finding in self.findings]
         for verdict in (Verdict.DIFFERS, Verdict.UNKNOWN, Verdict.PARTLY, Verdict.AGREES):
             if verdict in verdicts:
@@ -51,13 +51,13 @@ class Judgement:
 
     @property
     def chapter(self) -> str:
-        """Of the thesis, by the number of its section or figure."""
+        """Heading of its chapter of the thesis, or that of theory."""
         number = re.match(r"(?:chapter|section|figure) (\d)", self.claim.source)
         return CHAPTERS.get(number.group(1), THEORY) if number else THEORY
 
 
 def judge(sections: Sequence[Concluded]) -> list[Judgement]:
-    """Every claim there is, in order. Raises: OptionError for a finding about no claim."""
+    """All claims in their order, with their findings. Raises: OptionError for a finding about no claim."""
     found: dict[str, list[tuple[Experiment, Finding]]] = {key: [] for key in CLAIMS}
     for experiment, _, section in sections:
         for finding in section.findings:
@@ -69,6 +69,15 @@ def judge(sections: Sequence[Concluded]) -> list[Judgement]:
     return [Judgement(key, claim, tuple(found[key])) for key, claim in CLAIMS.items()]
 
 
-def counts(judgements: Sequence[Judgement]) -> dict[str, int]:
-    """How many claims have each outcome, in the order of `OUTCOMES`."""
-    return {name: sum(each.outcome == name for each in judgements) for name in OUTCOMES}
+def counts(judgements: Sequence[Judgement]) -> dict[str, dict[str, int]]:
+    """Number of claims with each outcome, in the order of `OUTCOMES`, by the names in `KINDS`."""
+    found = {}
+    for is_of_thesis, kind in KINDS.items():
+        outcomes = [each.outcome for each in judgements if each.claim.is_of_thesis is is_of_thesis]
+        found[kind] = {name: outcomes.count(name) for name in OUTCOMES}
+    return found
+
+
+def in_words(outcome: str, number: int) -> str:
+    """The outcome of a number of claims: "1 agrees", "2 agree"."""
+    return f"{number} {outcome if number == 1 else PLURAL.get(outcome, outcome)}"

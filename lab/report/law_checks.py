@@ -1,4 +1,4 @@
-"""Every law in the checks against theory, in one table: what springs cannot do beside what tetrahedra can."""
+"""Table of every law in the checks against theory."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from taichi_soft import LAWS
 from taichi_soft.core.types import LawName
 
 Values = Mapping[str, float]
-"""By law."""
+"""Numbers by law."""
 
 THEORY = "theory"
 DEPTH = 1
-"""Of `DEPTHS`, small enough for Hertz and deep enough for the mesh."""
+"""Index in `DEPTHS`: small enough for Hertz, and deep enough for the mesh."""
 
 
 def law_table(sections: Sequence[Concluded]) -> Table | None:
-    """A row for each law, a column for each check that was made; None where none was."""
+    """A row for each law, a column for each check that was made; None without any."""
     results = {experiment.name: results for experiment, results, _ in sections}
     checks: dict[str, tuple[float, Values]] = {}
     if "patch-test" in results:

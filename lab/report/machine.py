@@ -1,4 +1,4 @@
-"""What a report was made with."""
+"""Facts about the machine and the packages of a report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PACKAGES = ("taichi-soft", "taichi", "numpy", "scipy", "scikit-fem")
 
 
 def machine_facts(arch: str) -> dict[str, str]:
-    """Names and values for people: `arch` as Taichi knows it."""
+    """Facts to print, by name. `arch` is Taichi's name of the device."""
     return {
         "device": f"{arch}, one thread per process",
         "processor": f"{_processor()}, {os.cpu_count()} cores",
@@ -22,7 +22,7 @@ def machine_facts(arch: str) -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Its name, where the system tells."""
+    """Name of the processor, if the system reports one."""
     information = Path("/proc/cpuinfo")
     if information.exists():
         for line in information.read_text().splitlines():

@@ -1,4 +1,4 @@
-"""Text that Markdown takes literally."""
+"""Escape text for Markdown."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 
 
 class Literal(str):
-    """Text that is Markdown already, or the path of a file with nothing in it to escape."""
+    """Text that needs no escape: Markdown, or the path of a file."""
 
 
 def escaped(value: Any) -> str:
-    """Any value as words in one line, none of which means anything to Markdown, in tables neither."""
+    """A value as one line of text that Markdown prints literally, also in tables."""
     if isinstance(value, Literal):
         return value
     text = " ".join(str(value).split())
     text = re.sub(r"([\\`*_\[\]<>|&~$])", r"\\\1", text)
-    # At the beginning of a line: headings and underlines of headings, lists, numbered lists.
+    # At the start of a line: headings and underlines of headings, lists, numbered lists.
     return re.sub(r"^(?=#|[-+](?:\s|$)|[-=]+$)|^(\d+)(?=[.)](?:\s|$))", lambda at: (at[1] or "") + "\\", text)

@@ -1,4 +1,4 @@
-"""The report: one page that holds everything, the same in Markdown, and every number as CSV."""
+"""The report: one self-contained page, the same in Markdown, and every number as CSV."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from lab.experiments import CLAIMS, Effort
 from lab.extras import require_report
 from lab.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
-from lab.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
+from lab.report.judgements import Concluded, Judgement, counts, in_words, judge
 from lab.report.law_checks import law_table
 from lab.report.markdown import Literal, escaped
 from lab.report.spreadsheets import csv_of_judgements
@@ -24,17 +24,17 @@ TEMPLATES = Path(__file__).parent / "templates"
 def write_report(
     sections: Sequence[Concluded], directory: Path, command: str, effort: Effort, facts: dict[str, str]
 ) -> Path:
-    """Write what experiments showed, in the order given.
+    """Write the sections in the given order.
 
     Args:
-        directory: of `report.html` and `report.md`, `verdicts.csv`, and the folders `plots`, `pictures`,
-            `tables` and `points`. It is made if it is missing; other files in it stay.
-        command: that makes this report again.
-        facts: names and values: the machine, versions.
+        directory: folder for `report.html`, `report.md` and `verdicts.csv`, and for the folders `plots`,
+            `pictures`, `tables` and `points`. It is created if it is missing. Other files in it stay.
+        command: command line that repeats this report.
+        facts: names and values of the machine and of versions.
     Returns: the path of `report.html`, which needs no other file.
     Raises: OptionError without the extra `lab`, for names used twice, findings about no claim, rows or
-        pictures of a wrong shape, and a directory that takes no files. What was there before is then still
-        whole.
+        pictures of a wrong shape, and a directory that cannot be written. Existing files then stay as they
+        are.
     """
     require_report()
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
@@ -48,7 +48,6 @@ def write_report(
         "judgements": judgements,
         "chapters": list(dict.fromkeys(each.chapter for each in judgements)),
         "counts": counts(judgements),
-        "plural": OF_MANY,
         "exhibits": exhibits,
         "sheets": sheets,
         "seconds": sum(each.seconds for each in exhibits),
@@ -64,7 +63,7 @@ def write_report(
 
 
 def _filled(name: str, values: dict[str, Any]) -> str:
-    """A template with its values, each escaped as the format wants it."""
+    """A template with its values, each escaped for the format."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     is_html = name.endswith(".html")
@@ -77,14 +76,16 @@ def _filled(name: str, values: dict[str, Any]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(duration=duration, point_line=point_line, file_name=file_name, raw=Literal)
+    environment.filters.update(
+        duration=duration, point_line=point_line, file_name=file_name, in_words=in_words, raw=Literal
+    )
     return environment.get_template(name).render(values)
 
 
 def _data_files(
     exhibits: Sequence[Exhibit], judgements: Sequence[Judgement], sheets: Sequence[Sheet]
 ) -> dict[str, bytes]:
-    """All files but the pages, by their paths in the directory."""
+    """All files except the pages, by their paths in the directory."""
     texts = {"verdicts.csv": csv_of_judgements(judgements)} | {sheet.path: sheet.csv for sheet in sheets}
     files: dict[str, bytes] = {}
     for each in exhibits:
@@ -95,7 +96,7 @@ def _data_files(
 
 
 def _replace(directory: Path, files: dict[str, bytes]) -> None:
-    """Write all files beside their places, and move them there when all are whole."""
+    """Write all files under temporary names, and rename them when all are complete."""
     parts: dict[Path, Path] = {}
     try:
         for path, data in files.items():
@@ -103,7 +104,7 @@ def _replace(directory: Path, files: dict[str, bytes]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             parts[target] = target.with_name(f".{target.name}.part")
             parts[target].write_bytes(data)
-        for target, part in parts.items():  # the pages come last
+        for target, part in parts.items():  # the pages last
             os.replace(part, target)
     except OSError as error:
         raise OptionError(f"cannot write the report to {directory}: {error.strerror or error}") from error

@@ -8,13 +8,13 @@ import warnings
 from lab.experiments import Plot
 
 SCALE = 2
-"""Pixels of the file per pixel of the page, at 96 pixels per inch: sharp on fine screens."""
+"""Pixels of the file per pixel of the page, at 96 pixels per inch: sharp on high-resolution screens."""
 
 COLOURS_OF_A_FILE = 128
-"""Lines and letters of a plot need no more, smoothed as they are."""
+"""Enough for the anti-aliased lines and letters of a plot."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's, told apart by the colour-blind too; without yellow, which is pale on white."""
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish; without yellow, pale on white."""
 
 STYLE = {
     "font.size": 11,
@@ -45,7 +45,7 @@ STYLE = {
 def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
     """A plot as PNG, and its size on the page [pixels].
 
-    Raises: MissingPointError where a point that it needs is missing.
+    Raises: MissingPointError if a point that it needs is missing.
     """
     import matplotlib
     from cycler import cycler
@@ -72,7 +72,7 @@ def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
 
 
 def _with_palette(file: io.BytesIO) -> bytes:
-    """The same picture in a third of the bytes."""
+    """The same image with a palette, in a third of the bytes."""
     from PIL import Image  # which matplotlib brings with it
 
     smaller = io.BytesIO()

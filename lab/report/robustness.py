@@ -1,4 +1,4 @@
-"""The sweep of `drop-test`: its cells computed and kept, counted by law, and shown."""
+"""The sweep of `drop-test`: compute and store its cells, count them by law, and print them."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from taichi_soft.core.types import ArchName
 from taichi_soft.meshing.delaunay import scipy_spatial
 
 TIME_LIMIT = 600.0
-"""Of a cell [s]; one that takes longer has no result, and is tried again."""
+"""Longest time of a cell [s]. A longer one has no result, and is retried."""
 
 SOFT_MACH, SOFT_SAG = 0.5, 0.1
-"""Above which it is said beside a verdict: what hits the floor at its own speed of sound must be crushed."""
+"""Limits above which a line names them: a body that hits the floor at its speed of sound is crushed."""
 
 COLUMNS = (
     Verdict.OK,
@@ -42,26 +42,27 @@ COLUMNS = (
 )
 
 CRITERION = (
-    "Every body is built with what its row names and nothing else. A body that is dropped falls "
-    f"{DROP:g} m and is watched for {DROP_TIME:g} s. A wreck has {RECOVERY_TIME:g} s in which to have no "
-    f"tetrahedron inside out for {CALM_TIME:g} s. Then gravity ends and it comes to rest, braked. "
-    "Frozen: it says so, or its positions are not finite. Inverted: tetrahedra inside out at the end. "
-    f"Runaway: faster at the end than {SPEED_TOLERANCE:g} times what the fall can give. Misshapen: farther "
-    f"from its rest shape than {100 * SHAPE_TOLERANCE:g} % of its size, as root mean square with rigid "
-    "motion taken out. Too soft: inverted, and the library warned that it does not bear its own weight. "
-    f"Too slow, and not tried: more than {MOST_SUBSTEPS} substeps for 1/60 s, or "
-    f"{MOST_WORK:.0e} substeps of tetrahedra in all. Refused: the library raised an error when it was built."
+    "Every body is built with the options that its row names and with defaults for the rest. A dropped body "
+    f"falls {DROP:g} m and is simulated for {DROP_TIME:g} s. A wreck is a body that starts strongly "
+    f"deformed. Within {RECOVERY_TIME:g} s it must have no inverted tetrahedron for {CALM_TIME:g} s. Then "
+    "gravity is switched off, and it comes to rest with strong damping. Frozen: the body reports it, or its "
+    "positions are not finite. Inverted: inverted tetrahedra at the end. Runaway: at the end faster than "
+    f"{SPEED_TOLERANCE:g} times the fastest speed of the fall. Misshapen: the distance from its rest shape "
+    f"is more than {100 * SHAPE_TOLERANCE:g} % of its size, as a root mean square without rigid motion. Too "
+    "soft: inverted, and the library warned that it cannot bear its own weight. Too slow, and not tried: "
+    f"more than {MOST_SUBSTEPS} substeps for 1/60 s, or {MOST_WORK:.0e} substeps of tetrahedra in total. "
+    "Refused: the library raised an error when it was built."
 )
 
 
 def run_sweep(
     cells: Sequence[Cell], folder: Path, console: Console, *, workers: int | None, arch: ArchName
 ) -> list[Result]:
-    """Compute cells that are not in `folder` yet, and keep each there as soon as it is done; group by group.
+    """Compute the cells that are not in `folder` yet, group by group, and store each at once.
 
     Args:
-        workers: processes; None for one for each core.
-    Raises: OptionError before anything is computed, where scipy is wanted and not installed; SweepError for
+        workers: number of processes; None: one for each core.
+    Raises: OptionError before anything is computed, if scipy is needed and not installed; SweepError for
         files that are not of a sweep, or cannot be written.
     """
     groups = [name for name in (*GROUPS, "random wrecks") if any(cell["group"] == name for cell in cells)]
@@ -92,18 +93,18 @@ def _experiment(name: str, cells: list[Cell]) -> Experiment:
 
 
 def verdict_of(row: Result) -> Verdict:
-    """What became of a cell."""
+    """Verdict of a cell."""
     return Verdict.NO_RESULT if row.numbers is None else Verdict(row.numbers["verdict"])
 
 
 def is_broken(row: Result) -> bool:
-    """Whether a game that names no law would have a broken body there, or nothing is known."""
+    """True if the default law fails there, or there is no result."""
     fine = (Verdict.OK, Verdict.TOO_SOFT, Verdict.TOO_SLOW, Verdict.REFUSED)
     return row.point["law"] is None and verdict_of(row) not in fine
 
 
 def counts_by_law(rows: Sequence[Result]) -> dict[tuple[str, str, str, str], Counter[Verdict]]:
-    """How many cells of a group, law, flips and damping have each verdict, in the order of the rows."""
+    """Number of cells with each verdict by group, law, flips and damping, in the order of the rows."""
     found: dict[tuple[str, str, str, str], Counter[Verdict]] = {}
     for row in rows:
         cell = row.point
@@ -113,7 +114,7 @@ def counts_by_law(rows: Sequence[Result]) -> dict[tuple[str, str, str, str], Cou
 
 
 def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
-    """The table, and before it, of each group and verdict, the first cells that are not well."""
+    """Print the first failed cells of each group and verdict, and the table."""
     grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for heading in ("group", "law", "flips", "damping"):
         grid.add_column(heading, no_wrap=True)
@@ -135,7 +136,7 @@ def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
 
 
 def _unwell(rows: Sequence[Result]) -> list[Result]:
-    """Those of a game that names no law and are not well; where only others were asked for, of these."""
+    """Cells of the default law that are not ok; without any of these, those of the other laws."""
     unwell = [row for row in rows if verdict_of(row) is not Verdict.OK]
     if any(row.point["law"] is None for row in rows):
         return [row for row in unwell if row.point["law"] is None]
@@ -143,7 +144,7 @@ def _unwell(rows: Sequence[Result]) -> list[Result]:
 
 
 def line_of(row: Result) -> str:
-    """A cell, its verdict and why, in one line."""
+    """A cell, its verdict and its reason, in one line."""
     cell, numbers = row.point, row.numbers or {}
     law = " ".join(word for word in (cell["law"] or "default", cell["flips"], cell["damping"]) if word)
     reason = numbers.get("reason", row.error)
@@ -157,14 +158,14 @@ def line_of(row: Result) -> str:
 
 
 def write_page(rows: Sequence[Result], path: Path, command: str, arch: ArchName) -> None:
-    """The table, what is not well, and the meshes, as Markdown. Raises: OSError."""
+    """Write the table, the cells that are not ok, and the meshes as Markdown. Raises: OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(_page(rows, command, arch)) + "\n", encoding="utf-8")
 
 
 def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]:
     facts = machine_facts(arch)
-    yield "# Which bodies hold"
+    yield "# Which bodies stay whole"
     yield ""
     yield (
         f"Made on {date.today().isoformat()} by `{command}`, version {facts['taichi-soft']} of the sources "
@@ -182,13 +183,13 @@ def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]
     )
     unwell = _unwell(rows)
     if unwell:
-        yield "## What does not hold"
+        yield "## Failures"
         yield ""
         yield from (f"- {escaped(line_of(row))}" for row in unwell)
         yield ""
     yield "## Meshes"
     yield ""
-    yield "Of every body as it was built first; substeps are those of 1/60 s that the library chose."
+    yield "Facts of each mesh from its first body. Substeps are those of 1/60 s that the library chose."
     yield ""
     yield from _table(
         ["group", "mesh", "tetrahedra", "smallest dihedral angle", "substeps"], 2, _meshes(rows)
@@ -196,7 +197,7 @@ def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]
 
 
 def _meshes(rows: Sequence[Result]) -> list[list[str | int]]:
-    """Facts of each mesh, of the first cell that has it."""
+    """Facts of each mesh, from its first cell."""
     found: dict[tuple[str, str, float], list[str | int]] = {}
     for row in rows:
         cell, numbers = row.point, row.numbers
@@ -208,7 +209,7 @@ def _meshes(rows: Sequence[Result]) -> list[list[str | int]]:
 
 
 def _table(headings: Sequence[str], words: int, rows: Sequence[Sequence[object]]) -> Iterator[str]:
-    """A table of Markdown; columns after the first `words` hold numbers."""
+    """A Markdown table; columns after the first `words` hold numbers."""
     yield _line(headings)
     yield f"|{'---|' * words}{'---:|' * (len(headings) - words)}"
     yield from map(_line, rows)

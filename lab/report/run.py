@@ -1,4 +1,4 @@
-"""Experiments chosen by name, measured point by point, and concluded."""
+"""Choose experiments by name, measure their points, and conclude."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from taichi_soft.core.types import ArchName
 
 
 def choose_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Experiments in the order of the report, all of them where no name is given. Raises: OptionError."""
+    """Experiments in the order of the report, all of them if no name is given. Raises: OptionError."""
     for name in names:
         if name not in EXPERIMENTS:
             raise OptionError(f"unknown experiment {name!r}: {choose_one_of(EXPERIMENTS, name)}")
@@ -48,7 +48,7 @@ def choose_experiments(names: Sequence[str]) -> list[Experiment]:
 
 
 def require_writable(folder: Path) -> None:
-    """Make `folder` and write into it. Raises: OptionError."""
+    """Create `folder` and check that files can be written there. Raises: OptionError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -71,11 +71,13 @@ def run_experiments(
 ) -> list[Concluded]:
     """Measure all points that are not in `folder` yet, and conclude.
 
-    What is done is in `folder` at once, whatever interrupts this. Points that failed before are tried again.
+    Each result is stored in `folder` at once, so that an interrupted report resumes. Points that failed are
+    retried.
+
     Args:
-        console: for progress, and for what went wrong with single points.
-        workers: processes on this machine, or, where None, one for each core.
-        time_limit: of a point [s].
+        console: for progress, and for the errors of single points.
+        workers: number of processes; None: one for each core.
+        time_limit: longest time of a point [s].
     Raises: SweepError before anything is computed, for files that cannot be used.
     """
     points = {experiment.name: experiment.points(effort) for experiment in experiments}
@@ -84,7 +86,7 @@ def run_experiments(
         for name in points:
             stores[name] = store = stack.enter_context(closing(Store(folder / f"{name}.jsonl", origin(arch))))
             if store.set_aside is not None:
-                _note(console, f"{name}: results of other code are now in {store.set_aside}")
+                _note(console, f"{name}: results of other code were moved to {store.set_aside}")
         tasks = [
             Task(each.name, each.measure, point, each.is_timing)
             for each in experiments
@@ -92,7 +94,7 @@ def run_experiments(
             if _outcome(stores[each.name], point).numbers is None
         ]
         total = sum(map(len, points.values()))
-        known = f", {total - len(tasks)} of them measured before: {folder}" if len(tasks) < total else ""
+        known = f", {total - len(tasks)} of them measured before, in {folder}" if len(tasks) < total else ""
         _note(console, f"{total} points of {len(experiments)} experiments{known}")
         if tasks:
             outcomes = stack.enter_context(
@@ -101,7 +103,7 @@ def run_experiments(
             try:
                 _keep_all(outcomes, len(tasks), stores, console)
             except KeyboardInterrupt:
-                _note(console, f"what was computed is kept in {folder}: the same command goes on from there")
+                _note(console, f"the results so far are in {folder}: run the same command to resume")
                 raise
         return [_conclude(each, _results(points[each.name], stores[each.name])) for each in experiments]
 
@@ -126,7 +128,7 @@ def _results(points: Sequence[Point], store: Store) -> Results:
 
 
 def _conclude(experiment: Experiment, results: Results) -> Concluded:
-    """A conclusion that breaks where points are missing has nothing to tell."""
+    """Conclude. If that fails and points are missing, the claims cannot be told."""
     try:
         return experiment, results, _legible(section_of(experiment, results))
     except Exception as error:

@@ -11,7 +11,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from lab.experiments import CLAIMS, Experiment, Results, Section, Table
-from lab.report.judgements import NOT_MEASURED, OF_MANY, Judgement, counts
+from lab.report.judgements import NOT_MEASURED, Judgement, counts, in_words
 from lab.report.wording import duration, numeric_columns, point_line, readable
 
 COLOURS = {
@@ -22,14 +22,14 @@ COLOURS = {
     "not measured": "dim",
 }
 MOST_ROWS = 20
-"""Of a table; all of them are in the report."""
+"""Rows of a table that are printed; the report has all of them."""
 
 BETWEEN, WIDEST = 3, 40
-"""Letters between two columns; letters of a cell that are not wrapped."""
+"""Characters between two columns, and of the longest cell that is not wrapped."""
 
 
 def print_section(console: Console, experiment: Experiment, results: Results, section: Section) -> None:
-    """Everything of a section but its images."""
+    """Print a section without its images."""
     failed = results.failed
     console.print()
     console.print(Text(experiment.title, style="bold"))
@@ -57,7 +57,7 @@ def print_section(console: Console, experiment: Experiment, results: Results, se
 
 
 def print_verdicts(console: Console, rows: Sequence[Judgement]) -> None:
-    """Claims with their verdicts, the names of those not measured, and how many there are of each kind."""
+    """Print the claims with their verdicts, the names of those not measured, and how many agree."""
     grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, expand=True)
     grid.add_column("verdict", no_wrap=True)
     grid.add_column("claim", ratio=1)
@@ -77,9 +77,10 @@ def print_verdicts(console: Console, rows: Sequence[Judgement]) -> None:
     if missing:
         console.print()
         console.print(_coloured(NOT_MEASURED) + Text(f": {missing}"))
-    told = [Text(f"{number} {OF_MANY[name]}", style=COLOURS[name]) for name, number in counts(rows).items()]
     console.print()
-    console.print(Text(f"{len(rows)} claims: ") + Text(", ").join(told))
+    for kind, numbers in counts(rows).items():
+        words = [Text(in_words(name, number), style=COLOURS[name]) for name, number in numbers.items()]
+        console.print(Text(f"{sum(numbers.values())} {kind}: ") + Text(", ").join(words))
 
 
 def _coloured(outcome: str) -> Text:
@@ -87,7 +88,7 @@ def _coloured(outcome: str) -> Text:
 
 
 def _print_table(console: Console, table: Table) -> None:
-    """A table; one too wide for the console in several parts, each with the first column."""
+    """Print a table. If it is too wide for the console, print several parts, each with the first column."""
     shown = table.rows[:MOST_ROWS]
     cells = [[readable(value) for value in row] for row in shown]
     right = numeric_columns(table.rows, len(table.columns))
@@ -107,7 +108,7 @@ def _print_table(console: Console, table: Table) -> None:
 
 
 def _parts(columns: Sequence[str], cells: Sequence[Sequence[str]], width: int) -> Iterator[list[int]]:
-    """Columns that fit side by side if only headings and long cells are wrapped."""
+    """Groups of columns that fit side by side if only headings and long cells are wrapped."""
     needed = [
         BETWEEN
         + min(WIDEST, max(len(word) for word in [*columns[k].split(), *(row[k] for row in cells), ""]))

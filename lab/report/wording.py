@@ -1,4 +1,4 @@
-"""Numbers, points and durations as people read them."""
+"""Numbers, points and durations as text."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ def plain(value: Any) -> Any:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> tuple[bool, ...]:
-    """Which of `count` columns hold numbers, in digits or words of digits, and nothing else but empty cells:
-    they belong to the right."""
+    """True for each of `count` columns with nothing but numbers and empty cells: aligned to the right."""
     columns = [[plain(row[k]) for row in rows] for k in range(count)]
     filled = [[value for value in column if value is not None and value != ""] for column in columns]
     return tuple(bool(column) and all(_is_number(value) for value in column) for column in filled)
@@ -37,7 +36,7 @@ def _is_number(value: Any) -> bool:
 
 
 def readable(value: Any) -> str:
-    """A cell of a table: four digits of a number, words for what is true, a dash for nothing."""
+    """A cell of a table: a number with four digits, yes or no for a boolean, a dash for None."""
     value = plain(value)
     if value is None:
         return "–"
@@ -58,7 +57,7 @@ def _digits(value: float) -> str:
 
 
 def legible(text: str) -> str:
-    """A text with its numbers as people write them: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
+    """A text with readable numbers: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
     return re.sub(r"(?<![\w.])(\d)(?:\.(\d+))?e([+-]\d+)", _plain_power, text)
 
 

@@ -1,6 +1,6 @@
-"""Points computed in processes of this machine, and kept as soon as they are there.
+"""Compute points in processes of this machine, and store each result at once.
 
-A point is plain data, and so is what a function measures there. Nothing here knows what either is about.
+A point and its result are plain data. This package does not interpret either.
 """
 
 from lab.sweep.progress import show_progress

@@ -1,4 +1,4 @@
-"""How far a sweep has come, for people."""
+"""Progress of a sweep on the console."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 LINE_EVERY = 30.0
-"""A line where there is no terminal for a bar [s]."""
+"""Interval between lines without a terminal [s]."""
 
 
 class Advance(Protocol):
-    """One more is done, of the kind `name`."""
+    """Callback: one more point of the group `name` is done."""
 
     def __call__(self, name: str) -> None: ...
 
 
 @contextmanager
 def show_progress(console: Console, total: int) -> Iterator[Advance]:
-    """A bar with the time left, in a terminal; elsewhere a line now and then."""
+    """Show a bar with the time left in a terminal, and a line every `LINE_EVERY` elsewhere."""
     columns: tuple[Any, ...] = (
         TextColumn("{task.description}"),
         BarColumn(),

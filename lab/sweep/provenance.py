@@ -1,4 +1,4 @@
-"""What results were computed with."""
+"""Origin of results: sources, versions and device."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
 _ABOVE = {"report", "cli", "__main__.py"}
-"""What lies above the experiments: it shows results, and cannot change them."""
+"""Layers above the experiments: they show results, and cannot change them."""
 
 
 def origin(arch: str) -> dict[str, str]:
-    """Return what results depend on: a digest of the sources, versions, the device."""
+    """Return the origin of results: a digest of the sources, versions, and the device."""
     return {"sources": _digest(), "taichi": version("taichi"), "numpy": version("numpy"), "arch": arch}
 
 

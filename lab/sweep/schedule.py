@@ -1,4 +1,4 @@
-"""Which point is computed next, and by whom."""
+"""Assign points to processes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TIME_LIMIT = 1800.0
 """Longest time of a point [s]."""
 
 LOOK = 0.5
-"""Time limits are looked at this often, and Ctrl-C is where it does not interrupt a wait [s]."""
+"""Interval at which time limits are checked, and Ctrl-C where it does not interrupt a wait [s]."""
 
 
 def compute_all(
@@ -24,14 +24,14 @@ def compute_all(
     arch: ArchName = "cpu",
     time_limit: float = TIME_LIMIT,
 ) -> Generator[tuple[Task, Outcome], None, None]:
-    """Compute points and yield them as they are done; those that have to be alone last, one after the other.
+    """Compute points and yield them as they are done. Those that have to run alone come last, one by one.
 
-    The outcome of a point says what went wrong: an error, a process that was lost, too long a time. Closing
-    the iterator stops what is being computed: use `contextlib.closing`.
+    The outcome of a point that failed has the error: an exception, a lost process, or a timeout. Closing
+    the iterator stops the computation: use `contextlib.closing`.
 
     Args:
-        workers: processes of one thread each, started when they are needed; None: one for each core.
-        time_limit: of a point [s].
+        workers: number of processes of one thread each, started when needed; None: one for each core.
+        time_limit: longest time of a point [s].
     """
     crew = [Worker(arch, time_limit) for _ in range(workers or len(available_cores()))]
     try:
@@ -63,7 +63,7 @@ def _compute(tasks: Sequence[Task], crew: Sequence[Worker]) -> Iterator[tuple[Ta
 
 
 class Waiting:
-    """Points not yet begun, by group."""
+    """Points not yet started, by group."""
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self._groups: dict[str, list[Task]] = {}
@@ -72,8 +72,11 @@ class Waiting:
             self._groups.setdefault(task.group, []).append(task)
 
     def take(self, known: set[str]) -> Task | None:
-        """The next point for a worker that has computed points of the groups `known`, which is added to: of
-        these, or of a group that nobody has begun, or else of the one with most points left."""
+        """Take the next point for a worker that has computed points of the groups `known`.
+
+        It is one of these groups, or else of one that no worker has started, or else of the group with most
+        points left. The group is added to `known`.
+        """
         left = [name for name, tasks in self._groups.items() if tasks]
         if not left:
             return None

@@ -1,4 +1,4 @@
-"""Points that were computed, in a file: what was interrupted goes on where it stopped."""
+"""Results of points in a file, so that an interrupted sweep resumes."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ FORMAT = "taichi-soft sweep 1"
 
 
 class SweepError(TaichiSoftError, RuntimeError):
-    """Points cannot be kept as asked."""
+    """Results cannot be stored."""
 
 
 class Store:
-    """Outcomes by point, in a file of JSON lines: one that says what they were computed with, then one each.
+    """Outcomes by point, in a file of JSON lines: a header with the origin, then one line for each point.
 
-    A last line that was cut off is dropped, and its point computed again. Results of another origin are not
-    mixed in: their file is renamed.
+    An incomplete last line is dropped, and its point computed again. A file of another origin is renamed.
 
     Args:
-        origin: what results are computed with, as `sweep.origin` has it.
+        origin: sources, versions and device of the results, from `sweep.origin`.
     Attributes:
-        set_aside: where results of another origin are now, or None.
+        set_aside: new path of the results of another origin, or None.
     Raises: SweepError where the file is not one of these, which is then left as it is, or cannot be written.
     """
 
@@ -46,11 +45,11 @@ class Store:
             raise self._refusal(error) from error
 
     def get(self, point: Mapping[str, Any]) -> Outcome | None:
-        """What came of a point, None where it is yet to be computed."""
+        """Outcome of a point; None if it was not computed yet."""
         return self._outcomes.get(_key(point))
 
     def keep(self, point: Mapping[str, Any], outcome: Outcome) -> None:
-        """Keep what came of a point, over what may have come of it before. Raises: SweepError."""
+        """Store the outcome of a point in place of an earlier one. Raises: SweepError."""
         self._outcomes[_key(point)] = outcome
         try:
             self._append({"point": point, **vars(outcome)})
@@ -58,7 +57,7 @@ class Store:
             raise self._refusal(error) from error
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         self._file.close()
 
     def _append(self, row: Mapping[str, Any]) -> None:
@@ -66,7 +65,7 @@ class Store:
         self._file.flush()
 
     def _read(self, header: Mapping[str, Any]) -> int:
-        """Take up what is there; the length of what stays of it [bytes]."""
+        """Read the existing results; return the length of the part to keep [bytes]."""
         data = self.path.read_bytes()
         length = data.rfind(b"\n") + 1
         lines = data[:length].splitlines()
@@ -128,7 +127,7 @@ def _key(point: Mapping[str, Any]) -> str:
 
 
 def _checked(outcome: Outcome) -> Outcome:
-    """`outcome` as it was read, if its values are of their types. Raises: TypeError."""
+    """Return `outcome` if its values have their types. Raises: TypeError."""
     if not (
         isinstance(outcome.numbers, dict | None)
         and isinstance(outcome.error, str)

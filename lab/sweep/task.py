@@ -1,4 +1,4 @@
-"""What is to be computed, and what came of it."""
+"""Tasks and their outcomes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Task:
 
     Args:
         group: points of the same group share compiled kernels, and are best computed in the same process.
-        function: from the point to what was measured, both plain data. Other processes find it by its name.
-        is_alone: nothing else may run meanwhile.
+        function: function of the point that returns plain data. Other processes import it by its name.
+        is_alone: True if nothing else may run at the same time.
     """
 
     group: str
@@ -32,7 +32,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a point: numbers, or None and the reason."""
+    """Outcome of a point: numbers, or None and an error."""
 
     numbers: dict[str, Any] | None
     error: str = ""
@@ -44,8 +44,8 @@ def compute(
 ) -> Outcome:
     """Compute a point in this process, on one thread of the CPU or on `arch`.
 
-    What was measured goes through JSON: it is the same whether it comes from a process or from a file.
-    Warnings are not shown: experiments leave on purpose what games are warned about.
+    Results are converted to JSON and back, so that they are the same from a process and from a file.
+    Warnings are not shown: experiments deliberately do what games are warned about.
     """
     start = time.perf_counter()
     try:
@@ -62,7 +62,7 @@ def compute(
 
 
 def _line_of(error: Exception) -> str:
-    """What went wrong and where, in one line."""
+    """The error and its place, in one line."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     file = place.filename.replace("\\", "/").rpartition("/")[2]
     return f"{type(error).__name__}: {' '.join(str(error).split())} ({file}:{place.lineno})"

@@ -16,17 +16,17 @@ from taichi_soft.core.types import ArchName
 CONTEXT = multiprocessing.get_context("spawn")
 
 START_LIMIT = 120.0
-"""For a new process to start Python, import this package and start Taichi [s]."""
+"""Time for a new process to start Python, import this package and start Taichi [s]."""
 
 END_LIMIT = 10.0
-"""For a process to end by itself, in which Taichi writes compiled kernels to its cache [s]."""
+"""Time for a process to exit, in which Taichi writes compiled kernels to its cache [s]."""
 
 
 class Worker:
-    """A process that computes one point at a time; where it was lost, the next point starts another one.
+    """A process that computes one point at a time. If it is lost, the next point starts another one.
 
-    `concurrent.futures` would not do: before Python 3.14 it cannot end a process that hangs, it does not say
-    how a process died, and where its own process is killed, it leaves the others behind for ever.
+    `concurrent.futures` is not enough: before Python 3.14 it cannot end a process that hangs, it does not
+    report how a process died, and if its own process is killed, the others stay.
     """
 
     def __init__(self, arch: ArchName, time_limit: float) -> None:
@@ -39,25 +39,25 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """Whether it has a point whose outcome nobody has yet."""
+        """True while it computes a point."""
         return self._task is not None
 
     @property
     def pipe(self) -> Connection:
-        """Can be read as soon as `look` may find something."""
+        """Pipe that is readable as soon as `look` may return an outcome."""
         assert self._pipe is not None
         return self._pipe
 
     def begin(self, task: Task) -> None:
-        """Have a point computed, without waiting for it."""
+        """Start to compute a point, without waiting for it."""
         if self._process is None:
             self._start()
         self._task, self._began = task, time.perf_counter()
-        with suppress(OSError):  # the process is gone: `look` says so
+        with suppress(OSError):  # the process is lost: `look` reports it
             self.pipe.send((task.function, task.point))
 
     def look(self) -> tuple[Task, Outcome] | None:
-        """The point and what came of it; None while it is being computed."""
+        """Return the point and its outcome; None while it is being computed."""
         task = self._task
         assert task is not None
         try:
@@ -80,13 +80,13 @@ class Worker:
         return task, Outcome(None, error, time.perf_counter() - self._began)
 
     def kill(self) -> None:
-        """End the process at once, whatever it computes."""
+        """Kill the process."""
         if self._process is not None:
             self._process.kill()
             self.end()
 
     def end(self) -> str:
-        """Let the process end by itself, and say how it did."""
+        """Wait until the process exits, and return how it ended."""
         if self._process is None:
             return ""
         self.pipe.close()
@@ -98,7 +98,7 @@ class Worker:
         return f"exit code {code}" if code is None or code >= 0 else f"killed by {signal.Signals(-code).name}"
 
     def _start(self) -> None:
-        """The process does not see Ctrl-C: it ends with the pipe."""
+        """Start a process that ignores Ctrl-C: it ends when the pipe is closed."""
         self._is_starting = True
         self._pipe, theirs = CONTEXT.Pipe()
         self._process = CONTEXT.Process(target=_serve, args=(theirs, self._arch), daemon=True)
@@ -113,7 +113,7 @@ class Worker:
 
 
 def _serve(pipe: Connection, arch: ArchName) -> None:
-    """Compute what is sent until nobody is there any more."""
+    """Compute the points that are sent until the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     compute(arch, dict, {})  # starts Taichi
     with suppress(EOFError, ConnectionError):

@@ -68,8 +68,8 @@ class SoftBodyAsset:
         material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
         law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
             along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
-            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4). None:
-            "neo_hookean"; "virial" if `strain` or other `flips` are given, or for an
+            "best_fitting_plane", "split_ring_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
+            None: "neo_hookean"; "virial" if `strain` or other `flips` are given, or for an
             `AnisotropicMaterial`; "springs" for a `SpringMaterial`.
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
         flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None: the

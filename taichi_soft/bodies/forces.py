@@ -79,8 +79,8 @@ def force_gradient(
     """Return the derivative of the elastic forces on a deformed mesh by its vertices, in float64.
 
     It is exact, except for laws of chapter 4. For these, the normals of the planes stay fixed (thesis 4.2),
-    with an error of 0.1 to 0.6 by the sum of squares. "cmpm2" and "best_fitting_plane", which compare
-    directions, use the matrix that "cmpm" would have for an edge with the same normal.
+    with an error of 0.1 to 0.6 by the sum of squares. "cmpm2", "best_fitting_plane" and "split_ring_plane"
+    compare directions. They use the matrix that "cmpm" would have for an edge with the same normal.
     Args:
         mesh, material, positions, law, strain, flips: as for `internal_forces`.
         projected: True for the matrix in implicit Euler's system, symmetric and negative semi-definite.

@@ -38,7 +38,7 @@ class RenderMesh:
     """
 
     def __init__(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:
-        """Made by `Body.render_mesh`.
+        """Use `Body.render_mesh` instead.
 
         Args:
             body: body that it draws.

@@ -28,7 +28,7 @@ class SkinMesh(RenderMesh):
     """
 
     def __init__(self, body: SoftBody, number: int) -> None:
-        """Made by `Body.render_meshes`, from the surface with this number in the asset's skin."""
+        """Use `Body.render_meshes` instead. `number` is that of a surface in the asset's skin."""
         self._body, self._number = body, number
         self._bind()
 

@@ -226,7 +226,7 @@ class SoftBody(Handle):
     """A body without its world. Users hold the subclass `Body`."""
 
     def __init__(self, context: Context, index: int, asset: SoftBodyAsset) -> None:
-        """Made by `World.add_body` and `World.spawn`."""
+        """Use `World.add_body` or `World.spawn` instead."""
         # Weak, so that a dropped world returns its state without waiting for the garbage collector.
         self._context_ref = weakref.ref(context)
         self._asset = asset

@@ -101,7 +101,7 @@ class Collider(Handle):
     """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
 
     def __init__(self, colliders: ColliderSet, index: int, row: ColliderRow) -> None:
-        """Made by `World.add_collider`."""
+        """Use `World.add_collider` instead."""
         self._set = weakref.ref(colliders)
         self._row = row
         self.index = index

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Slice, SoftBody, context_of
-from taichi_soft.control.change import change, named_particles, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, require_per_body, rows_of
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 from taichi_soft.core.checks import as_flag
@@ -175,7 +175,7 @@ def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> A
     require_unattached(body, vertices)
     rows = rows_of(body, vertices)
     if feels:
-        require_substeps(context, "forces on frames (two_way=True)")
+        require_per_body(context, "forces on frames (two_way=True)")
     offsets = body.positions()[vertices].astype(np.float64) - frame.position
     local = turned(offsets, frame.rotation.T.astype(np.float64)).astype(np.float32)
     change(body, attach_particles, body.index, number, int(feels), rows, local)

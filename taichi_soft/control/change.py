@@ -64,7 +64,7 @@ def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     return context_of(body).built.rows_of(body.index, vertices)
 
 
-def require_substeps(context: Context, what: str) -> None:
+def require_per_body(context: Context, what: str) -> None:
     """Raise a StateError if the schedule does not support `what`."""
     if context.settings.schedule is Schedule.FLAT:
         raise StateError(f"schedule 'flat' does not support {what}: make the world with schedule='per_body'")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
-from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of, some_particles
+from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
     add_push,
@@ -41,7 +41,7 @@ def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -
             f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "
             f"stay below {MAX_ACCELERATION:g} m/s^2"
         )
-    require_substeps(context_of(body), "forces")
+    require_per_body(context_of(body), "forces")
     change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
 
 
@@ -62,7 +62,7 @@ def set_gravity_scale(body: SoftBody, scale: float) -> None:
 def set_linear_damping(body: SoftBody, rate: float) -> None:
     """Implement `Body.set_linear_damping`."""
     per_second = as_number(rate, "rate", 0.0, 1e6, "a number from 0 to 1e6 per second")
-    require_substeps(context_of(body), "linear damping")
+    require_per_body(context_of(body), "linear damping")
     change(body, write_linear_damping, body.index, per_second)
 
 
@@ -77,7 +77,7 @@ def set_wind(context: Context, velocity: ArrayLike | None, density: float, drag:
     speed = as_vector(velocity if blows else (0, 0, 0), "velocity", "m/s", VELOCITY_LIMIT)  # type: ignore[arg-type]
     kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
     coefficient = as_number(drag, "drag", 0.0, 1e3)
-    require_substeps(context, "wind")
+    require_per_body(context, "wind")
     if context.built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
         context.built.mark_modified(-1)
 

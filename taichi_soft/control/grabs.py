@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
-from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of
+from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of
 from taichi_soft.control.grab_patch import Patch, patch_around, point_between
 from taichi_soft.control.kernels.grabs import (
     CORNERS,
@@ -190,7 +190,7 @@ def grab_at(
     hertz, limit = as_pull(frequency, max_force)
     omega, mass = 2 * np.pi * hertz, mass_of(body, np.arange(body.vertex_count, dtype=np.int32))
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
-    require_substeps(context_of(body), "grabs")
+    require_per_body(context_of(body), "grabs")
     corners = body.surface[number]
     target = point_between(body.positions()[corners], weights)
     if point is not None:

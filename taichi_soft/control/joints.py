@@ -17,7 +17,14 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     require_alive,
 )
-from taichi_soft.control.change import change, mass_of, named_particles, rows_of, some_particles
+from taichi_soft.control.change import (
+    change,
+    mass_of,
+    named_particles,
+    require_per_body,
+    rows_of,
+    some_particles,
+)
 from taichi_soft.control.embedding import Places, places_at, places_on
 from taichi_soft.control.grab_patch import wave_speed
 from taichi_soft.control.kernels.joints import (
@@ -118,7 +125,7 @@ class Joints(Numbered[Joint]):
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Join two bodies, if possible."""
         context = self.context
-        if other is None or context.settings.is_implicit or not context.built.program.has_contact:
+        if other is None or not context.built.program.has_contact:
             return
         with contextlib.suppress(StateError):  # all joints are in use
             joint = self.join(body, other, [0], [0])
@@ -194,15 +201,7 @@ class Joints(Numbered[Joint]):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
         require_alive(other)
         vertices, places = _find_places(body, other, particles, onto)
-        if context.settings.is_implicit:
-            raise StateError(
-                "implicit_euler does not support joints: make the world with integrator='leapfrog'"
-            )
-        if not context.built.program.has_contact:
-            raise StateError(
-                "joints need a world with contact: make it with soft_contact=True, or with "
-                "collider_room=1 if bodies should not touch each other"
-            )
+        require_per_body(context, "joints")
         free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > JOINT_ROWS:

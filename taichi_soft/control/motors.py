@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of
-from taichi_soft.control.change import change, named_particles, numbers, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, numbers, require_per_body, rows_of
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
     MOTOR_ROWS,
@@ -283,12 +283,7 @@ class Motors(Numbered[Motor]):
                 "leave out point"
             )
         place = None if point is None else as_vector(point, "point", "m")
-        require_substeps(context, "motors")
-        if not context.built.program.has_contact:
-            raise StateError(
-                "motors need a world with contact: give it a collider, soft_contact=True, or collider_room=1 "
-                "if there is only the floor"
-            )
+        require_per_body(context, "motors")
         positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
         drive = Drive(turns, stays, direction / length, place, wanted, limit)
         if not stays:

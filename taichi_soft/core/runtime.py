@@ -1,7 +1,7 @@
 """Start Taichi once.
 
-Every other module imports `ti` from here, so that it is patched before use. Only this module calls
-`ti.init`, which resets every field in the process.
+Every other module takes `ti` from here, after the workarounds of `taichi_soft.core.taichi_workarounds` were
+applied to it. Only this module calls `ti.init`, which resets every field in the process.
 """
 
 from __future__ import annotations
@@ -15,13 +15,9 @@ import logging
 import os
 import shutil
 import tempfile
-import threading
-from _thread import start_new_thread
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from taichi_soft.core.cores import (
@@ -33,26 +29,29 @@ from taichi_soft.core.cores import (
     thread_ids,
 )
 from taichi_soft.core.errors import DeviceError, OptionError
-from taichi_soft.core.first_launch import FIRST_LAUNCHES
-from taichi_soft.core.float_environment import with_usual_floats
-from taichi_soft.core.kernel_cache import await_lock, folder_of
-from taichi_soft.core.known_kernels import KnownKernels
-from taichi_soft.core.taichi_patches import (
-    check_real_functions,
-    choose_by_comparison,
+from taichi_soft.core.taichi_workarounds.cache_lock import await_lock, folder_of
+from taichi_soft.core.taichi_workarounds.calling_threads import (
+    at_home,
+    leave_home,
+    let_threads_in,
+    must_go_home,
+)
+from taichi_soft.core.taichi_workarounds.field_holders import holds_fields
+from taichi_soft.core.taichi_workarounds.importing import ti
+from taichi_soft.core.taichi_workarounds.index_checks import check_real_functions, let_whole_numbers_overflow
+from taichi_soft.core.taichi_workarounds.kernel_keys import (
     code_options,
-    has_pending_fields,
     keep_kernels_apart,
     let_any_number_of_threads_run,
-    let_threads_in,
-    let_whole_numbers_overflow,
-    remember_sources,
-    ti,
 )
+from taichi_soft.core.taichi_workarounds.known_kernels import FIRST_LAUNCHES, KnownKernels
+from taichi_soft.core.taichi_workarounds.min_max import choose_by_comparison
+from taichi_soft.core.taichi_workarounds.real_functions import keep_branches_in_real_functions
+from taichi_soft.core.taichi_workarounds.source_reading import read_sources_once
+from taichi_soft.core.taichi_workarounds.subnormals import give_workers_usual_floats, with_usual_floats
 from taichi_soft.core.threads import in_turn, leave_behind
 from taichi_soft.core.types import ArchName
 from taichi_soft.core.version import VERSION
-from taichi_soft.core.worker_floats import give_workers_usual_floats
 
 __all__ = [
     "Device",
@@ -64,25 +63,16 @@ __all__ = [
     "kernel_folder",
     "make_fields",
     "ti",
+    "with_usual_floats",
 ]
 
 Result = TypeVar("Result")
-Class = TypeVar("Class", bound=type)
 
 DEBUG = "TAICHI_SOFT_DEBUG"
 """Environment variable: 1 turns on index checks in kernels, which are slow and only for tests."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
-
-
-def holds_fields(cls: Class) -> Class:
-    """Decorate a class so that kernels take an object with all its fields as one argument.
-
-    It replaces `ti.data_oriented` for classes without kernels, which slows down every attribute access.
-    """
-    cls._data_oriented = True  # type: ignore[attr-defined]
-    return cls
 
 
 @dataclass(frozen=True)
@@ -105,9 +95,6 @@ _log = logging.getLogger(__name__)
 _device: Device | None = None
 _process = 0  # process that started Taichi
 _checked_kernels: str | None = None  # folder of kernels with index checks
-_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # jobs for the thread that started Taichi
-_is_served = threading.Lock()
-_home = 0  # id of that thread
 _first_field: Any = None  # a separate layout, because an empty one cannot be exported
 
 
@@ -315,59 +302,29 @@ def _at_home(function: Callable[[], Result], arch: str) -> Result:
     """Call a function in the thread that Taichi 1.7 requires for starting and for laying out fields. On a
     CPU this is a dedicated thread, because the first caller's thread may end. On a GPU, and with index
     checks, which would crash a dedicated thread, it is the caller's."""
-    if arch != "cpu" or os.environ.get(DEBUG) == "1":
-        return function()
-    found: Future[Result] = Future()
-
-    def work() -> None:
-        try:
-            found.set_result(function())
-        except BaseException as error:
-            found.set_exception(error)
-
-    if not _is_served.locked():
-        start_new_thread(_serve, ())
-    try:
-        _jobs.put(work)
-        return found.result()
-    except KeyboardInterrupt:
-        last = (
-            threading.Event()
-        )  # wait for the current job, because stopping it halfway would break all worlds
-        _jobs.put(last.set)
-        last.wait()
-        raise
+    return function() if arch != "cpu" or os.environ.get(DEBUG) == "1" else at_home(function)
 
 
 def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
     """Lay out fields of other code, which Taichi does at the next kernel call."""
-    if _device is not None and has_pending_fields() and threading.get_ident() != _home:
+    if _device is not None and must_go_home():
         _at_home(functools.partial(lay_out, is_first_call), _device.arch)
     else:
         lay_out(is_first_call)
 
 
-if ti.__version__[:2] == (1, 7):
-    remember_sources()
-    let_threads_in(_lay_out)
-    let_any_number_of_threads_run()
-    choose_by_comparison()
-    FIRST_LAUNCHES.install()
-
-
-def _serve() -> None:
-    global _home
-    if _is_served.acquire(blocking=False):  # another thread serves if Ctrl-C interrupted its start
-        _home = threading.get_ident()
-        while True:
-            _jobs.get()()
+keep_branches_in_real_functions()
+read_sources_once()
+let_threads_in(_lay_out)
+let_any_number_of_threads_run()
+choose_by_comparison()
+FIRST_LAUNCHES.install()
 
 
 def _after_fork() -> None:
     """Mark a forked process, which has Taichi's memory but none of its threads."""
-    global _is_served
     if _device is None:
-        _is_served = threading.Lock()
+        leave_home()
         return
     leave_behind(_process)
     # Otherwise the end of this process would wait for these threads.

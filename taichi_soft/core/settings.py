@@ -27,11 +27,6 @@ class Settings:
     retries: int  # how often a failed step is retried, each time with twice the substeps
     schedule: Schedule  # as chosen by `World.build`; AUTO until then if not given
 
-    @property
-    def is_implicit(self) -> bool:
-        """True if steps solve linear systems."""
-        return self.integrator is Integrator.IMPLICIT_EULER
-
 
 @dataclass(frozen=True)
 class ContactSettings:

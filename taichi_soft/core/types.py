@@ -96,6 +96,7 @@ LawName: TypeAlias = Literal[
     "cmpm",
     "cmpm2",
     "best_fitting_plane",
+    "split_ring_plane",
     "tilted_plane",
     "tilted_plane_printed",
 ]

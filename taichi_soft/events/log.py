@@ -22,7 +22,7 @@ class Listener:
     """A function that receives events until `remove` is called."""
 
     def __init__(self, kind: type[Event], function: Callable[[Any], object]) -> None:
-        """Made by `World.on`."""
+        """Use `World.on` instead."""
         self.kind = kind
         self.function = function
         self.is_active = True
@@ -66,8 +66,8 @@ class EventLog:
             )
         if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
             raise StateError(
-                f"{kind.__name__} is not recorded in a world without colliders and soft_contact: make the "
-                "world with collider_room=1, so that its floor is a collider"
+                f"{kind.__name__} needs contact, which schedule 'flat' does not support: make the "
+                "world with schedule='per_body'"
             )
         return kinds
 

@@ -15,7 +15,7 @@ from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import MAX_ACCELERATION
 from taichi_soft.control.frames import Frames
-from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of, wave_speed
+from taichi_soft.control.grab_patch import LIMITS, elements_of, wave_speed
 from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.joints import Joints
@@ -80,9 +80,7 @@ def _of_world(context: WorldContext) -> Arrays:
     kinds, room = list(context.slots.kinds), built.state.capacity.contact
     slots = list(zip(context.slots.assets, context.slots.slots, strict=True))
     return {
-        "world/flags": _ints(
-            [built.program.has_contact, built.sleeps, room.soft, built.state.capacity.implicit]
-        ),
+        "world/flags": _ints([built.sleeps, room.soft, built.state.capacity.implicit]),
         "world/counts": _ints([len(context.slots.slots), context.layout.particle_count]),
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
@@ -97,9 +95,8 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
         "events/limits": _floats([CONTACT_PAUSE, MAX_EVENTS, touch_rows(room, len(context.slots.slots))]),
-        "grabs/limits": _floats(
-            [PATCH_SIZE, FARTHEST_PULL, WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]
-        ),
+        "grabs/limits": _floats([WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]),
+        "grabs/patch_limits": _floats(LIMITS),
         "slots/asset": _ints([kinds.index(asset) for asset in context.slots.assets]),
         "slots/friction": _floats(
             [asset.contact.friction if body is None else body.friction for asset, body in slots]

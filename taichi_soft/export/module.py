@@ -11,6 +11,7 @@ from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_colli
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
+from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
 from taichi_soft.control.kernels.motors import read_speed
@@ -25,7 +26,7 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
-from taichi_soft.solver.kernels.step import step_in_turn, step_islands, step_per_body
+from taichi_soft.solver.kernels.step import step_islands
 
 Kernels = dict[str, tuple[Any, dict[str, Any]]]
 
@@ -66,17 +67,13 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     """All kernels that the native library calls in this world, by name."""
     state, program = context.built.state, context.built.program
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
-    if program.has_contact:
-        found["step"] = _example(step_islands, state=state, program=program)
-        found["forget_collider"] = _example(forget_collider, contact=state.contact)
-        found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
-        found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
-        if not program.has_soft_contact:
-            found["list_joined_islands"] = _example(list_joined_islands, state=state)
-    elif len(context.slots.slots) == 1:
-        found["step"] = _example(step_in_turn, state=state, program=program)
-    else:
-        found["step"] = _example(step_per_body, state=state, program=program)
+    found["step"] = _example(step_islands, state=state, program=program)
+    found["shape_patch"] = _example(shape_patch)
+    found["forget_collider"] = _example(forget_collider, contact=state.contact)
+    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
+    found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
+    if not program.has_soft_contact:
+        found["list_joined_islands"] = _example(list_joined_islands, state=state)
     found["find_hits"] = _example(find_hits, state=state, is_serial=True)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)

@@ -119,8 +119,8 @@ class Controls:
 
         A new estimate for each body would pause the world at each move of a slider.
         """
-        is_implicit = self.world.settings.is_implicit
-        if self._first is None or is_implicit or not {"young", "poisson"} & set(self.given):
+        has_stable_step = context_of_world(self.world).substeps.has_stable_step
+        if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):
             return self._first_stable
         counts = [self.dt / asset.stable_step.recommended * self._factor(asset) for asset in self._assets]
         soft = context_of_world(self.world).contact.soft

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.layout import BodyArrays, BondArrays
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import DeviceError
-from taichi_soft.core.float_environment import with_usual_floats
+from taichi_soft.core.runtime import with_usual_floats
 
 SOURCE = Path(__file__).with_name("baseline.cpp")
 RELAXED = (

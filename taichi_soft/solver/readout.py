@@ -16,7 +16,6 @@ from taichi_soft.control.kernels.joints import add_joint_forces
 from taichi_soft.core.checks import as_buffer
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.settings import Settings
-from taichi_soft.core.types import Integrator
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
@@ -66,7 +65,7 @@ class Readout:
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)
         read_velocities(state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
         lag = float(state.body_velocity_lag[body.index])
-        if settings.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
+        if self._program.integrator.is_lag_told and lag > 0.0 and not body.is_frozen:
             forces = np.empty_like(rows)
             compute_body_forces(state, self._program, body.index, forces)
             if self._joints.holds(body):

@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.runtime import Device
-from taichi_soft.core.types import Integrator, Schedule
+from taichi_soft.core.types import Schedule
+from taichi_soft.solver.integrators import IntegratorModel
 from taichi_soft.solver.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
-from taichi_soft.solver.kernels.step import UNFINISHED, step_in_turn, step_islands, step_per_body
+from taichi_soft.solver.kernels.step import UNFINISHED, step_islands
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
@@ -22,27 +23,20 @@ STRETCH = 2_000_000
 much where bodies touch, and up to 23 times where a step is made again. While a kernel runs, Python hears no
 Ctrl-C. A longer step takes a snapshot first: some 5 % of its time, and it is no step of a game."""
 
-IMPLICIT_WORK = 50
-"""A substep of implicit Euler over one of leapfrog, about: so many products with the matrix it takes."""
-
 ALL = 2**31 - 1
 """Substeps of one call of a kernel that makes the whole step."""
 
 Launch = Callable[[int, float], int]
 
 
-def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodies: bool) -> Schedule:
+def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
     """The schedule to use where `asked` leaves it open.
-
-    `needs_bodies`: implicit solves and contact run in one thread per body only.
 
     A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
     of them to keep the threads busy, or too few tetrahedra to be worth sharing.
     """
     if asked is not Schedule.AUTO:
         return asked
-    if needs_bodies:
-        return Schedule.PER_BODY
     if device.is_gpu:
         return Schedule.FLAT
     # A body without tetrahedra works on its edges, of which there are about twice as many per unit of work.
@@ -53,11 +47,10 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
     return Schedule.FLAT
 
 
-def most_substeps(scene: Scene, integrator: Integrator) -> int:
+def most_substeps(scene: Scene, integrator: IntegratorModel) -> int:
     """How many substeps a step of a world may have that one call of a kernel makes."""
-    work = IMPLICIT_WORK if integrator is Integrator.IMPLICIT_EULER else 1
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
-    return max(1, STRETCH // max(1, work * sum(sizes)))
+    return max(1, STRETCH // max(1, integrator.work * sum(sizes)))
 
 
 def make_launch(
@@ -70,16 +63,8 @@ def make_launch(
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count
 
-    step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
     stretch = most_substeps(scene, program.integrator)
-
-    def per_body(substeps: int, h: float) -> int:
-        most = stretch if substeps > stretch else ALL
-        found = int(step_bodies(state, program, bodies, substeps, h, most, 0))
-        while found == UNFINISHED:
-            found = int(step_bodies(state, program, bodies, substeps, h, most, 1))
-        return found
 
     def by_islands(substeps: int, h: float) -> int:
         most = stretch if substeps > stretch else ALL
@@ -121,5 +106,5 @@ def make_launch(
         return failed
 
     if schedule is Schedule.PER_BODY:
-        return by_islands if program.has_contact else per_body
+        return by_islands
     return flat_gpu if device.is_gpu else flat_cpu

@@ -30,7 +30,6 @@ from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.failures import find_failure
-from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.solver.kernels.islands import list_joined_islands, read_islands
 from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bodies
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
@@ -118,8 +117,8 @@ class Simulation:
         clock, reports = self.clock, []
         # What freezes a body is the last of several attempts.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
-        if self.settings.is_implicit:
-            finer, is_braked = MOST_PIECES if self.program.has_contact else 1, False
+        if self.program.integrator.halvings > 0:
+            finer, is_braked = 1 << self.program.integrator.halvings, False
         status = self.state.body_status.to_numpy()
         for body in self.pools.occupants:
             if status[body.index] != FROZEN or body.is_frozen:
@@ -162,7 +161,7 @@ class Simulation:
 
     def check_solves(self) -> None:
         """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
-        if not self.settings.is_implicit:
+        if not self.state.capacity.implicit:
             return
         residuals = self.state.body_residual.to_numpy()
         for body in self.pools.occupants:
@@ -284,9 +283,13 @@ class Simulation:
         return pinned_vertices(body)
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
-        """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider."""
+        """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider.
+
+        The floor is left to the caller, who names the height that is missing.
+        """
         if self.colliders is not None:
-            require_clear(self.colliders.handles, present_asset(body), points, f"body {body.index}")
+            others = [each for each in self.colliders.handles if each is not self.colliders.floor]
+            require_clear(others, present_asset(body), points, f"body {body.index}")
 
     def mark_joints_changed(self) -> None:
         """Let bodies that are joined be stepped together, where no step finds out by itself."""
@@ -328,7 +331,7 @@ class Simulation:
 
     def solve_residual(self, body: SoftBody) -> float | None:
         """As `Body.solve_residual`."""
-        has_solved = self.settings.is_implicit and self.clock.steps > record_of(body).first_step
+        has_solved = self.state.capacity.implicit and self.clock.steps > record_of(body).first_step
         return float(self.state.body_residual[body.index]) if has_solved else None
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:

@@ -1,7 +1,4 @@
-"""Fields of the step itself: how far each island has come in it, and what threads have to know of each other.
-
-Without contact each body is an island of its own, with the same number.
-"""
+"""Fields of the step: how far each island has come in it, and what threads have to know of each other."""
 
 from taichi_soft.core.runtime import holds_fields, ti
 
@@ -18,7 +15,6 @@ class Progress:
     is_stable: ti.i32  # 0 where forces changed a velocity by too much at once in the attempt
     failed: ti.i32  # bodies that did, once the step is made
     is_awake: ti.i32
-    # With contact only.
     candidates: ti.i32  # NONE, OUTDATED or VALID
     fastest: ti.f32  # highest speed in the last substep [m/s]
     velocity: ti.math.vec3  # mean velocity of the particles before the attempt [m/s]
@@ -31,6 +27,7 @@ class Moment:
 
     s: ti.i32  # number of the substep, from 0
     substeps: ti.i32  # of the attempt
+    is_last: ti.i32  # 1 in the last attempt
     h: ti.f32  # length of the substep [s]
     since: ti.f32  # time since the start of the step, and until its end [s]
     left: ti.f32
@@ -43,6 +40,7 @@ class Job:
     phase: ti.i32
     s: ti.i32  # number of the substep, from 0
     substeps: ti.i32  # of the attempt at a step
+    has_pairs: ti.i32  # 1 where bodies of the island may touch each other, or themselves
     forgets: ti.i32  # 1 where a search drops the candidates there are
     h: ti.f32  # length of the substep [s]
     since: ti.f32  # time since the start of the step, and until its end [s]

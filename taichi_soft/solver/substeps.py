@@ -43,11 +43,11 @@ class Substeps:
     """How long the substeps of one world can be, and how long they are."""
 
     def __init__(
-        self, pools: Pools[SoftBody], *, is_implicit: bool, soft_contact: bool, most: int | None
+        self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool, most: int | None
     ) -> None:
-        """`is_implicit`: its integrator takes substeps of any length. `most`: as `World(max_substeps=)`."""
+        """`has_stable_step`: longer substeps explode. `most`: as `World(max_substeps=)`."""
         self._pools = pools
-        self._is_implicit, self._soft_contact = is_implicit, soft_contact
+        self.has_stable_step, self._soft_contact = has_stable_step, soft_contact
         self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
         self._asked: tuple[Any, ...] = ()
         self._chosen = (0.0, 0, 0.0)  # for what was asked last
@@ -78,7 +78,7 @@ class Substeps:
         """
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
-        if self._is_implicit:
+        if not self.has_stable_step:
             return (0.999, SOFT_CONTACT_STEP) if self._soft_contact else (1.0, math.inf)
         longest = min(each.stable_step.recommended for asset in self._pools.kinds for each in asset.levels)
         for body in self._pools.occupants:
@@ -96,7 +96,7 @@ class Substeps:
 
         Raises: OptionError where they are more than the world may take.
         """
-        if self._pools.slots and not self._is_implicit:
+        if self._pools.slots and self.has_stable_step:
             self._require_few(FRAME, self.stable_count(FRAME))
 
     def _require_few(self, dt: float, count: int) -> None:
@@ -136,13 +136,13 @@ class Substeps:
         seconds = as_step(dt)
         count = as_count(self.stable_count(seconds) if substeps is None else substeps, "substeps")
         if substeps is None:
-            if not self._is_implicit:
+            if self.has_stable_step:
                 self._require_few(seconds, count)
         elif self._most is not None and count > self._most:
             raise OptionError(f"substeps is {count:,}; the world takes max_substeps={self._most:,}")
         h = seconds / count
         _log.info("a step of %g s is made in %d substeps", seconds, count)
-        if self._is_implicit:
+        if not self.has_stable_step:
             return seconds, count, h
         # Of bodies that were cut or are of something else nothing is estimated here: the caller knows better.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)

@@ -24,11 +24,12 @@ from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.settings import Settings
-from taichi_soft.core.types import Integrator, Schedule
+from taichi_soft.core.types import Schedule
 from taichi_soft.events import EventLog, Observer
 from taichi_soft.fracture.cutting import warm_up
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
@@ -51,24 +52,14 @@ def build(context: WorldContext) -> Simulation:
         require_clear(colliders.handles, asset, free_points(asset, rows), f"body {slot}")
     device = init()
     context.built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
-    has_contact = (
-        contact.soft
-        or contact.sleep_speed > 0.0
-        or len(colliders.handles) + contact.collider_room > 0
-        or _has_hulls(context)
-    )
+    settings = replace(context.settings, schedule=_schedule(context, device))
+    has_contact = settings.schedule is Schedule.PER_BODY
     if has_contact:
         _add_floor(context)
-    settings = replace(context.settings, schedule=_schedule(context, device, has_contact))
     capacity = _capacity(context, settings, has_contact)
     program = _program(context, settings, device, has_contact)
-    if settings.integrator is Integrator.EXPLICIT_EULER:
-        warnings.warn(
-            "explicit_euler gains energy at every substep, however short, and explodes sooner or later: "
-            "it is here for comparison, leapfrog is for use",
-            UnstableStepWarning,
-            stacklevel=4,
-        )
+    if program.integrator.warning:
+        warnings.warn(program.integrator.warning, UnstableStepWarning, stacklevel=4)
     state = acquire(State, capacity, program)
     weakref.finalize(context, release, state)
     _fill(context, state, program)
@@ -92,7 +83,7 @@ def build(context: WorldContext) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
-        most_substeps(scene, settings.integrator),
+        most_substeps(scene, program.integrator),
         EventLog(Observer(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
@@ -113,17 +104,8 @@ def build(context: WorldContext) -> Simulation:
 
 
 def _add_floor(context: WorldContext) -> None:
-    """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
+    """Make the floor one of the colliders."""
     settings = context.settings
-    if settings.schedule is Schedule.FLAT:
-        raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
-    if settings.integrator is Integrator.EXPLICIT_EULER:
-        raise OptionError("integrator 'explicit_euler' has no colliders: any other has")
-    if settings.is_implicit and _has_hulls(context):
-        raise OptionError(
-            "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
-            "without hull"
-        )
     if settings.floor is not None:
         floor = context.colliders.floor = context.colliders.add(
             PlaneShape(),
@@ -138,15 +120,39 @@ def _add_floor(context: WorldContext) -> None:
         context.handles.enlist(floor)
 
 
-def _schedule(context: WorldContext, device: Device, has_contact: bool) -> Schedule:
-    asked = context.settings.schedule
-    is_cut = any(asset.spare_vertices or asset.coarser for asset in context.slots.kinds)
-    if is_cut and asked is Schedule.FLAT:
+def _schedule(context: WorldContext, device: Device) -> Schedule:
+    """The schedule of a world. Raises: OptionError for what the one asked for cannot do."""
+    settings, contact = context.settings, context.contact
+    asked = settings.schedule
+    integrator = INTEGRATORS[settings.integrator]
+    name = integrator.name.value
+    if integrator.only_flat:
+        if asked is Schedule.PER_BODY:
+            raise OptionError(f"integrator {name!r} has no colliders: use schedule 'flat' or 'auto'")
+        asked = Schedule.FLAT
+    for feature, is_asked in {
+        "bodies that are cut or have levels of detail": any(
+            asset.spare_vertices or asset.coarser for asset in context.slots.kinds
+        ),
+        "hulls": _has_hulls(context),
+        "colliders": len(context.colliders.handles) + contact.collider_room > 0,
+        "soft contact": contact.soft,
+        "sleep": contact.sleep_speed > 0.0,
+        "implicit Euler": integrator.takes_solves,
+    }.items():
+        if is_asked and asked is Schedule.FLAT:
+            raise OptionError(
+                f"schedule 'flat' does not support {feature}: use 'per_body' or 'auto', and another "
+                "integrator than 'explicit_euler'"
+            )
+        if is_asked:
+            asked = Schedule.PER_BODY
+    if not integrator.has_hulls and _has_hulls(context):
         raise OptionError(
-            "schedule 'flat' takes no bodies that are cut or have levels of detail: take 'per_body' or 'auto'"
+            f"integrator {name!r} does not support hulls, because its solves hold vertices: use 'leapfrog', "
+            "or assets without hull"
         )
-    needs_bodies = context.settings.is_implicit or has_contact or is_cut
-    return choose_schedule(asked, context.layout, device, needs_bodies=needs_bodies)
+    return choose_schedule(asked, context.layout, device)
 
 
 def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> Capacity:
@@ -158,7 +164,7 @@ def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> C
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,
-        implicit=settings.is_implicit,
+        implicit=INTEGRATORS[settings.integrator].takes_solves,
         contact=contact,
         plastic=_is_plastic(context),
     )
@@ -167,7 +173,7 @@ def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> C
 def _program(context: WorldContext, settings: Settings, device: Device, has_contact: bool) -> StepProgram:
     return StepProgram(
         tuple(dict.fromkeys(asset.description.model for asset in context.slots.kinds)),
-        settings.integrator,
+        INTEGRATORS[settings.integrator],
         settings.floor is not None and not has_contact,
         has_contact,
         context.contact.soft,

@@ -78,7 +78,7 @@ def warm_up(context: WorldContext) -> None:
 
 def _find_stable_step(context: WorldContext) -> None:
     """Compute the stable step, unless it is known."""
-    if context.slots.occupants and not context.settings.is_implicit:
+    if context.slots.occupants:
         context.substeps.stable_count(FRAME)
 
 

@@ -11,7 +11,7 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import MOST_SAMPLES
-from taichi_soft.control.change import require_substeps
+from taichi_soft.control.change import require_per_body
 from taichi_soft.control.drives import ForceField, apply_force_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
@@ -24,6 +24,7 @@ from taichi_soft.core.types import Integrator, IntegratorName, Schedule, Schedul
 from taichi_soft.persistence.recorder import Recorder
 from taichi_soft.persistence.snapshot import restore_snapshot, take_snapshot
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
@@ -49,11 +50,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 to 1; None leaves bodies their own elasticity. In a world with colliders
-            or soft contact it works as in `add_collider`. Otherwise the floor reflects each vertex
-            separately: at 0, the default there, bodies keep their own elasticity, and a damped body can
-                bounce lower at 1
-            than at 0.
+        restitution: of the floor, 0 to 1, as in `add_collider`; None leaves bodies their own elasticity. With
+            the schedule "flat" the floor reflects each vertex separately: at 0, the default there, bodies
+            keep their own elasticity, and a damped body can bounce lower at 1 than at 0.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". The last one is stable
             for every step, but solves a linear system per step and has damping that grows with the step. It
@@ -120,8 +119,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
-        if settings.is_implicit and settings.schedule is Schedule.FLAT:
-            raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
+        model = INTEGRATORS[settings.integrator]
+        if model.takes_solves and settings.schedule is Schedule.FLAT:
+            raise OptionError("schedule 'flat' does not support implicit_euler: use 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
         touching = ContactSettings(
@@ -135,7 +135,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         pools: Pools[SoftBody] = Pools()
         substeps = Substeps(
             pools,
-            is_implicit=settings.is_implicit,
+            has_stable_step=model.has_stable_step,
             soft_contact=touching.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
@@ -315,7 +315,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         """
         field = require_field(function)
         _ = self._built
-        require_substeps(self._context, "force field")
+        require_per_body(self._context, "force field")
         self._force_field = field
 
 

@@ -13,6 +13,7 @@ from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.attachments import Attachments
+from taichi_soft.control.change import require_per_body
 from taichi_soft.control.drives import set_gravity, set_wind
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frame, Frames
@@ -22,7 +23,6 @@ from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.motors import Motor, Motors
 from taichi_soft.core.constants import ALL_GROUPS
-from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import recorded
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.queries import cast_ray
@@ -103,11 +103,8 @@ class WorldControl(WorldParts):
             world.step(1 / 60)
             print(lift.impulse)  # from the bodies on it [N s]
         """
-        if self._context.fields is not None and self._context.fields.colliders is None:
-            raise StateError(
-                "the world was built without colliders: add one before build(), or make the world with "
-                "collider_room"
-            )
+        if self._context.fields is not None:
+            require_per_body(self._context, "colliders beside the floor")
         collider = self._context.colliders.add(
             shape,
             position=position,

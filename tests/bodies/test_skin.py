@@ -256,9 +256,9 @@ def test_what_was_assumed_and_repaired_of_a_file_is_logged(tmp_path, caplog):
 def test_an_asset_and_options_of_its_own_do_not_go_together():
     asset = SoftBodyAsset(box((1, 1, 1), (1, 1, 1)), JELLY)
     world = World()
-    with pytest.raises(OptionError, match="material was given with an asset"):
+    with pytest.raises(OptionError, match=r"material .*SoftBodyAsset"):
         world.add_body(asset, JELLY)
-    with pytest.raises(OptionError, match="law was given with an asset"):
+    with pytest.raises(OptionError, match=r"law .*SoftBodyAsset"):
         world.add_body(asset, law="face")
     body = world.add_body(asset, position=(0, 0, 1))
     assert body.asset is asset

@@ -249,7 +249,7 @@ def test_a_jump_that_cannot_be_is_refused_and_changes_nothing(plain):
         frame.teleport((9999999.9, 0, 0), about_z(np.pi))
     assert world.state_hash() == name
     hold = body.attach([26], other)
-    with pytest.raises(StateError, match="body 0 is also attached to another frame"):
+    with pytest.raises(StateError, match=r"body 0 is .*another frame: release"):
         frame.teleport((0, 0, 3))
     hold.release()
     frame.teleport((0, 0, 3))

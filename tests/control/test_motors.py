@@ -224,8 +224,8 @@ def test_a_motor_leaves_with_its_body_and_comes_back_with_a_snapshot():
     assert (world.state_hash(), motor.effort, motor.measured_speed) == told
 
 
-def test_a_world_without_contact_refuses_a_motor_and_names_the_way_out():
-    world, body = made(WHEEL, collider_room=0)
-    with pytest.raises(StateError, match="collider_room=1"):
+def test_a_flat_world_refuses_a_motor_and_names_the_way_out():
+    world, body = made(WHEEL, collider_room=0, schedule="flat")
+    with pytest.raises(StateError, match=r"'flat' .* motors.*'per_body'"):
         world.add_motor(body, HUB, (0, 0, 1), speed=1.0, max_torque=1.0)
     assert list(world.motors) == []

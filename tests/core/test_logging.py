@@ -38,6 +38,6 @@ def test_device_schedule_substeps_and_compile_times_are_logged():
     assert any("Taichi runs on cpu with 1 threads" in text for text in said["INFO"])
     assert any("schedule per_body, leapfrog, without contact" in text for text in said["INFO"])
     assert any("a step of 0.0166667 s is made in" in text for text in said["INFO"])
-    assert any(text.startswith("kernel step_in_turn took ") for text in said["DEBUG"])
+    assert any(text.startswith("kernel step_islands took ") for text in said["DEBUG"])
     names = [text.split()[1] for text in said["DEBUG"]]
-    assert {"spawn_body", "step_in_turn"} <= set(names)
+    assert {"spawn_body", "step_islands"} <= set(names)

@@ -20,9 +20,10 @@ def interrupted_import(tmp_path):
     return {**os.environ, "PYTHONPATH": str(tmp_path)}
 
 
-def test_ctrl_c_while_the_command_is_imported_is_one_line(interrupted_import):
+@pytest.mark.parametrize("command", [["taichi_soft", "info"], ["lab", "report", "--list"]])
+def test_ctrl_c_while_the_command_is_imported_is_one_line(interrupted_import, command):
     done = subprocess.run(
-        [sys.executable, "-m", "taichi_soft", "info"],
+        [sys.executable, "-m", *command],
         cwd=ROOT, env=interrupted_import, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")

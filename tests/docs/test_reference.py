@@ -36,7 +36,7 @@ def entries(docstring):
 
 
 def is_made_by_users(cls):
-    return not (cls.__init__.__doc__ or "").startswith("Made by")
+    return not (cls.__init__.__doc__ or "").startswith("Use `")
 
 
 def fields_without_a_comment(cls):

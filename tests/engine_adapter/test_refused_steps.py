@@ -222,8 +222,6 @@ def test_a_listener_that_raises_changes_nothing_and_no_event_is_lost(game):
 def test_what_waits_of_the_coming_step_is_kept_where_a_step_is_refused(game):
     """A joint released by a change of level has its event, whatever becomes of the step."""
     world = begin(game)
-    if world.settings.is_implicit:
-        return  # it has no joints
     adapter = EngineAdapter(world, STEP, budget_ms=1e-6)
     adapter.step()
     body = world.bodies[3]

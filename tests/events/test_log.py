@@ -217,7 +217,7 @@ def test_other_refusals(log, observer):
         log.on(Woke, 3)
     observer.has_contacts = False
     for kind in (ContactBegan, ContactEnded):
-        with pytest.raises(StateError, match="collider_room"):
+        with pytest.raises(StateError, match="per_body"):
             log.on(kind, print)
     with pytest.raises(StateError, match="record_events"):
         log.drain()

@@ -354,7 +354,7 @@ def test_bodies_that_cannot_be_cut_say_so():
         bar(spare_vertices=-1)
     flat = World(schedule="flat")
     flat.reserve(bar(), 1)
-    with pytest.raises(OptionError, match="schedule 'flat' takes no bodies that are cut"):
+    with pytest.raises(OptionError, match="'flat' does not support bodies that are cut"):
         flat.build()
 
 

@@ -88,7 +88,7 @@ def test_a_script_that_makes_no_world_or_two_is_refused(tmp_path):
     for number, text in enumerate(("x = 1\n", "from taichi_soft import World\na, b = World(), World()\n")):
         path = tmp_path / f"game{number}.py"
         path.write_text(text)
-        with pytest.raises(OptionError, match="exactly one World"):
+        with pytest.raises(OptionError, match="exactly one global World"):
             made_scene(SceneSource("script", str(path)))
 
 

@@ -409,7 +409,7 @@ def test_a_world_whose_process_dies_is_made_anew(visitor, served):
         command = Path(f"/proc/{child}/cmdline").read_bytes()
         if b"spawn_main" in command:
             os.kill(int(child), signal.SIGKILL)
-    visitor.until(lambda: any("broke down" in words for words in visitor.said))
+    visitor.until(lambda: any("failed" in words for words in visitor.said))
     visitor.until(lambda: visitor.said[-1].endswith("is ready"), 240.0)
     before = visitor.counts["pictures"]
     visitor.until(lambda: visitor.counts["pictures"] > before + 5)
@@ -450,9 +450,7 @@ def test_a_scene_that_cannot_be_made_says_why_to_whoever_comes(serve, tmp_path):
     served = serve(str(tmp_path / "empty.py"))
     for _ in range(2):
         with Visitor(served.address) as visitor:
-            visitor.until(
-                lambda visitor=visitor: "must make one World" in (visitor.status.get("trouble") or "")
-            )
+            visitor.until(lambda visitor=visitor: "one global World" in (visitor.status.get("trouble") or ""))
 
 
 def test_a_step_that_raises_stops_the_world_and_says_why(serve, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import runpy
 import subprocess
 
 import pytest
@@ -9,6 +10,8 @@ from native_build import ROOT
 
 GODOT = ROOT / "engine_adapter" / "godot"
 SCRIPTS = ROOT / "tests" / "native" / "godot"
+
+files_of = runpy.run_path(str(GODOT / "write_project.py"))["files_of"]
 
 
 def build(folder, native, world):

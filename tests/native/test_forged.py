@@ -124,8 +124,8 @@ FORGERIES = {
     "ranks that are none": changed("asset0/rank", first(-1)),
     "fewer rows than can touch": changed("events/limits", lambda array: np.append(array[:2], 1.0)),
     "a grab of a body that there is not": held_by_a_body_that_there_is_not,
-    "grabs without a size": changed("grabs/limits", first(np.nan)),
-    "grabs with more rows than fields have": changed("grabs/limits", added(0, 0, 0, 0, 1000)),
+    "grabs without a size": changed("grabs/patch_limits", first(np.nan)),
+    "grabs with more rows than fields have": changed("grabs/limits", added(0, 0, 1000)),
     "vertices that are nowhere": changed("asset0/vertices", first(np.nan)),
 }
 

@@ -3,11 +3,12 @@
 import re
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 from games import line, lines_of
-from godot_build import GODOT, SCRIPTS, told
+from godot_build import GODOT, SCRIPTS, files_of, told
 from godot_games import HALF_TURN, UPRIGHT, levels_game
 from native_build import ROOT
 
@@ -18,8 +19,7 @@ DT = 1 / 64
 def project(engine, libraries, demo_world, tmp_path_factory):
     """The demo as a reader has it after the steps of docs/godot.md, and the scripts of this test."""
     folder = tmp_path_factory.mktemp("project") / "demo"
-    shutil.copytree(GODOT / "demo", folder)
-    shutil.copy(ROOT / "assets" / "elephant.glb", folder)
+    subprocess.run([sys.executable, str(GODOT / "write_project.py"), "3", str(folder)], check=True)
     shutil.copytree(libraries, folder / "addons" / "taichi_soft" / "bin")
     for script in SCRIPTS.glob("*.gd"):
         shutil.copy(script, folder)
@@ -429,7 +429,7 @@ def test_joints_and_motors_are_found_by_name_and_number(drives):
 
 
 def test_these_tests_call_every_such_function_of_the_node():
-    node = (GODOT / "demo" / "addons" / "taichi_soft" / "soft_world.gd").read_text(encoding="utf-8")
+    node = files_of(3)["addons/taichi_soft/soft_world.gd"]
     named = re.findall(r"^func (\w*(?:gravity|friction|join|motor|level)\w*)\(", node, re.MULTILINE)
     assert len(named) == 15
     scripts = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("drives.gd", "levels.gd"))

@@ -3,11 +3,11 @@
 import re
 
 import pytest
-from godot4_host import GODOT, VERSIONS, registered
+from godot4_host import VERSIONS, registered
+from godot_build import files_of
 from native_build import ROOT
 
-DEMO = GODOT / "demo4"
-SCRIPTS = sorted(DEMO.rglob("*.gd"))
+PROJECT = files_of(4)
 OF_GDSCRIPT = {"Variant", "PI", "TAU", "INF", "NAN", "load", "preload", "range", "len"}
 OF_GLTF = {"bufferViews", "bufferView", "images", "byteLength", "mimeType"}
 
@@ -20,7 +20,7 @@ def page_script():
 
 def scripts():
     """Texts of all scripts, by name."""
-    found = {path.name: path.read_text(encoding="utf-8") for path in SCRIPTS}
+    found = {path.split("/")[-1]: text for path, text in PROJECT.items() if path.endswith(".gd")}
     assert len(found) == 4
     return {**found, "page": page_script()}
 
@@ -130,7 +130,7 @@ def test_scripts_call_the_library_with_as_many_arguments_as_it_takes(host):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_scene_has_classes_and_properties_that_are_there(api, version):
-    text = (DEMO / "main.tscn").read_text(encoding="utf-8")
+    text = PROJECT["main.tscn"]
     exported = set().union(*(variables_of(each) for each in scripts().values()))
     sections = re.findall(
         r'^\[(?:node|sub_resource) .*?type="(\w+)".*?\]\n(.*?)(?=^\[|\Z)', text, re.S | re.M
@@ -146,11 +146,18 @@ def test_the_scene_has_classes_and_properties_that_are_there(api, version):
 
 def test_files_name_each_other(godot4):
     """What scenes and scripts load is there, after the steps of docs/godot4.md."""
-    made = {"elephant.glb", "demo.softworld"}
-    for path in [*SCRIPTS, DEMO / "main.tscn", DEMO / "project.godot"]:
-        for target in re.findall(r'"res://([^"]+)"', path.read_text(encoding="utf-8")):
-            assert target in made or (DEMO / target).exists(), f"{path.name}: {target}"
-    text = (DEMO / "addons/taichi_soft/taichi_soft.gdextension").read_text(encoding="utf-8")
+    there = {*PROJECT, "elephant.glb", "demo.softworld"}
+    extension = "addons/taichi_soft/taichi_soft.gdextension"
+    for path in PROJECT.keys() - {extension}:
+        for target in re.findall(r'"res://([^"]+)"', PROJECT[path]):
+            assert target in there, f"{path}: {target}"
+    text = PROJECT[extension]
     shipped = set(re.findall(r'"res://addons/taichi_soft/bin/([^"]+)"', text))
     assert shipped == {path.name for path in (godot4 / "bin").iterdir()} - {"fake_host"}
     assert 'entry_symbol = "taichi_soft_godot_init"' in text
+
+
+def test_nothing_for_godot_3_is_in_the_project():
+    """And nothing for Godot 4 in that for Godot 3, which test_godot.py runs."""
+    assert [path for path, text in PROJECT.items() if "Godot 3" in text] == []
+    assert [path for path, text in files_of(3).items() if re.search(r"\w3D\b|Godot 4|@export", text)] == []

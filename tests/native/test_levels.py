@@ -67,7 +67,7 @@ WANTED = {
     "below": (ARGUMENT, "level is -1, and asset 1 has 3: give 0 to 2"),
     "beyond": (ARGUMENT, "level is 3, and asset 1 has 3: give 0 to 2"),
     "joined": (STATE, "has joints that name its vertices"),
-    "joined from the other side": (STATE, "release of 1"),
+    "joined from the other side": (STATE, "release = 1"),
     "positions": (-6, "give room for 162"),
     "mesh": (STATE, "mesh 1 is for level 0, the body is at level 1"),
     "homeless": (STATE, "would hold nothing at level 2"),

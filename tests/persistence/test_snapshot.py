@@ -372,7 +372,10 @@ def set_word(at, to):
     return change
 
 
-# From behind: grabs (16), wind (4), ten words for each of the two bodies.
+BODIES = 2 * 8 * 24
+"""The word after 24 for each particle. Ten follow for each body, then wind (4) and grabs."""
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -398,10 +401,10 @@ def set_word(at, to):
         set_word(12, np.float32(np.nan).view(np.int32)),
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
-        set_word(-16, 99),
-        set_word(-16 - 4 - 20, 9),
-        set_word(-16 - 4 - 6, np.float32(np.nan).view(np.int32)),
-        set_word(-16 - 4 - 1, np.float32(np.nan).view(np.int32)),
+        set_word(BODIES + 24, 99),
+        set_word(BODIES, 9),
+        set_word(BODIES + 14, np.float32(np.nan).view(np.int32)),
+        set_word(BODIES + 19, np.float32(np.nan).view(np.int32)),
     ],
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):

@@ -35,7 +35,7 @@ def make_world(jelly):
 
 def test_a_gpu_takes_the_flat_schedule(make_world):
     scene = make_world("per_body")._context.layout
-    assert choose_schedule(Schedule.AUTO, scene, GPU, needs_bodies=False) is Schedule.FLAT
+    assert choose_schedule(Schedule.AUTO, scene, GPU) is Schedule.FLAT
 
 
 def test_one_launch_per_substep_makes_the_same_motion(make_world):

@@ -22,7 +22,7 @@ from taichi_soft import (
     box,
     sphere,
 )
-from taichi_soft.core.first_launch import FirstLaunches
+from taichi_soft.core.taichi_workarounds.known_kernels import FirstLaunches
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import make_launch
 

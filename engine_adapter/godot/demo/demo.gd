@@ -1,17 +1,17 @@
-# Materials of the demo. The space key drops another elephant, and the mouse grabs soft bodies.
-extends Spatial
+# Looks of the demo, an elephant more at each press of space, and a hand: the mouse pulls soft bodies about.
+extends Node3D
 
-const ELEPHANT := "res://elephant.glb"  # copy of assets/elephant.glb, the source of the bodies in world.py
+const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
 
 var _hand := 0  # a grab
-var _depth := 0.0  # distance of the grab from the camera
+var _depth := 0.0  # how far in front of the camera it was taken
 var _plush := _colored(Color(0.72, 0.72, 0.78))
 var _dropped := 0
 
 
 func _ready() -> void:
-    var file := File.new()
-    if file.file_exists(ELEPHANT):
+    if FileAccess.file_exists(ELEPHANT):
+    # Godot 3: if File.new().file_exists(ELEPHANT):
         _plush = _colored(Color(0.8, 0.8, 0.8))
         _plush.albedo_texture = _texture_of(ELEPHANT)
     $World/Rider.material_override = _plush
@@ -21,45 +21,47 @@ func _ready() -> void:
     $World/Ground/Mesh.material_override = _colored(Color(0.5, 0.55, 0.45))
 
 
-func _unhandled_key_input(event: InputEventKey) -> void:
-    if event.pressed and not event.echo and event.scancode == KEY_SPACE:
-        # Next to the previous one, which may still be there.
-        if drop(Transform(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
+func _unhandled_key_input(event: InputEvent) -> void:
+# Godot 3: func _unhandled_key_input(event: InputEventKey) -> void:
+    var key := event as InputEventKey
+    if key != null and key.pressed and not key.echo and key.keycode == KEY_SPACE:
+        # Beside the one before: it may still be there.
+        if drop(Transform3D(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
             _dropped += 1
 
 
 func _unhandled_input(event: InputEvent) -> void:
     var button := event as InputEventMouseButton
-    if button != null and button.button_index == BUTTON_LEFT:
+    if button != null and button.button_index == MOUSE_BUTTON_LEFT:
         if button.pressed:
-            grab_at(button.position)
+            take_hold(button.position)
         else:
-            release_grab()
+            let_go()
     elif event is InputEventMouseMotion and _hand != 0:
         if not $World.move_grab(_hand, $Camera.project_position(event.position, _depth)):
-            _hand = 0  # the body was removed
+            _hand = 0  # the body was taken out
 
 
-# Grab the soft body at a point of the window.
-func grab_at(place: Vector2) -> void:
-    release_grab()
-    var camera: Camera = $Camera
+# Of the soft body that is seen at a place of the window.
+func take_hold(place: Vector2) -> void:
+    let_go()
+    var camera: Camera3D = $Camera
     var hit: Dictionary = $World.raycast(
         camera.project_ray_origin(place), camera.project_ray_normal(place)
     )
-    if not hit.empty():
+    if not hit.is_empty():
         _hand = $World.grab(hit)
         _depth = -camera.to_local(hit.point).z
 
 
-func release_grab() -> void:
+func let_go() -> void:
     if _hand != 0:
         $World.release_grab(_hand)
     _hand = 0
 
 
-# Drop another elephant. Returns its node, or null if no slot is free.
-func drop(place: Transform) -> TaichiSoftBody:
+# One elephant more, while there is room; returns what draws it, or null.
+func drop(place: Transform3D) -> TaichiSoftBody:
     var body: int = $World.spawn("elephant", place)
     if body == 0:
         return null
@@ -70,21 +72,22 @@ func drop(place: Transform) -> TaichiSoftBody:
     return drawn
 
 
-func _colored(color: Color) -> SpatialMaterial:
-    var material := SpatialMaterial.new()
+func _colored(color: Color) -> StandardMaterial3D:
+    var material := StandardMaterial3D.new()
     material.albedo_color = color
     return material
 
 
-# Return the first image in a .glb, which has a header of 12 bytes, a JSON chunk and a binary chunk.
+# The first picture in a .glb: that has a head of 12 bytes, a part in JSON, and one with the bytes.
 func _texture_of(path: String) -> ImageTexture:
-    var file := File.new()
-    file.open(path, File.READ)
+    var file := FileAccess.open(path, FileAccess.READ)
+    # Godot 3: var file := File.new()
+    # Godot 3: file.open(path, File.READ)
     file.seek(12)
     var length := file.get_32()
     file.get_32()
-    var head: Dictionary = parse_json(file.get_buffer(length).get_string_from_utf8())
-    var view: Dictionary = head.bufferViews[head.images[0].bufferView]
+    var head: Dictionary = JSON.parse_string(file.get_buffer(length).get_string_from_utf8())
+    var view: Dictionary = head.bufferViews[int(head.images[0].bufferView)]
     file.seek(12 + 8 + length + 8 + int(view.get("byteOffset", 0)))
     var bytes := file.get_buffer(int(view.byteLength))
     var image := Image.new()
@@ -92,6 +95,7 @@ func _texture_of(path: String) -> ImageTexture:
         image.load_png_from_buffer(bytes)
     else:
         image.load_jpg_from_buffer(bytes)
-    var texture := ImageTexture.new()
-    texture.create_from_image(image)
-    return texture
+    return ImageTexture.create_from_image(image)
+    # Godot 3: var texture := ImageTexture.new()
+    # Godot 3: texture.create_from_image(image)
+    # Godot 3: return texture

@@ -1,11 +1,11 @@
-# A platform that moves back and forth.
-extends KinematicBody
+# A platform that goes to and fro.
+extends AnimatableBody3D
 
-export var reach := 0.6  # [m]
-export var period := 6.0  # [s]
+@export var reach := 0.6  # [m]
+@export var period := 6.0  # [s]
 
 var _time := 0.0
-onready var _middle := transform.origin
+@onready var _middle := transform.origin
 
 
 func _physics_process(delta: float) -> void:

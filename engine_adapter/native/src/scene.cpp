@@ -112,17 +112,20 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
   const auto grabs = archive.get<double>("grabs/limits");
-  if (flags.count != 4 || grabs.count != 5 || counts.count != 2 || stable.count != 2 || limits.count != 7)
+  if (flags.count != 3 || grabs.count != 3 || counts.count != 2 || stable.count != 2 || limits.count != 7)
     invalid_file("numbers");
-  has_contact = flags[0] != 0;
-  sleeps = flags[1] != 0;
-  has_soft_contact = flags[2] != 0;
-  is_implicit = flags[3] != 0;
-  patch_size = grabs[0], farthest_pull = grabs[1], pull_in_weights = grabs[2], highest_pull_speed = grabs[3];
-  for (double each : grabs) {
-    if (!(each >= 0.0 && each <= 1e30)) invalid_file("grabs");
+  sleeps = flags[0] != 0;
+  has_soft_contact = flags[1] != 0;
+  is_implicit = flags[2] != 0;
+  patch_limits = archive.get<double>("grabs/patch_limits");
+  if (patch_limits.count != 4) invalid_file("numbers");
+  pull_in_weights = grabs[0], highest_pull_speed = grabs[1];
+  for (const auto& numbers : {grabs, patch_limits}) {
+    for (double each : numbers) {
+      if (!(each >= 0.0 && each <= 1e30)) invalid_file("grabs");
+    }
   }
-  patch_rows = grabs[4] >= 1.0 && grabs[4] <= 1e6 ? size_t(grabs[4]) : 0;
+  patch_rows = grabs[2] >= 1.0 && grabs[2] <= 1e6 ? size_t(grabs[2]) : 0;
   slot_count = counts[0], particle_count = counts[1];
   stable_share = stable[0], stable_step = stable[1];
   has_floor = floors.count == 1;

@@ -93,14 +93,15 @@ class Scene {
 
   Archive archive;
   Axes axes;
-  bool has_contact, sleeps, has_soft_contact, is_implicit;
+  bool sleeps, has_soft_contact, is_implicit;
   int32_t slot_count, particle_count;
   double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;
   double floor;
   int32_t floor_collider;  // collider of the floor, or -1
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
-  double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // limits of grabs; pull_in_weights in N/kg
+  double pull_in_weights, highest_pull_speed;  // of grabs; the first in N/kg
+  Archive::View<double> patch_limits;          // that the kernel shape_patch takes
   size_t patch_rows;
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;

@@ -44,7 +44,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   frame_alive_.assign(frames, 0);  // without frames there is one unused row
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
   feels_.assign(feels.begin(), feels.end());
-  if (scene_->has_contact) colliders_ = Colliders(archive);
+  colliders_ = Colliders(archive);
   events_ = Events(archive, size_t(scene_->slot_count));
   generations_.assign(size_t(scene_->slot_count), 1);
   grab_generations_.assign(kMostGrabs, 1);
@@ -102,7 +102,6 @@ void World::bind() {
     records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
     body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
   }
-  if (!s.has_contact) return;
   joint_bodies_ = {root, s.place("joints.bodies", kMostJoints, 2)};
   joint_span_ = {root, s.place("joints.rows", kMostJoints, 2)};
   joint_impulse_ = {root, s.place("joints.impulse", kMostJoints, 3)};
@@ -173,7 +172,7 @@ bool World::aim_pins(double dt) {
 }
 
 bool World::prepare_colliders(double dt) {
-  if (!scene_->has_contact || !colliders_.prepare(dt, &motion_)) return false;
+  if (!colliders_.prepare(dt, &motion_)) return false;
   for (size_t c = 0; c < motion_.size(); ++c) {
     const ColliderMotion& m = motion_[c];
     for (int k = 0; k < 3; ++k) {
@@ -208,7 +207,7 @@ void World::step(double dt, int32_t substeps) {
       if (body_status_(slot) == kFrozen) frozen.push_back(slot);
     }
   }
-  if (scene_->has_contact) colliders_.finish(dt);
+  colliders_.finish(dt);
   steps_ += 1;
   time_ += dt;
   last_dt_ = dt;
@@ -225,17 +224,12 @@ void World::set_threads(int32_t count) {
 
 void World::launch_step(int32_t substeps, double h) {
   const int32_t bodies = scene_->slot_count;
-  std::vector<Argument> arguments = {Machine::whole(bodies)};
-  if (scene_->has_contact) arguments.push_back(Machine::whole(std::min(machine_->threads.most(), bodies) - 1));
-  arguments.insert(arguments.end(),
-                   {Machine::whole(substeps), Machine::real(h), Machine::whole(kAll), Machine::whole(0)});
-  machine_->launch("step", arguments);
-  is_still_ = false;
-  if (scene_->has_contact) {
-    int32_t busy = 0;
-    for (int32_t island = 0; island < island_count_(0); ++island) busy += failed_(island) + is_awake_(island);
-    is_still_ = busy == 0;
-  }
+  const int32_t helpers = std::min(machine_->threads.most(), bodies) - 1;
+  machine_->launch("step", {Machine::whole(bodies), Machine::whole(helpers), Machine::whole(substeps), Machine::real(h),
+                            Machine::whole(kAll), Machine::whole(0)});
+  int32_t busy = 0;
+  for (int32_t island = 0; island < island_count_(0); ++island) busy += failed_(island) + is_awake_(island);
+  is_still_ = busy == 0;
 }
 
 int32_t World::steps_due(double seconds) {

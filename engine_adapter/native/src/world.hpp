@@ -72,7 +72,12 @@ struct Drive {  // settings of a motor
   double speed, limit;
 };
 
-struct Patch;
+// The part of a body that a hand takes hold of.
+struct Patch {
+  std::vector<int32_t> vertices;
+  std::vector<double> shares;  // of a pull; they add up to 1
+  double strength;             // [N], up to which it is pulled on the patch
+};
 struct SnapshotHead;
 
 class World {
@@ -241,6 +246,7 @@ class World {
   void detach_vertices(int32_t slot, const std::vector<int32_t>& vertices);
   size_t grab_of(ts_grab grab) const;  // index of a grab
   void end_grab(size_t number);
+  Patch patch_around(const Asset& asset, const int32_t* corners, const double* weights, uint32_t count);
   void write_patch(size_t number, int32_t slot, const Patch& patch);
   void read_levels();
   bool are_held(int32_t slot, const std::vector<int32_t>& vertices) const;

@@ -117,7 +117,7 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
 }
 
 void World::despawn(int32_t slot) {
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
   }
   for (size_t m = 0; m < kMostMotors; ++m) {

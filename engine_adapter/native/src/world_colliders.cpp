@@ -11,9 +11,6 @@ Collider& World::collider(int32_t number) {
 }
 
 int32_t World::add_collider(const Collider& row) {
-  if (!scene_->has_contact) {
-    fail(TS_ERROR_STATE, "this world has no contact: export it with collider_room");
-  }
   const int32_t number = colliders_.free_row();
   if (size_t(number) >= collider_room_) {
     fail(TS_ERROR_STATE, "there is room for %zu colliders and all are in use: export with a larger collider_room",

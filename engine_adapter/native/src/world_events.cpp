@@ -34,18 +34,11 @@ std::map<Pair, std::array<float, 3>> World::look() {
 }
 
 void World::record_events(int32_t kinds) {
-  constexpr int32_t kContacts = TS_CONTACT_BEGAN | TS_CONTACT_ENDED;
   if ((kinds & ~TS_ALL_EVENTS) != 0) {
     fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_FROZE", kinds);
   }
-  if (!scene_->has_contact) {
-    if (kinds != 0 && (kinds & ~kContacts) == 0) {
-      fail(TS_ERROR_STATE, "contact events need colliders or soft contact: export the world with them");
-    }
-    kinds &= ~kContacts;
-  }
   if (Events::looks_for(kinds)) look();
-  if (scene_->has_soft_contact) records_touches_(0) = (kinds & kContacts) != 0 ? 1 : 0;
+  if (scene_->has_soft_contact) records_touches_(0) = (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED)) != 0 ? 1 : 0;
   events_.record(kinds, present());
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "error.hpp"
-#include "patch.hpp"
 #include "world.hpp"
 
 namespace taichi_soft {
@@ -61,7 +60,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   for (double each : asset.masses) mass += each;
   const double strongest = max_force < 0.0 ? scene_->pull_in_weights * mass : max_force;
   const int32_t* corners = asset.surface.data + 3 * triangle;
-  const Patch patch = patch_around(*scene_, asset, corners, weights, 3);
+  const Patch patch = patch_around(asset, corners, weights, 3);
 
   grab_body_(g) = slot + 1;
   for (size_t i = 0; i < kGrabCorners; ++i) {
@@ -81,6 +80,27 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
   mark_modified(slot);
   return grab_at(int32_t(g));
+}
+
+// Round a point at rest between `count` vertices, three or four.
+Patch World::patch_around(const Asset& asset, const int32_t* corners, const double* weights, uint32_t count) {
+  const uint32_t n = uint32_t(asset.vertex_count()), elements = uint32_t(asset.element_stiffness.count);
+  const double* rows = machine_->rows.room<double>(2 * n);
+  const double* strength = machine_->found.room<double>(1);
+  machine_->launch("shape_patch",
+                   {Machine::array(corners, count), Machine::array(weights, count),
+                    Machine::array(scene_->patch_limits.data, uint32_t(scene_->patch_limits.count)),
+                    Machine::array(asset.vertices.data, n, 3), Machine::array(asset.masses.data, n),
+                    Machine::array(asset.elements.data, elements, uint32_t(asset.element_width)),
+                    Machine::array(asset.element_stiffness.data, elements), Machine::array(machine_->rows, n, 2),
+                    Machine::array(machine_->found, 1)});
+  Patch found{{}, {}, *strength};
+  for (uint32_t v = 0; v < n; ++v) {
+    if (rows[2 * v] == 0.0) continue;
+    found.vertices.push_back(int32_t(v));
+    found.shares.push_back(rows[2 * v + 1]);
+  }
+  return found;
 }
 
 void World::write_patch(size_t g, int32_t slot, const Patch& patch) {

@@ -100,7 +100,7 @@ double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
 
 size_t World::joint_rows() const {
   int32_t used = 0;
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     if (joint_bodies_(j, 0) != 0) used = std::max(used, joint_span_(j, 1));
   }
   return size_t(used);
@@ -110,7 +110,7 @@ ts_joint World::joint_at(int32_t number) const {
   if (number < 0 || size_t(number) >= kMostJoints) {
     fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostJoints - 1);
   }
-  if (!scene_->has_contact || joint_bodies_(size_t(number), 0) == 0) return 0;
+  if (joint_bodies_(size_t(number), 0) == 0) return 0;
   return kJoint | ts_joint(joint_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
 }
 
@@ -137,11 +137,6 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
     std::vector<int32_t> partners;
     for (const auto& pair : pairs) partners.push_back(pair.second);
     holders = holders_on(other, partners);
-  }
-  if (scene_->is_implicit) fail(TS_ERROR_STATE, "implicit_euler does not support joints: export a world with leapfrog");
-  if (!scene_->has_contact) {
-    fail(TS_ERROR_STATE,
-         "joints need a world with contact: export it with soft_contact, or with collider_room=1");
   }
   size_t j = 0;
   while (j < kMostJoints && joint_bodies_(j, 0) != 0) ++j;
@@ -188,7 +183,7 @@ void World::end_joint(size_t j) {
 
 // Joined bodies are stepped together, even in worlds without a contact search.
 void World::joints_have_changed() {
-  if (!scene_->has_contact || scene_->has_soft_contact) return;
+  if (scene_->has_soft_contact) return;
   machine_->launch("list_joined_islands", {Machine::whole(scene_->slot_count)});
 }
 

@@ -5,7 +5,6 @@
 
 #include "barycentric.hpp"
 #include "error.hpp"
-#include "patch.hpp"
 #include "world.hpp"
 
 namespace taichi_soft {
@@ -134,7 +133,7 @@ void World::require_change(int32_t slot, int32_t level, bool may_release) const 
          asset.level_count(), fix.c_str());
   }
   bool has_joints = false, has_motors = false;
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     has_joints = has_joints || joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1;
   }
   for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || motor_wholes_[0](m) == slot + 1;
@@ -200,7 +199,7 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
 // Releases constraints that have no vertex at another level, and finds the held vertices there.
 void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                       std::map<int32_t, Hanging>* attached) {
-  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
     if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
   }
   for (size_t m = 0; m < kMostMotors; ++m) {
@@ -282,7 +281,7 @@ void World::hold_at(size_t g, const Vector& place) {
     if (!(least > highest)) continue;
     highest = least, weights = shares, corners = asset.tets.data + t;
   }
-  const Patch patch = patch_around(*scene_, asset, corners, weights.data(), 4);
+  const Patch patch = patch_around(asset, corners, weights.data(), 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
     grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
     grab_weights_(g, i) = as_float(weights[i]);

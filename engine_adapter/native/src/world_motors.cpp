@@ -140,9 +140,6 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
     fail(TS_ERROR_ARGUMENT,
          "point is only for a rotation about a fixed axis: set turns and is_fixed too");
   }
-  if (!scene_->has_contact) {
-    fail(TS_ERROR_STATE, "motors need a world with contact: export it with a collider, or collider_room=1");
-  }
   Vector axis = {drive.axis[0] / length, drive.axis[1] / length, drive.axis[2] / length};
   if (!drive.is_fixed) axis = axis_at_rest(slot, vertices, axis);
   int32_t number = 0;

@@ -254,7 +254,6 @@ bool World::lies_in(int32_t particle, int32_t slot, int32_t level) const {
 // Indices of bodies and particles were checked before.
 bool World::are_joints_valid(const Packed& packed, const SnapshotHead& head) const {
   const Scene& s = *scene_;
-  if (!s.has_contact) return head.joint_rows == 0;
   const Place bodies = s.place("joints.bodies"), rows = s.place("joints.rows");
   const Place particle = s.place("joints.particle"), weight = s.place("joints.weight");
   std::vector<std::pair<size_t, size_t>> spans;
@@ -289,7 +288,7 @@ bool World::are_motors_valid(const Packed& packed, const SnapshotHead& head) con
     const int32_t who = packed.number(body, m);
     if (who == 0) continue;
     const int64_t from = packed.number(first, m), to = packed.number(end, m);
-    if (!s.has_contact || !packed.lives(who) || from != int64_t(next) || to <= from || to > int64_t(head.motor_rows)) {
+    if (!packed.lives(who) || from != int64_t(next) || to <= from || to > int64_t(head.motor_rows)) {
       return false;
     }
     Vector direction;
@@ -313,12 +312,10 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
                                                     {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
                                                     {s.place("grabs.particle").offset, s.particle_count},
                                                     {s.place("motors.motor.body").offset, s.slot_count + 1},
-                                                    {s.place("motors.particle").offset, s.particle_count}};
-  if (s.has_contact) {
-    limits.push_back({s.place("joints.bodies").offset, s.slot_count + 1});
-    limits.push_back({s.place("joints.rows").offset, int64_t(kJointRows) + 1});
-    limits.push_back({s.place("joints.particle").offset, s.particle_count});
-  }
+                                                    {s.place("motors.particle").offset, s.particle_count},
+                                                    {s.place("joints.bodies").offset, s.slot_count + 1},
+                                                    {s.place("joints.rows").offset, int64_t(kJointRows) + 1},
+                                                    {s.place("joints.particle").offset, s.particle_count}};
   Levels levels;
   if (!parse_levels(&at, head, &levels)) return false;
   const Packed packed(*this, at, head, levels.levels);
@@ -418,7 +415,7 @@ void World::restore(const char* bytes, size_t size) {
   Levels levels;
   parse_levels(&at, head, &levels);
   const Packed packed(*this, at, head, levels.levels);
-  if (scene_->has_contact) machine_->launch("forget_held", {});
+  machine_->launch("forget_held", {});
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
     if (packed.lives(slot + 1) && levels.levels[size_t(slot)] != level_of(slot)) refill(slot, levels.levels[size_t(slot)]);
   }
@@ -444,7 +441,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &memory.status);
   take_all(&at, &memory.sleepers);
   take_all(&at, &memory.contacts);
-  if (scene_->has_contact) write_colliders();
+  write_colliders();
   mark_driven();
   joints_have_changed();
   surroundings_ = head.surroundings;

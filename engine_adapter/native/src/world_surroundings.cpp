@@ -34,16 +34,12 @@ void World::set_gravity(const Vector& gravity) {
 void World::set_friction(double friction) {
   require_friction(friction);
   const int32_t number = scene_->floor_collider;
-  if (!scene_->has_floor || (scene_->has_contact && !is_floor(number))) {
+  if (!scene_->has_floor || !is_floor(number)) {
     fail(TS_ERROR_STATE,
          "the world has no floor: use ts_collider_set_friction for a collider, or ts_body_set_friction for "
          "contact between bodies");
   }
-  if (scene_->has_contact) return set_collider_friction(number, friction);
-  if (friction == surroundings_.friction) return;
-  surroundings_.friction = friction;
-  write_surroundings();
-  mark_modified(-1);
+  set_collider_friction(number, friction);
 }
 
 bool World::is_floor(int32_t number) const {

@@ -1,4 +1,4 @@
-"""One body at a time, dropped or wrecked: meshes, materials and steps that a library has to bear."""
+"""Single bodies, dropped or strongly deformed, with many meshes, materials and steps."""
 
 from lab.drop_test.robustness.cells import GROUPS, choose_cells, law_variants
 from lab.drop_test.robustness.trial import run_cell

@@ -1,4 +1,4 @@
-"""The library's own shapes, each in four finenesses, about a metre large."""
+"""The library's own shapes, each in four resolutions, about a metre large."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Maker = Callable[[], TetMesh]
 
 
 def _frame(cells: int) -> TetMesh:
-    """A cube of which only the twelve edges are there, `cells` thick."""
+    """The twelve edges of a cube, `cells` thick."""
     side = 4 * cells
     index = np.arange(side)
     is_outer = (index < cells) | (index >= side - cells)

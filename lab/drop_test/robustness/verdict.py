@@ -1,4 +1,4 @@
-"""What became of a cell, in one word and a reason."""
+"""Verdicts: one word and a reason."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from dataclasses import dataclass
 from taichi_soft.core.types import Choice
 
 MOST_SUBSTEPS = 500
-"""Of 1/60 s: what needs more is no game."""
+"""Substeps of 1/60 s beyond which a body is too slow for a game."""
 
 SHAPE_TOLERANCE = 0.01
-"""How far a body that was wrecked may end from its rest shape, in its size."""
+"""Largest distance from the rest shape at the end, over the size of the body."""
 
 SPEED_TOLERANCE = 1.5
-"""Speed at the end over the largest that the fall could have given: above it energy came from nowhere."""
+"""Speed at the end over the largest of the fall, above which the body gained energy."""
 
 
 class Verdict(Choice):
-    """Of a cell, worst first. `TOO_SOFT`: inverted, and the world said so when it was built; `NO_RESULT`: the
-    trial itself broke off."""
+    """Verdict of a cell, worst first.
+
+    `TOO_SOFT`: inverted, after the world had warned of it when it was built. `NO_RESULT`: the trial failed.
+    """
 
     FROZEN = "frozen"
     INVERTED = "inverted"
@@ -33,7 +35,7 @@ class Verdict(Choice):
 
 @dataclass(frozen=True)
 class Ending:
-    """What is to be judged, at the end of a trial."""
+    """Measurements at the end of a trial."""
 
     tets: int
     failure: str | None  # why it froze; None where it did not
@@ -45,7 +47,7 @@ class Ending:
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:
-    """The worst that can be said, and why; no reason where all is well."""
+    """The worst verdict, and its reason; no reason if the body is well."""
     if end.failure is not None:
         return Verdict.FROZEN, end.failure
     if not end.is_finite:

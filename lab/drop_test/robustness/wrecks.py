@@ -1,4 +1,4 @@
-"""Bodies in a state that nobody would build: where recovery has to begin."""
+"""Strongly deformed bodies, as starting points of a recovery."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from taichi_soft.core.math.rotations import matrix_of
 
 Floats = NDArray[np.float64]
 Wreck = Callable[[Floats, np.random.Generator], Floats]
-"""Vertices (n, 3) of a body about the origin to where they are put."""
+"""Function of vertices (n, 3) of a body about the origin that returns their deformed positions."""
 
 NOISE = 1e-3
-"""Of the body's size: what is flat, straight or shrunk is so but for this."""
+"""Remaining thickness of flat, straight or shrunk bodies, over their size."""
 
 
 def _scrambled(x: Floats, rng: np.random.Generator) -> Floats:
@@ -54,13 +54,15 @@ WRECKS: dict[str, Wreck] = {
 
 
 def wrecked(x: Floats, wreck: str, seed: int) -> Floats:
-    """Vertices (n, 3) [m] of a body about the origin, wrecked."""
+    """Deformed vertices (n, 3) [m] of a body about the origin."""
     return WRECKS[wreck](x, np.random.default_rng([seed, list(WRECKS).index(wreck)]))
 
 
 def distance_from_rest(rest: Floats, now: Floats, masses: Floats) -> float:
-    """How far vertices are from the rest shape once rigid motion is taken out (Kabsch 1976), as root mean
-    square over mass, in longest edges of the rest shape's box."""
+    """Distance of vertices from the rest shape without rigid motion (Kabsch 1976).
+
+    It is a root mean square over mass, in units of the longest edge of the rest shape's box.
+    """
     weights = masses / masses.sum()
     a, b = rest - weights @ rest, now - weights @ now
     u, _, v = np.linalg.svd((weights[:, None] * a).T @ b)

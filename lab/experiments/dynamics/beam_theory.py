@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 DEGREE = 12
-"""Of the polynomials: the first frequency no longer changes in its seventh figure."""
+"""Number of polynomials, with which the first frequency has seven correct digits."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Of its section [m^2]."""
+        """Area of its section [m^2]."""
         return self.width * self.height
 
     @property

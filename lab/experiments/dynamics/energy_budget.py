@@ -1,4 +1,4 @@
-"""Where the energy of a falling, bending bar goes (not in the thesis).
+"""Energy budget of a falling, bending bar (not in the thesis).
 
 A bar held at one end is let go from the horizontal, falls, and swings about its bent shape. What gravity
 gives is what it holds in motion and strain, and what the dampers on its edges take: all three are computed
@@ -46,7 +46,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Energies over time [J]: of motion, strain and place, what was damped, and what is missing."""
+    """Energies over time [J]: kinetic, strain and potential energy, damped energy, and the rest."""
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     held = np.flatnonzero(mesh.vertices[:, 0] < -0.5 + 1e-9)
@@ -80,7 +80,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _edges(mesh: TetMesh, positions: Floats) -> Floats:
-    """From the first vertex of each tetrahedron to the others, as rows, (m, 3, 3)."""
+    """Edges from the first vertex of each tetrahedron to the others, as rows, (m, 3, 3)."""
     corners = positions[mesh.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
@@ -101,7 +101,7 @@ def _energy_density(law: LawName, F: Floats) -> Floats:
 
 
 def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float:
-    """What dampers b on all edges take, sum of b (n . dv)^2 [W]."""
+    """Power of dampers b on all edges, the sum of b (n . dv)^2 [W]."""
     p, q = mesh.edges.T
     along = x[q] - x[p]
     closing = ((v[q] - v[p]) * along).sum(axis=1) / np.linalg.norm(along, axis=1)
@@ -109,7 +109,7 @@ def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float
 
 
 def conclude(results: Results) -> Section:
-    """Nothing is missing where there is an energy."""
+    """Judge the budget of laws with an energy."""
     rows = results.where()
     lost = {(p["law"], p["damping"]): n["error"] / n["given"] for p, n in rows}
     undamped, damped = (max(lost[law, b] for law in WITH_ENERGY) for b in (0.0, DAMPING))
@@ -153,9 +153,9 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A bar of 1 x 0.2 x 0.2 m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} kg/m^3), held at one "
-            "end, is let go. Energies of strain are those of the laws' papers, what is damped is the sum of "
-            f"b (n . dv)^2 over all edges (eq. 3.9, b = {DAMPING:g} N s/m), integrated over time.",
+            f"A bar of 1 x 0.2 x 0.2 m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} kg/m^3), attached at "
+            "one end, is released. Strain energies are those of the laws' papers. The damped energy is the "
+            f"sum of b (n . dv)^2 over all edges (eq. 3.9, b = {DAMPING:g} N s/m), integrated over time.",
         ),
         (finding,),
         (

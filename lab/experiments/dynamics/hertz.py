@@ -71,7 +71,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Laws on tetrahedra press back as Hertz says, springs do not."""
+    """Judge the forces against Hertz and finite elements."""
     rows = results.where()
     hertz = np.array([hertz_force(RADIUS * depth) for depth in DEPTHS])
     elements = results.one(law=ELEMENTS, pieces=COARSE, grading=GRADED)
@@ -130,16 +130,17 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A sphere of {RADIUS} m (E = 1e6 Pa, nu = 0.3), held above half of its radius, is pressed on "
-            "a rigid plane without friction, and comes to rest at each depth. The force is what holds it. "
-            "Hertz measures the depth from far away; that the cap is held, finite elements know too.",
-            "A sphere of facets touches with single vertices: while few of them do, the force jumps about "
-            f"Hertz's. On an even mesh of {elements['tets']} tetrahedra finite elements have "
-            f"{even.min():.2f} to {even.max():.2f} of it. On the same mesh, drawn to the contact by a "
-            f"Moebius map until its edges are a quarter as long there, they have {drawn.min():.2f} to "
-            f"{drawn.max():.2f}. What is left between them and the laws grows from {at_first:.1%} to "
-            f"{at_last:.1%} with the depth: the strain under the contact is no longer small.",
-            "Laws of chapter 4 are left out: they need a Delaunay mesh.",
+            f"A sphere of {RADIUS} m (E = 1e6 Pa, nu = 0.3), whose upper half is held, is pressed on "
+            "a rigid plane without friction, and comes to rest at each depth. The force is that on the held "
+            "part. Hertz measures the depth from far away. Finite elements have the same held part.",
+            "A sphere of facets touches the plane with single vertices. While only a few of them touch, "
+            f"the force jumps about Hertz's. On an even mesh of {elements['tets']} tetrahedra finite "
+            f"elements have {even.min():.2f} to {even.max():.2f} times his force. On the same mesh, refined "
+            "towards the contact by a Moebius map until its edges there are a quarter as long, they have "
+            f"{drawn.min():.2f} to {drawn.max():.2f} times his force. The difference between finite "
+            f"elements and the laws grows from {at_first:.1%} to {at_last:.1%} with the depth, because the "
+            "strain under the contact is no longer small.",
+            "Laws of chapter 4 are left out, because they need a Delaunay mesh.",
         ),
         (finding,),
         (
@@ -169,7 +170,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
-    """The model where finite elements on the same mesh do better, else the mesh."""
+    """Reason: the model if finite elements on the same mesh are closer, else the mesh."""
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:
         return f"the mesh: finite elements on it are off by up to {left:.1%}, and the laws are near to these"

@@ -31,9 +31,9 @@ VELOCITY, SPIN = np.array([1.0, 0.5, -0.3]), np.array([0.5, 3.0, 1.0])  # m/s, r
 STRETCH, SHEAR = 1.05, 0.05
 FRAMES = 60
 CENTRAL = (*TETRAHEDRAL, "springs", "volume_springs")
-"""Laws of which no force should turn a body. Those of chapter 4 push both ends of an edge sideways, too."""
+"""Laws whose forces should not turn a body. Those of chapter 4 also push both ends of an edge sideways."""
 ROUND_OFF = 1e-5
-"""Change over what there was: float32 leaves some 1e-7, what turns a body leaves a hundredth and more."""
+"""Relative change: round-off of float32 causes about 1e-7, torques a hundredth and more."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -47,7 +47,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Largest change of both, over momentum and angular momentum at the start; -1 where the body breaks."""
+    """Largest relative change of momentum and angular momentum; -1 if the body fails."""
     mesh = box(SIZE, CELLS)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     world = World(gravity=(0, 0, 0), floor=None, retries=0)
@@ -86,7 +86,7 @@ def _momenta(masses: Floats, positions: NDArray[Any], velocities: NDArray[Any]) 
 
 
 def conclude(results: Results) -> Section:
-    """Momentum stays under every law, angular momentum where forces do not push edges sideways."""
+    """Judge momentum under every law, and angular momentum under those without sideways forces."""
     rows = results.where()
     sound = [(p, n) for p, n in rows if n["times"]]
     momentum = max(n["momentum"] for _, n in sound)
@@ -130,9 +130,9 @@ def conclude(results: Results) -> Section:
         (
             f"A box of {' x '.join(map(str, SIZE))} m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} "
             "kg/m^3), stretched and sheared by 5 %, flies, tumbles and vibrates without gravity.",
-            "Opposite forces on the ends of an edge keep the momentum; they turn the body where they do not "
-            "point along it, as the shear force of chapter 4 does not. Its damping (eq. 4.5) cannot "
-            "tell a shear from a turn, and brakes both.",
+            "Opposite forces on the ends of an edge conserve momentum. They turn the body if they do not "
+            "point along the edge, as the shear force of chapter 4. The damping of that chapter (eq. 4.5) "
+            "does not distinguish a shear from a rotation, and brakes both.",
         ),
         (finding,),
         (

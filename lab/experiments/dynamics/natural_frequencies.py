@@ -65,7 +65,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Frequencies of both beams [Hz], 0 where they break; a swing over the one a period before."""
+    """Frequencies of both beams [Hz], 0 if they fail; a swing over the one a period before."""
     mesh = beam_mesh(point["cells"])
     numbers: Numbers = {"tets": len(mesh.tets)}
     for support in SUPPORTS:
@@ -121,15 +121,15 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             f"A beam of {LENGTH} x {WIDTH} x {HEIGHT} m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} "
-            "kg/m^3), held at one end or free, is given the velocity of its first bending mode, and its "
-            "frequency is read from zero crossings. Laws on tetrahedra and springs are undamped; the others "
-            "belong to no energy and get what damping they need, which the tables tell. Finite elements: "
+            "kg/m^3), attached at one end or free, starts with the velocity of its first bending mode. Its "
+            "frequency is read from zero crossings. Laws on tetrahedra and springs are undamped. The others "
+            "have no energy and get the damping that they need, which the tables list. Finite elements: "
             "scikit-fem, linear tetrahedra on the same mesh, with the mass at the vertices.",
             "Linear tetrahedra are too stiff in bending, in finite elements as in the laws of chapter 6: "
             f"with {COARSE} cells along the height a cantilever is {_excess(results, 'cantilever', COARSE)} "
             f"too fast, with {FINE} ({fine['tets']} tetrahedra) {_excess(results, 'cantilever', FINE)}. "
-            f"Refined without end it would come to {tends['virial']:.2f} of Timoshenko's frequency, one of "
-            f"springs to {tends['springs']:.2f}.",
+            f"Extrapolated to an infinitely fine mesh, it has {tends['virial']:.2f} times Timoshenko's "
+            f"frequency, and one of springs {tends['springs']:.2f} times.",
         ),
         tuple(findings),
         tuple(tables),
@@ -141,7 +141,7 @@ def conclude(results: Results) -> Section:
 
 
 def _laws(results: Results) -> list[str]:
-    """Of the coarse mesh, in order."""
+    """Laws of the coarse mesh, in order."""
     return [point["law"] for point, _ in results.where(cells=COARSE) if point["law"] != ELEMENTS]
 
 

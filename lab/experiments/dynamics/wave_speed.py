@@ -140,13 +140,14 @@ def conclude(results: Results) -> Section:
 
     return Section(
         (
-            f"A bar of {LENGTH:g} m, {THICKNESS} m thick (E = {YOUNG:g} Pa, {DENSITY:g} kg/m^3), is moved by "
-            f"half a bell of {WIDTH} m standard deviation and {1e3 * HEIGHT:g} mm height at one end, and let "
-            "go, undamped. Where the bell is highest is followed along the bar; its speed is the slope of a "
-            "straight line.",
-            "A bar this thin widens freely, so that Poisson's ratio leaves its speed alone; for nu = 0 it is "
-            "also that of the pressure wave in an unbounded body. The square of the speed tells with which "
-            f"modulus a law resists: springs with k = E a / l have {(springs['speed'] / SPEED) ** 2:.2f} E.",
+            f"A bar of {LENGTH:g} m, {THICKNESS} m thick (E = {YOUNG:g} Pa, {DENSITY:g} kg/m^3), starts "
+            f"undamped with a displacement at one end: half a bell of {WIDTH} m standard deviation and "
+            f"{1e3 * HEIGHT:g} mm height. The highest point of the bell is followed along the bar. Its speed "
+            "is the slope of a straight line.",
+            "A bar this thin widens freely, so that Poisson's ratio does not change its speed. For nu = 0 "
+            "the speed is also that of the pressure wave in an unbounded body. The square of the speed "
+            "gives the modulus of a law: springs with k = E a / l have "
+            f"{(springs['speed'] / SPEED) ** 2:.2f} E.",
         ),
         (finding,),
         (

@@ -1,7 +1,7 @@
 """State of particles before and after a step, and gravity."""
 
 from taichi_soft.bodies.status import ACTIVE
-from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.constants import LANES, POSITION_LIMIT, ROW_BITS, VELOCITY_LIMIT
 from taichi_soft.core.math.finite import is_within
 from taichi_soft.core.runtime import ti
 
@@ -11,6 +11,18 @@ def save_particle(state: ti.template(), p):
     """Save the state of a particle before the step, to interpolate from and to fall back to."""
     state.prev_position[p] = state.particle_position[p]
     state.prev_velocity[p] = state.particle_velocity[p]
+
+
+@ti.func
+def highest_speed(state: ti.template(), body):
+    """Of the particles of a body [m/s]."""
+    particles, speed2 = state.body_particles[body], ti.Vector.zero(state.real, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            v = state.particle_velocity[first + lane]
+            speed2[lane] = ti.max(speed2[lane], ti.select(first + lane < particles[1], v.dot(v), 0.0))
+    return ti.sqrt(speed2.max())
 
 
 @ti.func

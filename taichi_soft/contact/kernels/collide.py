@@ -110,25 +110,31 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 
 @ti.func
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
-    """Store the clearance of each particle from the first `count` near colliders, 1 or more."""
-    outer, particles = state.touching.body_outer[body], state.body_particles[body]
-    if is_deep:
-        for p in range(particles[0], particles[1]):
-            state.contact.particle_clearance[p] = reach
+    """Store the clearance of each particle from the first `count` near colliders, 1 or more.
+
+    Planes stop all particles: inner ones of a body that folds would otherwise go below the floor.
+    """
+    contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        contact.particle_clearance[p] = UNSEEN
+    touches_by_points = False  # of its hull, and by no particle
+    if ti.static(state.capacity.contact.hull):
+        touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
+    if is_deep and not touches_by_points:
         for i in range(count):
-            _measure_clearance(state, state.contact.near[row + i], particles[0], particles[1], 0, since, left)
+            if contact.collider_kind[contact.near[row + i]] != ShapeKind.PLANE:
+                _measure_clearance(state, contact.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
-            # One that went in unseen is not thrown out at once.
-            if state.contact.particle_clearance[p] < 0.0:
-                state.contact.particle_clearance[p] = UNSEEN
-        if ti.static(state.capacity.contact.hull):
-            if state.hull.body_points[body][0] < state.hull.body_points[body][1]:  # and these do not touch
-                for k in range(state.body_outer[body][0], state.body_outer[body][1]):
-                    state.contact.particle_clearance[state.outer_particle[k]] = UNSEEN
+            if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
+                contact.particle_clearance[p] = UNSEEN
     for k in range(outer[0], outer[1]):
-        state.contact.particle_clearance[state.touching.outer_particle[k]] = reach
+        contact.particle_clearance[state.touching.outer_particle[k]] = reach
     for i in range(count):
-        _measure_clearance(state, state.contact.near[row + i], outer[0], outer[1], 1, since, left)
+        c = contact.near[row + i]
+        if contact.collider_kind[c] == ShapeKind.PLANE and not touches_by_points:
+            _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
+        else:
+            _measure_clearance(state, c, outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
@@ -141,28 +147,23 @@ def forget_contacts(state: ti.template(), body: ti.i32):
         state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
         row = row_behind(row)
-    was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
-    if was_deep and state.contact.near_count[body] > 0:
-        p = state.body_particles[body][0]
-        while p < state.body_particles[body][1]:
-            state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
-            p = row_behind(p)
     state.contact.near_count[body] = 0
     state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0
 
 
 @ti.func
-def collided(state: ti.template(), body, p, start, way_velocity, h, since):
-    """Position and velocity of a particle after a substep among colliders.
+def collide_particle(state: ti.template(), body, p, h, since):
+    """Let a particle that its velocity has moved in a substep collide on that way.
 
+    One that touches nothing stays where it is: the result does not depend on what else is looked at.
     Args:
-        start: where it is [m].
-        way_velocity: with which it would go on [m/s].
         h: substep [s].
-        since: time since the start of the fixed step [s], to which the colliders' poses belong.
+        since: time from the start of the fixed step to that of the substep [s].
     """
-    x, v, way = start, way_velocity, h * way_velocity
+    v = state.particle_velocity[p]
+    way = h * v
+    x = state.particle_position[p] - way
     row = body * state.contact.capacity.colliders
     left = ti.cast(1.0, ti.f32)  # part of the substep still to go
     touches, is_open = 0, 1
@@ -218,4 +219,6 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
                 if state.particle_contact[p] == 0:
                     state.particle_contact[p] = c + 1
             v = v_out
-    return x + way, v
+    if touches > 0:
+        state.particle_position[p] = x + way
+        state.particle_velocity[p] = v

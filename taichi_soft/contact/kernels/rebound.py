@@ -7,6 +7,7 @@ body, and never more than contact gave: a collider does not pull.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
+from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -49,6 +50,20 @@ def add_normal_impulse(contact: ti.template(), row, normal_impulse, normal, befo
 
 
 @ti.func
+def _momentum_along(state: ti.template(), first, end, n):
+    """Mass [kg] of particles that move, and their momentum along `n` [kg m/s]."""
+    masses, momenta = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
+    for block in range((end - first + LANES - 1) // LANES):
+        row = (first + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            counts = row + lane < end and state.particle_inv_mass[row + lane] > 0.0
+            mass = ti.select(counts, state.particle_mass[row + lane], 0.0)
+            masses[lane] += mass
+            momenta[lane] += mass * state.particle_velocity[row + lane].dot(n)
+    return masses.sum(), momenta.sum()
+
+
+@ti.func
 def limit_rebounds(state: ti.template(), body, time):
     """Take from a body what the presses of a substep give its centre of mass beyond the restitution.
 
@@ -64,13 +79,7 @@ def limit_rebounds(state: ti.template(), body, time):
         normal_impulse = state.contact.normal_impulse[row].norm()
         if normal_impulse > 0.0:
             n = state.contact.normal_impulse[row] / normal_impulse
-            mass, along = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
-            moment = ti.Vector.zero(ti.f32, 3)
-            for p in range(particles[0], particles[1]):
-                if state.particle_inv_mass[p] > 0.0:
-                    mass += state.particle_mass[p]
-                    along += state.particle_mass[p] * state.particle_velocity[p].dot(n)
-                    moment += state.particle_mass[p] * state.particle_position[p]
+            mass, along = _momentum_along(state, particles[0], particles[1], n)
             speed = along / mass - rates.y / rates.x
             approach = normal_impulse / mass - speed
             leave = state.contact.rebound[row]
@@ -82,8 +91,10 @@ def limit_rebounds(state: ti.template(), body, time):
             state.contact.rebound[row] = leave
             excess = ti.min(mass * (speed - leave), normal_impulse)
             if excess > 0.0:
+                moment = ti.Vector.zero(ti.f32, 3)
                 for p in range(particles[0], particles[1]):
                     if state.particle_inv_mass[p] > 0.0:
+                        moment += state.particle_mass[p] * state.particle_position[p]
                         state.particle_velocity[p] = state.particle_velocity[p] - excess / mass * n
                 arm = moment / mass - state.contact.collider_position[c]
                 arm -= state.contact.collider_velocity[c] * time

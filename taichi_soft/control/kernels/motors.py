@@ -21,7 +21,6 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti
-from taichi_soft.core.types import Integrator
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
 """Largest number of motors of a world, and of particles of all motors."""
@@ -106,7 +105,7 @@ def _pattern(state: ti.template(), motor, p, point, axis):
 
 
 @ti.func
-def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
+def _run_motor(state: ti.template(), motor, h, kick):
     """Apply a motor. Returns: its impulse [N m s] or [N s]."""
     gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
     point, axis = _axis_now(state, motor)
@@ -118,10 +117,7 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
         if inv_mass > 0.0:
             d = _pattern(state, motor, p, point, axis)
             velocity = state.particle_velocity[p]
-            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):  # computes its forces later
-                velocity += h * gravity
-            else:
-                velocity += kick * (inv_mass * state.particle_force[p].xyz + gravity)
+            velocity += ti.select(kick > 0.0, kick, h) * (inv_mass * state.particle_force[p].xyz + gravity)
             inertia += state.particle_mass[p] * d.dot(d)
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
@@ -146,12 +142,11 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
 
 
 @ti.real_func
-def run_motors(
-    state: ti.template(), program: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32
-):
-    """Apply the motors of one body for a substep of `h` [s], in a world with contact.
+def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32):
+    """Apply the motors of one body for a substep of `h` [s].
 
-    They use the velocities after a kick of `kick` [s], so that they include resisting forces.
+    They use the velocities after a kick of `kick` [s], so that they include resisting forces. If `kick` is 0,
+    forces are computed later, and they include gravity only.
 
     Args:
         is_first: 1 in the first substep of a step.
@@ -161,7 +156,7 @@ def run_motors(
             if state.motors.motor[number].body == body + 1:
                 motor = state.motors.motor[number]
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
-                state.motors.impulse[number] = before + _run_motor(state, program, motor, h, kick)
+                state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
                 if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
                     state.contact.calm[body] = 0.0  # keeps a slow start from counting as rest
 

@@ -17,9 +17,8 @@ def is_finite(v):
 
 @ti.func
 def is_within(v, limit):
-    """1 if every component of a vec3 is finite and its absolute value is below `limit`."""
-    good = is_finite(v)
+    """1 if the absolute value of every component of a vec3 is below `limit`, which is false for NaN."""
+    good = 1
     for i in ti.static(range(3)):
-        if not (ti.abs(v[i]) < limit):
-            good = 0
+        good = good & int(ti.abs(v[i]) < limit)
     return good

@@ -109,6 +109,20 @@ def _fitted_normal(state: ti.template(), e, xp, r):
 
 
 @ti.func
+def _split_normal(state: ti.template(), e, xp, r):
+    """Normal of a ring that is split twice, of any length, and its carried direction (4.4.2)."""
+    one, other, carried = r * 0.0, r * 0.0, r * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        arm, weights = state.particle_position[state.ring_members[k][0]] - xp, state.ring_weights[k]
+        carried += arm * weights[0] + r * weights[1]
+        arm -= r * 0.5
+        one += arm * weights[2]
+        other += arm * weights[3]
+    return one.cross(other), carried
+
+
+@ti.func
 def _tilted_normal(state: ti.template(), e, xp, r):
     """Normal of the plane tilted by the particles around an edge (4.4.3)."""
     axis = direction_of(r)
@@ -136,6 +150,8 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
         normal, compared = _subface_normal(state, e, xp, r)
     if ti.static(law.ring == Ring.PLANE):
         normal, compared = _fitted_normal(state, e, xp, r)
+    if ti.static(law.ring == Ring.HALVES):
+        normal, compared = _split_normal(state, e, xp, r)
     if ti.static(law.ring == Ring.TILT):
         normal = _tilted_normal(state, e, xp, r)
     return r, direction_of(normal), compared

@@ -187,7 +187,7 @@ def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.te
     else:
         # Laws that compare directions have their constants per length 1.
         per_length = constants.x * 0.0 + 1.0
-        if ti.static(law.ring == Ring.SUBFACES or law.ring == Ring.PLANE):
+        if ti.static(law.ring in (Ring.SUBFACES, Ring.PLANE, Ring.HALVES)):
             per_length = 1.0 / ti.max(ti.sqrt(r.dot(r)), 1e-15)
         return along_and_across(n, constants.y * per_length, constants.z * per_length)
 

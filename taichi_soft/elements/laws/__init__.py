@@ -23,6 +23,7 @@ from taichi_soft.elements.laws.face import face_forces
 from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
 from taichi_soft.elements.laws.model import ElementModel
 from taichi_soft.elements.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
+from taichi_soft.elements.laws.split_ring_plane import split_ring_plane_bonds
 from taichi_soft.elements.laws.springs import spring_bonds
 from taichi_soft.elements.laws.st_venant_kirchhoff import (
     st_venant_kirchhoff_energy,
@@ -111,6 +112,13 @@ LAWS: dict[LawName, Law] = {
             "the same with a plane fitted to the particles around the edge",
             Ring.PLANE,
             best_fitting_plane_bonds,
+        ),
+        BondLaw(
+            "split_ring_plane",
+            "thesis 4.4.2",
+            "the same with the cheap normal of that plane: a ring of particles split into halves twice",
+            Ring.HALVES,
+            split_ring_plane_bonds,
         ),
         BondLaw(
             "tilted_plane",

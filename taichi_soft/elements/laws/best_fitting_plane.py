@@ -54,43 +54,29 @@ def plane_normals(rings: EdgeRings) -> Floats:
     return np.asarray(axes[:, :, 0] * np.where(side < 0, -1.0, 1.0)[:, None])
 
 
-def split_ring_normals(rings: EdgeRings) -> Floats:
-    """Cheap normals of 4.4.2 at rest, (k, 3): sums instead of eigenvectors.
+def carried_by_ring(rings: EdgeRings, normals: Floats) -> tuple[Floats, Floats]:
+    """Weights (s,) of each particle around an edge, and (s,) of the edge's far end, in the carried direction.
 
-    The particles around an edge are split into two halves, and again a quarter of a turn further. The normal
-    is perpendicular to the two vectors between the means of the halves; for three particles it is that of
-    their plane.
+    Summed over the rows of `rings.neighbours` of an edge, they give the direction that `normals` had at rest,
+    as carried by the tetrahedra (`carried_direction`).
     """
-    mesh = rings.mesh
+    far, one, other = carried_direction(rings, normals).T
     edge, vertex = rings.neighbours
-    ends = mesh.vertices[mesh.edges]
-    offset = mesh.vertices[vertex] - ends[edge].mean(axis=1)
-    start = np.searchsorted(edge, np.arange(len(mesh.edges)))
-    index, count = np.arange(len(edge)) - start[edge], np.maximum(np.bincount(edge), 3)[edge]
-    half = count // 2
-    spans = []
-    for shift in (0 * count, np.maximum(1, np.rint(count / 4).astype(np.int64))):
-        weight = np.where((index - shift) % count < half, 1 / half, -1 / (count - half))
-        spans.append(np.add.reduceat(weight[:, None] * offset, start, axis=0))
-    normals = np.cross(*spans)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    side = np.einsum("ka,ka->k", normals, ends[:, 1] - ends[:, 0])
-    return np.asarray(normals * np.where(side < 0, -1.0, 1.0)[:, None])
+    count = len(rings.mesh.vertices)
+    keys = edge * count + vertex
+    weight = np.zeros(len(keys))
+    order = np.argsort(keys)
+    for side, weights in zip(rings.sides.T, (one, other), strict=True):
+        np.add.at(weight, order[np.searchsorted(keys[order], rings.edge * count + side)], weights)
+    return weight, np.asarray((rings.sum(far) / np.bincount(edge))[edge])
 
 
 def best_fitting_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
     """Ring rows: a particle; its weight, and part of the far end's weight, in the carried direction."""
     rings = require_tets(mesh, material, "best_fitting_plane")
     normals = plane_normals(rings)
-    far, one, other = carried_direction(rings, normals).T
+    weight, far_weight = carried_by_ring(rings, normals)
     edge, vertex = rings.neighbours
-    count = len(mesh.vertices)
-    keys = edge * count + vertex
-    weight = np.zeros(len(keys))
-    order = np.argsort(keys)
-    for side, weights in zip(rings.sides.T, (one, other), strict=True):
-        np.add.at(weight, order[np.searchsorted(keys[order], rings.edge * count + side)], weights)
-    far_weight = (rings.sum(far) / np.bincount(edge))[edge]
     young, shear, damping = moduli(rings, material)
     area = rings.edge_areas
     return Bonds(

@@ -22,6 +22,7 @@ class Ring(Enum):
     VORONOI = "voronoi"  # corners of the Voronoi face, each in barycentric coordinates of four particles
     SUBFACES = "subfaces"  # the two particles that span a barycentric subface
     PLANE = "plane"  # particles to fit a plane to
+    HALVES = "halves"  # particles, whose ring is split into halves twice
     TILT = "tilt"  # particles whose rise tilts a plane
 
 

@@ -1,14 +1,11 @@
-"""How forces become motion. A new integrator is one file and one line here."""
+"""How forces become motion. A new integrator is one file, one line here and its name in `core.types`."""
 
-from taichi_soft.core.types import Integrator
-from taichi_soft.solver.integrators.explicit_euler import explicit_euler
-from taichi_soft.solver.integrators.lazy_leapfrog import lazy_leapfrog
-from taichi_soft.solver.integrators.leapfrog import leapfrog
+from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
+from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER
+from taichi_soft.solver.integrators.lazy_leapfrog import LAZY_LEAPFROG
+from taichi_soft.solver.integrators.leapfrog import LEAPFROG
+from taichi_soft.solver.integrators.model import IntegratorModel
 
-__all__ = ["ADVANCE"]
+__all__ = ["INTEGRATORS", "IntegratorModel"]
 
-ADVANCE = {  # implicit Euler moves a whole body at once and so is a kernel: `solver.kernels.implicit_euler`
-    Integrator.EXPLICIT_EULER: explicit_euler,
-    Integrator.LEAPFROG: leapfrog,
-    Integrator.LAZY_LEAPFROG: lazy_leapfrog,
-}
+INTEGRATORS = {model.name: model for model in (EXPLICIT_EULER, LEAPFROG, LAZY_LEAPFROG, IMPLICIT_EULER)}

@@ -1,9 +1,27 @@
 """Explicit Euler (thesis section 3.5.1, eq. 3.16). Gains energy on every oscillation; for comparison."""
 
 from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.solver.integrators.explicit import add_forces, any_shape, before_each, whole_substep
+from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.kernels.kick import kick_by_forces
 
 
 @ti.func
-def explicit_euler(x, v, a, h, kick):
+def advance(x, v, a, h, kick):
     """Position and velocity one substep later, both from the old values."""
     return x + h * v, v + h * a
+
+
+EXPLICIT_EULER = IntegratorModel(
+    Integrator.EXPLICIT_EULER,
+    felt_time=whole_substep,
+    drive_time=before_each,
+    hold=add_forces,
+    predict=kick_by_forces,
+    check=any_shape,
+    advance=advance,
+    only_flat=True,
+    warning="explicit_euler gains energy at every substep, however short, and explodes sooner or later: it "
+    "is here for comparison, leapfrog is for use",
+)

@@ -1,10 +1,18 @@
 """Lazy leapfrog (thesis section 3.5.2): explicit Euler with its two lines swapped."""
 
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.solver.integrators.explicit import add_forces, any_shape, before_each, whole_substep
+from taichi_soft.solver.integrators.leapfrog import advance
+from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.kernels.kick import kick_by_forces
 
-
-@ti.func
-def lazy_leapfrog(x, v, a, h, kick):
-    """Position after `h` [s] with the new velocity, which comes first. `kick` is a whole substep [s]."""
-    v_new = v + kick * a
-    return x + h * v_new, v_new
+LAZY_LEAPFROG = IntegratorModel(
+    Integrator.LAZY_LEAPFROG,
+    felt_time=whole_substep,
+    drive_time=before_each,
+    hold=add_forces,
+    predict=kick_by_forces,
+    check=any_shape,
+    advance=advance,
+    lag=0.5,  # to the order of the error that it makes
+)

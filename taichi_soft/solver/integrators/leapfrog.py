@@ -1,15 +1,44 @@
 """Leapfrog (thesis section 3.5.2, eq. 3.17 with v_3/2 = v_1/2 + h M^-1 f(x_1)).
 
-Velocities live half a substep behind positions. `kick` is the time from the velocity's last moment to
-the middle of the coming substep: h in a steady run, h / 2 from a fresh start, where the velocity
-belongs to the same moment as the position, and (h_old + h) / 2 where the substep changes.
+Velocities live half a substep behind positions. A kick lasts from the velocity's last moment to the middle of
+the coming substep: h in a steady run, h / 2 from a fresh start, where the velocity belongs to the same moment
+as the position, and (h_old + h) / 2 where the substep changes.
 """
 
 from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.solver.integrators.explicit import add_forces, any_shape
+from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.kernels.kick import kick_by_forces
 
 
 @ti.func
-def leapfrog(x, v, a, h, kick):
+def advance(x, v, a, h, kick):
     """Position one substep later, velocity half a substep ahead of where the position was."""
     v_new = v + kick * a
     return x + h * v_new, v_new
+
+
+@ti.func
+def felt_time(lag, h, s):
+    """The first kick of a step ends the lag."""
+    return 0.5 * (lag + h) if s == 0 else h
+
+
+@ti.func
+def drive_time(h, s, substeps):
+    """Half of the first comes after the last."""
+    return 0.5 * h if s == 0 or s == substeps else h
+
+
+LEAPFROG = IntegratorModel(
+    Integrator.LEAPFROG,
+    felt_time=felt_time,
+    drive_time=drive_time,
+    hold=add_forces,
+    predict=kick_by_forces,
+    check=any_shape,
+    advance=advance,
+    lag=0.5,
+    is_lag_told=True,
+)

@@ -15,30 +15,11 @@ from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
-
-
-@ti.func
-def rows_of(state: ti.template(), program: ti.template(), island):
-    """First row of an island's bodies, and the row behind the last."""
-    first, end = island, island + 1
-    if ti.static(program.has_contact):
-        first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
-    return first, end
-
-
-@ti.func
-def body_at(state: ti.template(), program: ti.template(), row):
-    """The body in such a row."""
-    body = row
-    if ti.static(program.has_contact):
-        body = state.contact.island_body[row]
-    return body
 
 
 @ti.func
@@ -47,10 +28,8 @@ def attempts_of(state: ti.template(), program: ti.template()):
     and braked, or the same number."""
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        # Without contact it cuts its substeps by itself.
-        halvings = ti.static(MOST_PIECES.bit_length() - 1 if program.has_contact else 0)
-        last = halvings
+    if ti.static(program.integrator.halvings > 0):
+        halvings = last = program.integrator.halvings
     return halvings, last
 
 
@@ -59,12 +38,12 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
     """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or as many as the shapes of an
     island's bodies ask for."""
     least = ti.cast(substeps, ti.f32)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+    if ti.static(program.integrator.has_stable_step):
         if state.retries[None] > 0:
-            first, end = rows_of(state, program, island)
+            first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
             row = first
             while row < end:
-                body = body_at(state, program, row)
+                body = state.contact.island_body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
                     # A forged snapshot may say anything.
@@ -87,8 +66,7 @@ def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
                 if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
-        if ti.static(program.has_contact):
-            _begin_contacts(state, program, body)
+        _begin_contacts(state, program, body)
 
 
 @ti.func
@@ -123,57 +101,57 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
         restore_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             state.particle_reaction[p] = state.prev_reaction[p]
-        if ti.static(program.has_contact and state.capacity.implicit):
+        if ti.static(state.capacity.implicit):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     clear_forces(state, body)
-    if ti.static(program.has_contact):
-        take_back_rebounds(state, body)
-        forget_contacts(state, body)
-        if ti.static(state.capacity.contact.hull):
-            forget_held(state, body)
-        if ti.static(program.has_soft_contact):
-            forget_candidates(state, body)  # for good, as the island looks for others before it goes on
+    take_back_rebounds(state, body)
+    forget_contacts(state, body)
+    if ti.static(state.capacity.contact.hull):
+        forget_held(state, body)
+    if ti.static(program.has_soft_contact):
+        forget_candidates(state, body)  # for good, as the island looks for others before it goes on
 
 
 @ti.real_func
 def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32):
     """Put an island back to where it was before the step."""
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
-        _put_back_body(state, program, body_at(state, program, row))
+        _put_back_body(state, program, state.contact.island_body[row])
     if ti.static(program.has_soft_contact):
         forget_touches(state, island)
 
 
 @ti.func
-def brake_island(state: ti.template(), program: ti.template(), island, is_braked):
+def brake_island(state: ti.template(), island, is_braked):
     """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     row = first
     while row < end:
-        state.body_is_braked[body_at(state, program, row)] = is_braked
+        state.body_is_braked[state.contact.island_body[row]] = is_braked
         row = row_behind(row)
 
 
 @ti.func
 def body_is_sound(state: ti.template(), body):
     """Whether all of a body can still be computed with (1)."""
-    particles = state.body_particles[body]
-    sound, p = 1, particles[0]
-    while p < particles[1]:
-        sound = sound & particle_is_valid(state, p)
-        p = row_behind(p)
-    return sound
+    particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            is_broken = int(first + lane < particles[1]) & (1 - particle_is_valid(state, first + lane))
+            broken[lane] = broken[lane] | is_broken
+    return 1 - broken.max()
 
 
 @ti.func
-def island_is_sound(state: ti.template(), program: ti.template(), island):
+def island_is_sound(state: ti.template(), island):
     """Whether all that moves in an island can still be computed with (1)."""
     sound = 1
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
-        body = body_at(state, program, row)
+        body = state.contact.island_body[row]
         if state.body_status[body] == ACTIVE:
             sound = sound & body_is_sound(state, body)
     return sound

@@ -10,7 +10,6 @@ from taichi_soft.control.kernels.drives import push_particles
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.attempts import body_is_sound
 from taichi_soft.solver.kernels.sleep import note_way_of_hulled
@@ -37,8 +36,7 @@ def _freeze_if_broken(state: ti.template(), body):
 @ti.func
 def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
     """Returns 1 where it failed, stays inside out, or was not solved as exactly as asked."""
-    if ti.static(program.integrator == Integrator.LEAPFROG):
-        push_particles(state, body, 0.5 * h)
+    push_particles(state, body, program.integrator.drive_time(h, substeps, substeps))
     failed = _freeze_if_broken(state, body)
     if failed == 0:
         state.body_velocity_lag[body] = h
@@ -48,9 +46,9 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         failed = untangle_body(state, program, body, substeps * h)
         if ti.static(state.capacity.contact.hull):
             note_way_of_hulled(state, body, substeps * h)
-        if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        if ti.static(state.capacity.implicit):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
-    elif ti.static(program.has_contact):
+    else:
         forget_contacts(state, body)  # it was put back: nothing has touched it
     return failed
 

@@ -10,7 +10,7 @@ that swings would keep it awake.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
 
@@ -27,13 +27,14 @@ def update_rest_state(state: ti.template(), body):
     rest_state, sleep_speed = MOVING, state.contact.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
-        mass, motion = 0.0, 0.0
-        p = particles[0]
-        while p < particles[1]:
-            mass += state.particle_mass[p]
-            motion += state.particle_mass[p] * state.particle_velocity[p].norm_sqr()
-            p = row_behind(p)
-        most = mass * sleep_speed * sleep_speed
+        masses, motions = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
+        for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+            first = (particles[0] + block * LANES) & ROW_BITS
+            for lane in range(LANES):
+                mass = ti.select(first + lane < particles[1], state.particle_mass[first + lane], 0.0)
+                masses[lane] += mass
+                motions[lane] += mass * state.particle_velocity[first + lane].norm_sqr()
+        most, motion = masses.sum() * sleep_speed * sleep_speed, motions.sum()
         rest_state = int(motion <= SLOW_FACTOR * SLOW_FACTOR * most) + int(motion <= most)
     if state.contact.rest_state[body] != rest_state:
         state.contact.rest_state[body] = rest_state

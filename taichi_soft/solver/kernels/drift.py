@@ -1,6 +1,7 @@
 """Drift among colliders: new positions from velocities, and what colliders in the way make of both."""
 
-from taichi_soft.contact.kernels.collide import collided, find_near_colliders
+from taichi_soft.bodies.kernels.particles import highest_speed
+from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
 from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
 from taichi_soft.contact.kernels.rebound import limit_rebounds
@@ -12,92 +13,115 @@ from taichi_soft.solver.step_fields import Job
 
 
 @ti.func
-def is_clear(state: ti.template(), body, way):
-    """Whether a body meets no collider on its next `way` [m] (1)."""
-    return int(
-        state.contact.near_count[body] == 0 and state.contact.gone[body] + way <= state.contact.reach[body]
-    )
+def look_for_colliders(state: ti.template(), body, speed, since, left):
+    """List the colliders that a body may meet at a speed [m/s] in what is left of the step, and a quarter
+    beyond."""
+    place_points(state, body)
+    find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
 
 
 @ti.func
-def has_drifted(state: ti.template(), body, speed, h):
-    """Take note that a body alone has moved; put it back where it may have met something (0)."""
-    clear = is_clear(state, body, speed * h)
-    if clear == 1:
-        state.contact.gone[body] = state.contact.gone[body] + speed * h
-        note_motion(state, body, speed)
+def can_drift_at_once(state: ti.template(), body, way):
+    """Whether a body alone can go its next `way` [m] before it collides (1): near colliders are known.
+
+    Points of hulls that are near a collider change the velocities of particles before they move.
+    """
+    is_known = int(state.contact.gone[body] + way <= state.contact.reach[body])
+    if ti.static(state.capacity.contact.hull):
+        is_known = is_known & int(state.contact.near_count[body] == 0 or not has_hull(state, body))
+    return is_known
+
+
+@ti.func
+def _move_block(state: ti.template(), first, count, h):
+    """Move up to `LANES` particles from `first` on by their velocities."""
+    positions = ti.Matrix.zero(state.real, LANES, 3)
+    for lane in range(LANES):
+        x = state.particle_position[first + lane] + h * state.particle_velocity[first + lane]
+        for i in ti.static(range(3)):
+            positions[lane, i] = x[i]
+    if count >= LANES:
+        for lane in range(LANES):
+            for i in ti.static(range(3)):
+                state.particle_position[first + lane][i] = positions[lane, i]
+    else:
+        lane = 0
+        while lane < count:
+            for i in ti.static(range(3)):
+                state.particle_position[first + lane][i] = positions[lane, i]
+            lane = row_behind(lane)
+
+
+@ti.func
+def _collide_body(state: ti.template(), body, h, since, gone):
+    """Let the particles of a body that have moved by their velocities collide on that way.
+
+    Args:
+        gone: way since near colliders were listed, this one included [m].
+    """
+    particles = state.body_particles[body]
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        is_clear = ti.Vector.zero(ti.i32, LANES)
+        for lane in range(LANES):
+            is_clear[lane] = int(state.contact.particle_clearance[first + lane] > gone)
+        if is_clear.min() == 0:
+            p, end = first, ti.min(first + LANES, particles[1])
+            while p < end:
+                if not (state.contact.particle_clearance[p] > gone) and state.particle_inv_mass[p] > 0.0:
+                    collide_particle(state, body, p, h, since)
+                p = row_behind(p)
+    limit_rebounds(state, body, since + h)
+
+
+@ti.real_func
+def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone: ti.f32):
+    """Let a body collide that has moved by its velocities, and note how fast it is then.
+
+    Args:
+        gone: way since near colliders were listed, this one included [m].
+    """
+    state.contact.gone[body] = gone
+    if state.contact.near_count[body] > 0:
+        _collide_body(state, body, h, since, gone)
+    place_points(state, body)
+    is_noted = int(state.contact.calm[body] != 0.0)
+    if ti.static(state.capacity.contact.hull):
+        is_noted = is_noted & int(not has_hull(state, body))  # whose way a step counts: `note_way_of_hulled`
+    if is_noted == 1:
+        note_motion(state, body, highest_speed(state, body))
+
+
+@ti.real_func
+def drift_body(state: ti.template(), body: ti.i32, job: Job):
+    """New positions of one body, and what colliders in the way make of both."""
+    gone = state.contact.gone[body] + job.fastest * job.h
+    is_new = int(not (state.contact.reach[body] >= gone))
+    if is_new == 1:
+        look_for_colliders(state, body, job.fastest, job.since, job.left)
+        gone = job.fastest * job.h
+    if ti.static(state.capacity.contact.hull):
+        if state.contact.near_count[body] > 0:
+            collide_points(state, body, job.h, job.since, gone)
+        elif is_new == 1:
+            forget_held(state, body)
+    particles = state.body_particles[body]
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        _move_block(state, first, particles[1] - first, job.h)
+    end_drift(state, body, job.h, job.since, gone)
+
+
+@ti.func
+def has_drifted(state: ti.template(), body, speed, h, since):
+    """Collide a body alone that the kick has moved; put it back if near colliders are not known (0)."""
+    is_known = can_drift_at_once(state, body, speed * h)
+    if is_known == 1:
+        end_drift(state, body, h, since, state.contact.gone[body] + speed * h)
     else:
         particles = state.body_particles[body]
         p = particles[0]
         while p < particles[1]:
             state.particle_position[p] = state.particle_position[p] - h * state.particle_velocity[p]
             p = row_behind(p)
-    return clear
-
-
-@ti.func
-def _drift_block(state: ti.template(), body, first, count, h, since, gone):
-    """New positions of up to `LANES` particles from `first` on, one by one of those that may meet a collider.
-
-    Returns: the square of the way of each [m^2].
-    """
-    positions = ti.Matrix.zero(state.real, LANES, 3)
-    meets_none = state.contact.near_count[body] == 0
-    way2, passes = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
-    for lane in range(LANES):
-        p = first + lane
-        way = h * state.particle_velocity[p]
-        x = state.particle_position[p] + way
-        is_far = meets_none or state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
-        for i in ti.static(range(3)):
-            positions[lane, i] = x[i]
-        passes[lane] = ti.select(is_far, 1.0, 0.0)
-        way2[lane] = ti.select(lane < count, way.dot(way), 0.0)
-    if count >= LANES and passes.min() > 0.0:
-        for lane in range(LANES):
-            for i in ti.static(range(3)):
-                state.particle_position[first + lane][i] = positions[lane, i]
-    else:
-        for lane in range(ti.min(count, LANES)):
-            p = first + lane
-            if passes[lane] > 0.0:
-                for i in ti.static(range(3)):
-                    state.particle_position[p][i] = positions[lane, i]
-            else:
-                x = state.particle_position[p]
-                x_new, v_new = collided(state, body, p, x, state.particle_velocity[p], h, since)
-                state.particle_position[p] = x + (x_new - x)
-                state.particle_velocity[p] = v_new
-                way2[lane] = (x_new - x).dot(x_new - x)
-    return way2
-
-
-@ti.real_func
-def drift_body(state: ti.template(), body: ti.i32, job: Job):
-    """New positions of one body, and what colliders in the way make of velocities."""
-    h, since = job.h, job.since
-    gone = state.contact.gone[body] + job.fastest * h
-    is_new = int(not (state.contact.reach[body] >= gone))
-    if is_new == 1:
-        # A quarter more than the rest of the step needs at this speed.
-        place_points(state, body)
-        find_near_colliders(state, body, 1.25 * job.fastest * job.left + 1e-3, since, job.left)
-        gone = job.fastest * h
-    state.contact.gone[body] = gone
-    if ti.static(state.capacity.contact.hull):
-        if state.contact.near_count[body] > 0:
-            collide_points(state, body, h, since, gone)
-        elif is_new == 1:
-            forget_held(state, body)
-    particles = state.body_particles[body]
-    way2 = ti.Vector.zero(state.real, LANES)
-    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
-        first = (particles[0] + block * LANES) & ROW_BITS
-        way2 = ti.max(way2, _drift_block(state, body, first, particles[1] - first, h, since, gone))
-    place_points(state, body)
-    limit_rebounds(state, body, since + h)
-    if ti.static(state.capacity.contact.hull):
-        if not has_hull(state, body):  # it is looked at after the step: see `note_way_of_hulled`
-            note_motion(state, body, ti.sqrt(way2.max()) / h)
-    else:
-        note_motion(state, body, ti.sqrt(way2.max()) / h)
+    return is_known

@@ -2,10 +2,12 @@
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
+from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.substep import advance_body
+from taichi_soft.solver.kernels import flat
+from taichi_soft.solver.kernels.substep import substep_alone
 from taichi_soft.solver.step_fields import Moment
 
 
@@ -38,11 +40,16 @@ def find_broken_element(
                     is_open = 0
                 else:
                     clear_forces(state, body)
-                    now = Moment(s=s, substeps=substeps, h=h)
-                    advance_body(state, program, body, now, True)
+                    if ti.static(program.has_contact):
+                        now = Moment(s=s, substeps=substeps, h=h, since=s * h, left=h * (substeps - s))
+                        substep_alone(state, program, body, now)
+                    else:
+                        flat.substep_alone(state, program, body, h, s, substeps)
         state.body_is_braked[body] = 0
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
         clear_forces(state, body)
         forget_loads(state, body)
+        if ti.static(program.has_contact):
+            forget_contacts(state, body)

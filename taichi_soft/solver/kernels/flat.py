@@ -18,14 +18,15 @@ from taichi_soft.bodies.kernels.particles import (
 )
 from taichi_soft.bodies.kernels.plasticity import flow_block
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
+from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressures
 from taichi_soft.elements.kernels.edges import edge_force_of
 from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
-from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.motion import JOLT, kick_time, moved_particle
+from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clear_forces
+from taichi_soft.solver.kernels.kick import JOLT
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
 _FAILING, _DONE = 5, 6  # above the status of any body: the step is made again, or need not be
@@ -86,12 +87,35 @@ def gathered_force(state: ti.template(), p):
 
 
 @ti.func
+def _felt_time(state: ti.template(), program: ti.template(), body, h, s):
+    return program.integrator.felt_time(state.body_velocity_lag[body], h, s)
+
+
+@ti.func
+def _moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
+    """One substep of one particle under the internal force on it [N]; a pinned one keeps its velocity.
+
+    Returns: its new position [m] and velocity [m/s], and its acceleration [m/s^2].
+    """
+    inv_mass = state.particle_inv_mass[p]
+    is_free = inv_mass > 0.0
+    acceleration = (force * inv_mass + gravity) * ti.select(is_free, 1.0, 0.0)
+    x, v = program.integrator.advance(
+        state.particle_position[p], state.particle_velocity[p], acceleration, h, kick
+    )
+    if ti.static(program.has_floor):
+        if is_free:
+            x, v = resolve_floor(x, v, h, state.floor[None])
+    return x, v, acceleration
+
+
+@ti.func
 def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
     body = state.particle_body[p]
     if state.body_status[body] == ACTIVE:
-        kick = kick_time(state, program, body, h, s)
+        kick = _felt_time(state, program, body, h, s)
         force, gravity = gathered_force(state, p), gravity_on(state, body)
-        x, v, a = moved_particle(state, program, p, force, gravity, h, kick)
+        x, v, a = _moved_particle(state, program, p, force, gravity, h, kick)
         state.particle_position[p] = x
         state.particle_velocity[p] = v
         if not (kick * a.norm() <= JOLT * state.body_sound_speed[body]):
@@ -113,8 +137,30 @@ def _gather_phase(state: ti.template(), p, h, s, substeps):
 @ti.func
 def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, substeps):
     if _is_damped_now(state, body, h, s, substeps):
-        damp_vibration(state, program, body, kick_time(state, program, body, h, s), h, s, substeps)
+        damp_vibration(
+            state,
+            program,
+            body,
+            _felt_time(state, program, body, h, s),
+            h,
+            s,
+            substeps,
+        )
         clear_forces(state, body)
+
+
+@ti.func
+def substep_alone(state: ti.template(), program: ti.template(), body, h, s, substeps):
+    """One substep of one body in one thread, to find out what broke it."""
+    accumulate_forces(state, program, body)
+    kick = _felt_time(state, program, body, h, s)
+    damp_vibration(state, program, body, kick, h, s, substeps)
+    for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+        force, gravity = state.particle_force[p].xyz, gravity_on(state, body)
+        x, v, _ = _moved_particle(state, program, p, force, gravity, h, kick)
+        state.particle_position[p] = x
+        state.particle_velocity[p] = v
+    clear_forces(state, body)
 
 
 @ti.func

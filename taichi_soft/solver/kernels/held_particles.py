@@ -29,10 +29,7 @@ coming to rest."""
 @ti.func
 def _friction_on(state: ti.template(), p):
     """Coefficient of friction of what holds a particle."""
-    friction = state.floor[None].z
-    if ti.static(state.capacity.has_contact):
-        friction = state.contact.collider_surface[state.particle_contact[p] - 1].x
-    return friction
+    return state.contact.collider_surface[state.particle_contact[p] - 1].x
 
 
 @ti.func

@@ -1,14 +1,12 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
 (M + h D + h^2 K) dv = h (f + m g - h K v): the forces of the old positions, and how they change on the way.
-K is projected, and acts on what a body moves beside its rotation: see `rigid_rotation`. Where forces change
-too unevenly on the path, the step is made in pieces. The solve holds particles that lie on the floor at its
-height, until it would have to pull them down: see `held_particles`.
+K is projected, and acts on what a body moves beside its rotation: see `rigid_rotation`. The solve holds
+particles that lie on colliders, until it would have to pull them down: see `held_particles`.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
-from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.control.kernels.grabs import add_grabs
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
@@ -20,7 +18,7 @@ from taichi_soft.elements.kernels.linear_system import (
     clear_system,
 )
 from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks
-from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle, solve_held
+from taichi_soft.solver.kernels.held_particles import solve_held
 from taichi_soft.solver.kernels.rigid_rotation import multiply, split_off_rotation
 
 FARTHEST = 0.5
@@ -67,67 +65,6 @@ def solve_body(state: ti.template(), program: ti.template(), body, h, held_count
 
 
 @ti.func
-def _lay_on_floor(state: ti.template(), program: ti.template(), body, h):
-    """Hold particles that lie on the floor. Returns their number."""
-    count = 0
-    if ti.static(program.has_floor):
-        fall = h * gravity_on(state, body).norm()
-        particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            if state.particle_contact[p] == 1 and state.particle_inv_mass[p] > 0.0:
-                up, still = ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(state.real, 3)
-                hold_particle(state, p, up, state.particle_velocity[p], still, fall)
-                count += 1
-    return count
-
-
-@ti.func
-def _move(state: ti.template(), program: ti.template(), p, h):
-    """Position and velocity of one particle after the solve; what the floor does with it."""
-    if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
-        state.particle_position[p] = state.particle_position[p] + h * state.particle_velocity[p]
-        # The solve leaves this row open: what it lacks, the particle passes on [N s].
-        state.solution[p] = state.particle_force[p].xyz - state.image[p]
-    else:
-        v = state.particle_velocity[p] + state.solution[p]
-        x = state.particle_position[p] + h * v
-        if ti.static(program.has_floor):
-            if state.particle_contact[p] == 1:
-                velocity, pressing, _ = held_velocity(state, p)
-                v = velocity
-                x = state.particle_position[p] + h * v
-                if pressing < 0.0:
-                    state.particle_contact[p] = 0
-            else:
-                falling = x.z < state.floor[None].x
-                x, v = resolve_floor(x, v, h, state.floor[None])
-                if falling and v.z == 0.0:
-                    state.particle_contact[p] = 1
-        state.particle_position[p] = x
-        state.particle_velocity[p] = v
-    state.particle_force[p] = ti.Vector.zero(state.real, 4)
-
-
-@ti.func
-def _remember(state: ti.template(), body):
-    """Keep where the particles are, in fields that the solver has done with."""
-    particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
-        state.direction[p] = state.particle_position[p]
-        state.residual[p] = state.particle_velocity[p]
-        state.prev_contact[p] = state.particle_contact[p]
-
-
-@ti.func
-def _take_back(state: ti.template(), body):
-    particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
-        state.particle_position[p] = state.direction[p]
-        state.particle_velocity[p] = state.residual[p]
-        state.particle_contact[p] = state.prev_contact[p]
-
-
-@ti.func
 def add_pin_reactions(state: ti.template(), body, h):
     """Add up what pinned particles took up in a piece of a step [N s]."""
     if state.body_drives[body] & FEELS_REACTION != 0:
@@ -147,11 +84,8 @@ def keep_residual(state: ti.template(), body, residual, is_first):
 
 
 @ti.func
-def _slow_down(state: ti.template(), body, h, share):
-    """Leave a piece of `h` [s] a share of its motion, but all of what the body's particles have in common.
-
-    What even the finest piece cannot follow loses speed: left to itself it would throw the body apart.
-    """
+def _keep_share(state: ti.template(), body, h, share):
+    """Leave a substep of `h` [s] a share of its motion, but all that the body's particles have in common."""
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -161,8 +95,6 @@ def _slow_down(state: ti.template(), body, h, share):
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
             common = momentum / mass
-            if state.particle_contact[p] == 1:
-                common.z = 0.0
             v = common + share * (state.particle_velocity[p] - common)
             state.particle_position[p] = state.direction[p] + h * v
             state.particle_velocity[p] = v
@@ -193,29 +125,8 @@ def keeps_shape(state: ti.template(), body):
 
 
 @ti.func
-def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_first):
-    """One substep of one body: in one piece, or in more where its edges would change too much at once.
-
-    The solve takes the forces as linear. What goes far beyond that, such as a fall that ends within the step,
-    would be thrown anywhere.
-    """
-    piece, left = h, 1
-    largest = ti.cast(0.0, state.real)
-    while left > 0:
-        held_count = _lay_on_floor(state, program, body, piece)
-        residual = solve_body(state, program, body, piece, held_count)
-        _remember(state, body)
-        particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            _move(state, program, p, piece)
-        change = _largest_change(state, body)
-        if change > FARTHEST and piece > h / MOST_PIECES:
-            _take_back(state, body)
-            piece, left = 0.5 * piece, 2 * left
-        else:
-            if change > FARTHEST:
-                _slow_down(state, body, piece, FARTHEST / change)
-            largest = ti.max(largest, residual)
-            left -= 1
-            add_pin_reactions(state, body, piece)
-    keep_residual(state, body, largest, is_first)
+def slow_down(state: ti.template(), body, h):
+    """Take speed from a body of which an edge has changed by more than `FARTHEST` in a substep of `h` [s]."""
+    change = _largest_change(state, body)
+    if change > FARTHEST:
+        _keep_share(state, body, h, FARTHEST / change)

@@ -9,10 +9,16 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
-from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
-from taichi_soft.solver.kernels.motion import JOLT, PRESSED
 from taichi_soft.solver.step_fields import Job
+
+JOLT = 1.0
+"""By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
+body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
+cross the smallest tetrahedron."""
+
+PRESSED = 4.0
+"""The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
+by what it presses against."""
 
 EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
@@ -20,14 +26,7 @@ taken to be exploding: others pass through it until it is frozen or calm."""
 
 
 @ti.func
-def _put_block(
-    state: ti.template(),
-    program: ti.template(),
-    first,
-    positions: ti.template(),
-    velocities: ti.template(),
-    speeds_beside: ti.template(),
-):
+def _put_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
     """Write what a kick made of `LANES` particles from `first` on, and clear what the next one begins with.
 
     Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
@@ -38,9 +37,6 @@ def _put_block(
     for lane in range(LANES):
         for i in ti.static(range(3)):
             state.particle_velocity[first + lane][i] = velocities[lane, i]
-    if ti.static(program.has_soft_contact):
-        for lane in range(LANES):
-            state.soft.particle_speed[first + lane] = speeds_beside[lane]
     for lane in range(LANES):
         state.contact.particle_touches[first + lane] = 0
     for lane in range(LANES):
@@ -48,15 +44,7 @@ def _put_block(
 
 
 @ti.func
-def _put_last_block(
-    state: ti.template(),
-    program: ti.template(),
-    first,
-    count,
-    positions: ti.template(),
-    velocities: ti.template(),
-    speeds_beside: ti.template(),
-):
+def _put_last_block(state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()):
     """The same of the last particles of a body, fewer than `LANES`."""
     lane = 0
     while lane < count:
@@ -64,25 +52,48 @@ def _put_last_block(
         for i in ti.static(range(3)):
             state.particle_position[p][i] = positions[lane, i]
             state.particle_velocity[p][i] = velocities[lane, i]
-        if ti.static(program.has_soft_contact):
-            state.soft.particle_speed[p] = speeds_beside[lane]
         state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         lane = row_behind(lane)
 
 
 @ti.func
-def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, way, common):
-    """New velocities from the forces, which are cleared, of up to `LANES` particles from `first` on, and
-    positions after `way` [s] with them. What lies behind them is computed too, and counts nothing.
+def _note_block(state: ti.template(), first, count, common, velocities: ti.template()):
+    """Write the speed beside the `common` velocity of up to `LANES` particles from `first` on, for the search
+    for contacts, before the kick's new velocities are written.
 
-    Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration,
-    which counts less where something held it.
+    Returns: the square of that with which each may strike another.
+    """
+    speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    for lane in range(LANES):
+        v = ti.Vector([velocities[lane, i] for i in ti.static(range(3))])
+        speeds[lane] = (v - common).norm()
+        # What presses against others gains speed only to lose it to them.
+        was_touched = state.contact.particle_touches[first + lane] == 1
+        beside = ti.select(was_touched, state.particle_velocity[first + lane], v) - common
+        striking2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
+    if count >= LANES:
+        for lane in range(LANES):
+            state.soft.particle_speed[first + lane] = speeds[lane]
+    else:
+        lane = 0
+        while lane < count:
+            state.soft.particle_speed[first + lane] = speeds[lane]
+            lane = row_behind(lane)
+    return striking2
+
+
+@ti.func
+def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, job):
+    """New velocities of up to `LANES` particles from `first` on, and positions after the job's `drift_time`
+    with them. Forces are cleared. The rows behind are computed too, and count nothing.
+
+    Returns: of each the square of its speed, of that with which it may strike another, and of its
+    acceleration, which counts less where something held it.
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
     velocities = ti.Matrix.zero(state.real, LANES, 3)
-    speeds_beside = ti.Vector.zero(state.real, LANES)
-    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
     # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
     for lane in range(LANES):
@@ -91,45 +102,44 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
         # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
         acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
-        v_before = state.particle_velocity[p]
-        x, v = program.advance(state.particle_position[p], v_before, acceleration.xyz, way, kick)
+        x, v = program.integrator.advance(
+            state.particle_position[p], state.particle_velocity[p], acceleration.xyz, job.drift_time, kick
+        )
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
-        # What presses against others gains speed only to lose it to them.
-        was_touched = state.contact.particle_touches[p] == 1
-        if ti.static(program.has_soft_contact):
-            speeds_beside[lane] = (v - common).norm()
-            beside = ti.select(was_touched, v_before, v) - common
-            beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        counts = ti.select(was_touched, 1.0 / PRESSED**2, 1.0)
+        counts = ti.select(state.contact.particle_touches[p] == 1, 1.0 / PRESSED**2, 1.0)
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
+    if ti.static(program.has_soft_contact):
+        if job.has_pairs == 1:
+            striking2 = _note_block(state, first, count, job.velocity, velocities)
     if count >= LANES:
-        _put_block(state, program, first, positions, velocities, speeds_beside)
+        _put_block(state, first, positions, velocities)
     else:
-        _put_last_block(state, program, first, count, positions, velocities, speeds_beside)
-    return speed2, beside2, acceleration2
+        _put_last_block(state, first, count, positions, velocities)
+    return speed2, striking2, acceleration2
 
 
 @ti.func
-def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, common):
-    """New velocities from the forces, which are cleared, and positions after `way` [s] with them.
+def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
+    """New velocities after `kick` [s] of the forces, which are cleared, and positions after the job's
+    `drift_time`.
 
-    Returns: the highest speed [m/s], the highest and the mean beside the `common` velocity, and the largest
-    change, which counts less of what something held.
+    Returns: the highest speed [m/s]; the highest and the mean with which it may strike another, if it has
+    pairs; and whether forces changed no velocity by too much at once (1).
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
-    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2, total2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for block in range((count + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
-        v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, way, common)
-        speed2, beside2 = ti.max(speed2, v2), ti.max(beside2, b2)
+        v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, job)
+        speed2, striking2 = ti.max(speed2, v2), ti.max(striking2, b2)
         acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
-    change = kick * ti.sqrt(acceleration2.max())
-    return ti.sqrt(speed2.max()), ti.sqrt(beside2.max()), ti.sqrt(total2.sum() / count), change
+    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= JOLT * state.body_sound_speed[body])
+    return ti.sqrt(speed2.max()), ti.sqrt(striking2.max()), ti.sqrt(total2.sum() / count), is_stable
 
 
 @ti.func
@@ -151,27 +161,15 @@ def _note_speeds(
 
 
 @ti.real_func
-def kick_among_colliders(
-    state: ti.template(), program: ti.template(), body: ti.i32, job: Job, kick: ti.f32
-) -> ti.i32:
-    """New velocities of one body after `kick` [s] of its forces, and positions after the job's `drift_time`.
+def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
+    """New velocities of one body that has felt its forces for so long [s].
 
     Notes the highest speed [m/s], the highest and the mean beside the job's `velocity`, and what it returns.
     Returns: whether forces changed no velocity by too much at once (1).
     """
-    is_stable = 1
-    speed, beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
-    mean_beside = ti.cast(0.0, state.real)
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
-        mean_beside = beside
-    else:
-        speed, beside, mean_beside, change = _kick_body(
-            state, program, body, kick, job.drift_time, job.velocity
-        )
-        is_stable = int(change <= JOLT * state.body_sound_speed[body])
-        if ti.static(state.capacity.contact.hull):
-            of_points, beside_of_points = note_points(state, body, job.velocity)
-            speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
+    speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
+    if ti.static(state.capacity.contact.hull):
+        of_points, beside_of_points = note_points(state, body, job.velocity)
+        speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
     _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
     return is_stable

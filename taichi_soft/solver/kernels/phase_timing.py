@@ -3,7 +3,8 @@
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces
 from taichi_soft.elements.kernels.elastic import accumulate_elastic_forces
-from taichi_soft.solver.kernels.motion import move_body
+from taichi_soft.solver.kernels.kick import kick_body
+from taichi_soft.solver.step_fields import Job
 
 PHASES = ("elastic", "damping", "motion")
 
@@ -30,4 +31,4 @@ def repeat_phase(
                     if state.body_model[body] == m:
                         accumulate_edge_forces(state, model, body)
             if ti.static(phase == "motion"):
-                move_body(state, program, body, h, h)
+                kick_body(state, program, body, Job(h=h, drift_time=h), h)

@@ -1,30 +1,38 @@
 """One fixed step of the schedule `per_body`: as many attempts as it takes, each of many substeps.
 
 One thread makes all substeps of an island, and islands go side by side. Nothing waits between substeps, and
-a body stays in one core's cache. With contact an island is all bodies that may touch in the step or are
-joined, and threads that have nothing else to do help with it (`jobs.py`). Without contact each body is an
-island of its own. The result does not depend on the number of threads.
+a body stays in one core's cache. An island is all bodies that may touch in the step or are joined, and
+threads that have nothing else to do help with it (`jobs.py`). The result does not depend on the number of
+threads.
 
 A long step is made in several calls, so that Ctrl-C can come between: each island goes on where it stopped.
 """
 
+from taichi_soft.bodies.kernels.particles import gravity_on, highest_speed
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.parting import find_overlaps, part_bodies
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
     attempts_of,
-    begin_body,
     brake_island,
     island_is_sound,
     put_back_island,
     refined_substeps,
 )
-from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
 from taichi_soft.solver.kernels.sleep import settle_island, wake_by_colliders, wake_island
-from taichi_soft.solver.kernels.substep import BEGIN, END, NONE, OUTDATED, do_phase, each_body, substep
+from taichi_soft.solver.kernels.substep import (
+    BEGIN,
+    END,
+    NONE,
+    OUTDATED,
+    do_phase,
+    each_body,
+    is_alone,
+    substep,
+)
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
@@ -55,20 +63,20 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         count, first = finer * least, run.s
         end = ti.min(first + left, count)
         if first == 0:
-            _begin_attempt(state, program, island, run)
+            _begin_attempt(state, program, island, substeps * h, run)
         is_last = int(run.attempt == last)
         _make_substeps(state, program, island, end, count, longest / finer, is_last, run)
         left -= run.s - first
         if is_last == 0 and run.is_stable == 0:
             _put_back(state, program, island, run, halvings)
         elif run.s == count:
-            if (is_last | island_is_sound(state, program, island)) == 1:
+            if (is_last | island_is_sound(state, island)) == 1:
                 is_good = 1
             else:
                 _put_back(state, program, island, run, halvings)
     if is_good == 1:
         _end(state, program, island, run, finer * least, longest / finer)
-        _settle(state, program, island, run, substeps * h)
+        run.is_awake = settle_island(state, island, substeps * h)  # what was calm for long enough sleeps
     state.progress[island] = run
     return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake
 
@@ -76,23 +84,22 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
 @ti.func
 def _begin(state: ti.template(), program: ti.template(), island):
     """Wake bodies that one awake may touch, and remember where all are."""
-    is_awake = 0
-    if ti.static(program.has_contact):
-        is_awake = wake_island(state, island)
-        if is_awake == 1:
-            each_body(state, program, island, Job(phase=BEGIN))
-            if ti.static(program.has_soft_contact):
-                find_overlaps(state, island)
-    else:
-        is_awake = int(state.body_status[island] == ACTIVE)
-        begin_body(state, program, island)
+    is_awake = wake_island(state, island)
+    if is_awake == 1:
+        each_body(state, program, island, Job(phase=BEGIN))
+        if ti.static(program.has_soft_contact):
+            find_overlaps(state, island)
     attempt = ti.select(is_awake == 1, 0, DONE)
     state.progress[island] = Progress(attempt=attempt, is_stable=1, is_awake=is_awake, candidates=NONE)
 
 
 @ti.func
-def _begin_attempt(state: ti.template(), program: ti.template(), island, run: ti.template()):
-    if ti.static(program.has_soft_contact):
+def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
+    if is_alone(state, program, island) == 1:
+        body = state.contact.island_body[state.contact.island_first[island]]
+        # With what it falls in the step: near colliders are listed once.
+        run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
+    elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
 
 
@@ -103,7 +110,7 @@ def _make_substeps(
     """Substeps to before `end`, of so many in an attempt, which ends where it is found to be too coarse."""
     while run.s < end and (run.is_stable | is_last) == 1:
         s = run.s
-        now = Moment(s=s, substeps=count, h=h, since=s * h, left=h * (count - s))
+        now = Moment(s=s, substeps=count, is_last=is_last, h=h, since=s * h, left=h * (count - s))
         substep(state, program, island, now, run)
         run.s = s + 1
 
@@ -137,93 +144,22 @@ def _put_back(state: ti.template(), program: ti.template(), island, run: ti.temp
     run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
     run.fastest, run.shift = 0.0, ti.Vector.zero(ti.f32, 3)
     if run.attempt > halvings:
-        brake_island(state, program, island, 1)
+        brake_island(state, island, 1)
 
 
 @ti.func
 def _end(state: ti.template(), program: ti.template(), island, run: ti.template(), substeps, h):
     """End the step of each body; freeze what is broken."""
     failed = 0
-    if ti.static(program.has_contact):
-        each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
-        row = state.contact.island_first[island]
-        while row < state.contact.island_first[island + 1]:
-            failed += state.contact.has_failed[state.contact.island_body[row]]
-            row = row_behind(row)
-        if ti.static(program.has_soft_contact):
-            part_bodies(state, island, substeps * h)
-    else:
-        failed = end_body(state, program, island, substeps, h)
-    brake_island(state, program, island, 0)
+    each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
+    row = state.contact.island_first[island]
+    while row < state.contact.island_first[island + 1]:
+        failed += state.contact.has_failed[state.contact.island_body[row]]
+        row = row_behind(row)
+    if ti.static(program.has_soft_contact):
+        part_bodies(state, island, substeps * h)
+    brake_island(state, island, 0)
     run.attempt, run.failed = DONE, failed
-
-
-@ti.func
-def _settle(state: ti.template(), program: ti.template(), island, run: ti.template(), dt):
-    """Let an island that was calm for long enough fall asleep, after a step of `dt` [s]."""
-    if ti.static(program.has_contact):
-        run.is_awake = settle_island(state, island, dt)
-
-
-@ti.real_func
-def _step_alone(
-    state: ti.template(),
-    program: ti.template(),
-    body: ti.i32,
-    substeps: ti.i32,
-    h: ti.f32,
-    most: ti.i32,
-    goes_on: ti.i32,
-) -> ti.i32:
-    """As `fixed_step`, without contact.
-
-    By itself, so that sums are rounded alike in the kernels for one thread and for several.
-    """
-    failed, _ = fixed_step(state, program, body, substeps, h, most, goes_on)
-    return failed
-
-
-@ti.kernel
-def step_per_body(
-    state: ti.template(),
-    program: ti.template(),
-    body_count: ti.i32,
-    substeps: ti.i32,
-    h: ti.f32,
-    most: ti.i32,
-    goes_on: ti.i32,
-) -> ti.i32:
-    """One fixed step of every active body, side by side, or the next `most` substeps of it.
-
-    Returns: how many had trouble in it, or UNFINISHED: then it is to be called again, with `goes_on` 1.
-    """
-    failed, unfinished = 0, 0
-    ti.loop_config(block_dim=1)
-    for body in range(body_count):
-        found = _step_alone(state, program, body, substeps, h, most, goes_on)
-        failed += ti.max(found, 0)
-        unfinished += int(found == UNFINISHED)
-    return ti.select(unfinished > 0, UNFINISHED, failed)
-
-
-@ti.kernel
-def step_in_turn(
-    state: ti.template(),
-    program: ti.template(),
-    body_count: ti.i32,
-    substeps: ti.i32,
-    h: ti.f32,
-    most: ti.i32,
-    goes_on: ti.i32,
-) -> ti.i32:
-    """As `step_per_body` in the calling thread: a single body need not wait for another thread to wake up."""
-    failed, unfinished = 0, 0
-    ti.loop_config(serialize=True)
-    for body in range(body_count):
-        found = _step_alone(state, program, body, substeps, h, most, goes_on)
-        failed += ti.max(found, 0)
-        unfinished += int(found == UNFINISHED)
-    return ti.select(unfinished > 0, UNFINISHED, failed)
 
 
 @ti.kernel
@@ -237,7 +173,7 @@ def step_islands(
     most: ti.i32,
     goes_on: ti.i32,
 ) -> ti.i32:
-    """One fixed step of every active body with contact, or the next `most` substeps of it.
+    """One fixed step of every active body, or the next `most` substeps of it.
 
     Args:
         helpers: threads that may work on islands of others when there is none left for themselves.

@@ -1,4 +1,4 @@
-"""One substep, phase by phase, in the order in which they run: with contact and without.
+"""One substep, phase by phase, in the order in which they run.
 
     each body by itself     wind, drives
                             internal forces, reactions of pins, grabs, motors
@@ -9,8 +9,7 @@
     each body by itself     drift: new positions
 
 Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
-of them. Without contact each body is an island of its own, and its kick and drift are one pass over its
-particles.
+of them. A body alone drifts in its kick, in one pass over its particles, and collides after it.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -25,21 +24,16 @@ from taichi_soft.contact.kernels.broad_phase import (
 from taichi_soft.contact.kernels.contact_solver import solve_island
 from taichi_soft.contact.kernels.narrow_phase import find_gaps
 from taichi_soft.contact.kernels.touches import add_touches
-from taichi_soft.control.kernels.drives import add_reactions, blow_on, push_particles
-from taichi_soft.control.kernels.grabs import pull_grabs
+from taichi_soft.control.kernels.drives import blow_on, push_particles
 from taichi_soft.control.kernels.joints import solve_joints
 from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
-from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
-from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_shape
+from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, look_for_colliders
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
-from taichi_soft.solver.kernels.kick import kick_among_colliders
-from taichi_soft.solver.kernels.motion import kick_time, move_body
+from taichi_soft.solver.kernels.kick import kick_body
 from taichi_soft.solver.kernels.vibration import damp_body, to_positions
 from taichi_soft.solver.step_fields import Job
 
@@ -62,43 +56,37 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
         now: a `Moment`.
         run: a `Progress`, which becomes that after the substep.
     """
-    if ti.static(program.has_contact):
-        drift_time = _kick_bodies(state, program, island, now, run)
-        speed, impact_speed = _compare_speeds(state, island, now, run)
-        if _has_drifted(state, island, now, run, drift_time) == 0:
-            joint_speed, joint_impact = _solve_joints(state, program, island, now, run)
-            _solve_contact(state, program, island, now, run, ti.max(impact_speed, joint_impact))
-            _drift_bodies(state, program, island, now, run, ti.max(speed, joint_speed))
-        _check_shapes(state, program, island, run)
-    else:
-        run.is_stable = run.is_stable & advance_body(state, program, island, now, True)
+    drift_time = _kick_bodies(state, program, island, now, run)
+    speed, impact_speed = _compare_speeds(state, island, now, run)
+    if _has_drifted(state, island, now, run, drift_time) == 0:
+        of_joints = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
+        _solve_contact(state, program, island, now, run, ti.max(impact_speed, of_joints.y))
+        _drift_bodies(state, program, island, now, run, ti.max(speed, of_joints.x))
+    _check_shapes(state, program, island, now, run)
 
 
 @ti.func
-def advance_body(state: ti.template(), program: ti.template(), body, now, drifts: ti.template()):
-    """The phases of one body by itself.
+def _advance_body(state: ti.template(), program: ti.template(), body, job):
+    """The phases of one body by itself: wind, drives and forces, damping, kick."""
+    felt = program.integrator.felt_time(state.body_velocity_lag[body], job.h, job.s)
+    blow_on(state, body, job.h)
+    push_particles(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
+    program.integrator.hold(state, program, body, job.h, felt)
+    run_motors(state, body, job.h, felt, int(job.s == 0))
+    if job.s == 0:
+        update_rest_state(state, body)
+    damp_body(state, program, body, felt, job.h, job.s, job.substeps)
+    calm_body(state, program, body, to_positions(program, felt, job.h), job.h, job.s, job.substeps)
+    kick_body(state, program, body, job, felt)
 
-    Args:
-        now: a `Moment`, or a `Job` where the body is among colliders.
-        drifts: whether its particles drift in the kick, as nothing but the floor can be in the way.
-    Returns: whether forces changed no velocity by too much at once (1); by implicit Euler always.
-    """
-    kick = kick_time(state, program, body, now.h, now.s)
-    felt = _felt_time(program, kick, now)
-    blow_on(state, body, now.h)
-    push_particles(state, body, _drive_time(program, now))
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):  # which has these in its equations
-        accumulate_forces(state, program, body)
-        add_reactions(state, body, felt)
-        pull_grabs(state, body, now.h, felt)
-    if ti.static(program.has_contact):  # its code, even unused, takes others 5 % of their time
-        run_motors(state, program, body, now.h, felt, int(now.s == 0))
-        if now.s == 0:
-            update_rest_state(state, body)
-    damp_body(state, program, body, felt, now.h, now.s, now.substeps)
-    if ti.static(program.has_contact and program.integrator != Integrator.IMPLICIT_EULER):
-        calm_body(state, program, body, to_positions(program, felt, now.h), now.h, now.s, now.substeps)
-    return _kick(state, program, body, now, kick, drifts)
+
+@ti.func
+def substep_alone(state: ti.template(), program: ti.template(), body, now):
+    """One substep of one body among colliders, without other bodies, to find out what broke it."""
+    job = Job(s=now.s, substeps=now.substeps, h=now.h, since=now.since, left=now.left)
+    _advance_body(state, program, body, job)
+    job.fastest = state.contact.body_speed[body]
+    drift_body(state, body, job)
 
 
 @ti.func
@@ -107,7 +95,7 @@ def do_phase(state: ti.template(), program: ti.template(), island, body, job):
     if job.phase != KICK:
         _do_other_phase(state, program, island, body, job)
     elif state.body_status[body] == ACTIVE:
-        advance_body(state, program, body, job, False)
+        _advance_body(state, program, body, job)
 
 
 @ti.real_func
@@ -145,40 +133,18 @@ def each_body(state: ti.template(), program: ti.template(), island, job):
 
 
 @ti.func
-def _felt_time(program: ti.template(), kick, job):
-    """How long pins and grabs feel that [s]."""
-    felt = ti.cast(0.0, ti.f32)
-    if ti.static(program.integrator == Integrator.LEAPFROG):
-        felt = kick
-    elif ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        felt = job.h
-    return felt
-
-
-@ti.func
-def _drive_time(program: ti.template(), job):
-    """For how long drives act before a substep [s]: by leapfrog the last half comes after the last one."""
-    return 0.5 * job.h if ti.static(program.integrator == Integrator.LEAPFROG) and job.s == 0 else job.h
-
-
-@ti.func
-def _kick(state: ti.template(), program: ti.template(), body, job, kick, drifts: ti.template()):
-    is_stable = 1
-    if ti.static(not drifts):
-        is_stable = kick_among_colliders(state, program, body, job, kick)
-    elif ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        implicit_substep(state, program, body, job.h, int(job.s == 0))
-    else:
-        is_stable = move_body(state, program, body, job.h, kick)
-    return is_stable
-
-
-@ti.func
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Returns: for how long bodies have drifted with their new velocities already [s]."""
     body = state.contact.island_body[state.contact.island_first[island]]
-    is_free = _is_alone(state, program, island) & is_clear(state, body, run.fastest * now.h)
+    is_free = is_alone(state, program, island)
+    if is_free == 1:
+        if not (state.contact.gone[body] + run.fastest * now.h <= state.contact.reach[body]):
+            look_for_colliders(state, body, run.fastest, now.since, now.left)
+        is_free = can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
+    has_pairs = 0
+    if ti.static(program.has_soft_contact):
+        has_pairs = has_contact_pairs(state, island)
     each_body(
         state,
         program,
@@ -187,6 +153,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
             phase=KICK,
             s=now.s,
             substeps=now.substeps,
+            has_pairs=has_pairs,
             h=now.h,
             since=now.since,
             drift_time=drift_time,
@@ -197,12 +164,12 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 
 @ti.func
-def _is_alone(state: ti.template(), program: ti.template(), island):
-    """Whether nothing but colliders can touch what is in an island (1); by implicit Euler, never."""
+def is_alone(state: ti.template(), program: ti.template(), island):
+    """Whether nothing but colliders can touch what is in an island, and its kick can move it (1)."""
     body = state.contact.island_body[state.contact.island_first[island]]
     bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
-    is_explicit = ti.static(program.integrator != Integrator.IMPLICIT_EULER)
-    alone = int(is_explicit) & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
+    drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
+    alone = drifts_at_once & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
     if ti.static(program.has_soft_contact):
         alone = alone & (1 - has_contact_pairs(state, island))
     return alone
@@ -231,22 +198,12 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """Whether the bodies of an island are at new positions already (1): a body alone that meets nothing."""
+    """Whether the bodies of an island are at new positions already (1): one alone that the kick moved."""
     has_moved = 0
     body = state.contact.island_body[state.contact.island_first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
-        has_moved = has_drifted(state, body, run.fastest, now.h)
+        has_moved = has_drifted(state, body, run.fastest, now.h, now.since)
     return has_moved
-
-
-@ti.func
-def _solve_joints(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Returns: the highest speed of what joints hold [m/s], and the highest beside what the island shares."""
-    speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        found = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
-        speed, beside = found.x, found.y
-    return speed, beside
 
 
 @ti.func
@@ -285,10 +242,9 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 
 
 @ti.func
-def _check_shapes(state: ti.template(), program: ti.template(), island, run: ti.template()):
-    """By implicit Euler, which takes forces as linear: whether no body changed its shape by too much."""
-    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-            body = state.contact.island_body[i]
-            if state.body_status[body] == ACTIVE:
-                run.is_stable = run.is_stable & int(keeps_shape(state, body))
+def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
+    """Whether the integrator takes the new shape of every body."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            run.is_stable = run.is_stable & program.integrator.check(state, body, now.h, now.is_last)

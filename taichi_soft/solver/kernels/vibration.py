@@ -18,7 +18,6 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import Integrator
 from taichi_soft.solver.kernels.untangling import kept_while_caught
 
 MOST_FADING = 0.43
@@ -236,10 +235,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
 @ti.func
 def to_positions(program: ti.template(), kick, h):
     """The part of a kick [s] that brings velocities to the time of the positions, in a substep of `h` [s]."""
-    part = kick
-    if ti.static(program.integrator in (Integrator.LEAPFROG, Integrator.LAZY_LEAPFROG)):
-        part = kick - 0.5 * h
-    return part
+    return kick - program.integrator.lag * h
 
 
 @ti.func

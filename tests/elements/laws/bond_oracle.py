@@ -153,6 +153,36 @@ def best_fitting_plane(mesh, p, q, x):
     return against_carried(mesh, p, q, x, normal)
 
 
+def turned_ring(mesh, p, q):
+    """Vertices round an edge in the order in which they turn about it, from the lowest number on."""
+    ring, x = np.array(neighbours(mesh, p, q)), mesh.vertices
+    axis = unit(x[q] - x[p])
+    arms = x[ring] - x[p] - np.outer((x[ring] - x[p]) @ axis, axis)
+    turn = np.arctan2(np.cross(arms[0], arms) @ axis, arms @ arms[0])
+    return ring[np.argsort(np.where(np.abs(turn) < 1e-9, 0.0, turn % (2 * np.pi)))]
+
+
+def split_normal(mesh, p, q, y):
+    """Cheap normal of 4.4.2: across the vectors between the means of two halves of the ring, split twice."""
+    ring = turned_ring(mesh, p, q)
+
+    def across(x):
+        points = [x[v] for v in ring] + [(x[p] + x[q]) / 2] * (len(ring) == 2)
+        half, vectors = len(points) // 2, []
+        for first in (0, max(1, round(len(points) / 4))):
+            turned = points[first:] + points[:first]
+            vectors.append(np.mean(turned[:half], axis=0) - np.mean(turned[half:], axis=0))
+        return np.cross(*vectors)
+
+    towards_q = across(mesh.vertices) @ (mesh.vertices[q] - mesh.vertices[p])
+    return unit(across(y)) * np.sign(towards_q)
+
+
+def split_ring_plane(mesh, p, q, x):
+    """4.4.2 with the cheap normal."""
+    return against_carried(mesh, p, q, x, lambda y: split_normal(mesh, p, q, y))
+
+
 def tilt_angles(ring, x, p, q):
     """Angle of each particle over the plane across the edge in their mean height, and its unit arm."""
     axis = unit(x[q] - x[p])
@@ -200,7 +230,11 @@ def frame(law, mesh, p, q, x, face):
         return None if face is None else cmpm(mesh, p, q, x, face)
     if law.startswith("tilted_plane"):
         return tilted_plane(mesh, p, q, x, b=0.25 if law.endswith("printed") else 2.0)
-    return {"cmpm2": cmpm2, "best_fitting_plane": best_fitting_plane}[law](mesh, p, q, x)
+    return {
+        "cmpm2": cmpm2,
+        "best_fitting_plane": best_fitting_plane,
+        "split_ring_plane": split_ring_plane,
+    }[law](mesh, p, q, x)
 
 
 def bond(law, mesh, p, q, x, E, G, face):

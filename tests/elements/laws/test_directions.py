@@ -48,6 +48,7 @@ def test_the_virial_law_is_as_stiff_in_every_direction_as_its_material():
         ("cmpm", 0.08, 0.2),
         ("cmpm2", 0.005, 0.05),
         ("best_fitting_plane", 0.01, 0.2),
+        ("split_ring_plane", 0.01, 0.2),
         ("tilted_plane", 0.08, 0.8),
         ("springs", 0.15, 1.0),
     ],

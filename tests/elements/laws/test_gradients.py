@@ -41,7 +41,7 @@ SOLID = [
 ]
 PAIRWISE = ["springs", "volume_springs"]
 FROZEN = ["cmpm", "tilted_plane", "tilted_plane_printed"]
-COMPARED = ["cmpm2", "best_fitting_plane"]
+COMPARED = ["cmpm2", "best_fitting_plane", "split_ring_plane"]
 MATERIAL = Material(1e6, 0.3, 1000.0)
 BALL = sphere(0.7, 1)
 

@@ -40,32 +40,19 @@ def test_subfaces_and_fitted_planes_stand_as_numpy_says():
             assert fitted[e] == pytest.approx(angle_to(normal, p, q), abs=1e-4)
 
 
-def test_cheap_normals_stand_across_the_means_of_the_halves_of_a_ring():
-    """Section 4.4.2; the ring in its order round the edge, from the vertex of the lowest number on."""
-    cheap, x = plane_angles(BALL, "best_fitting_plane", is_split=True), BALL.vertices
+def test_split_rings_have_the_normals_that_numpy_finds():
+    split = plane_angles(BALL, "split_ring_plane")
     for e, (p, q) in enumerate(BALL.edges.tolist()):
-        around = np.array(sorted(oracle.neighbours(BALL, p, q)))
-        axis = oracle.unit(x[q] - x[p])
-        arms = x[around] - x[p] - np.outer((x[around] - x[p]) @ axis, axis)
-        turn = np.arctan2(np.cross(arms[0], arms) @ axis, arms @ arms[0]) % (2 * np.pi)
-        points = x[around[np.argsort(turn)]]
-        if len(points) == 2:
-            points = np.vstack([points, (x[p] + x[q]) / 2])
-        half, spans = len(points) // 2, []
-        for shift in (0, max(1, round(len(points) / 4))):
-            turned = np.roll(points, -shift, axis=0)
-            spans.append(turned[:half].mean(axis=0) - turned[half:].mean(axis=0))
-        normal = np.cross(*spans)
-        expected = angle_to(normal * np.sign(normal @ axis), p, q)
-        assert cheap[e] == pytest.approx(expected, abs=1e-5)
+        expected = angle_to(oracle.split_normal(BALL, p, q, BALL.vertices), p, q)
+        assert split[e] == pytest.approx(expected, abs=1e-5)
 
 
 def test_cheap_normals_are_those_of_the_fitted_planes_where_particles_lie_in_one():
     few = [e for e, (p, q) in enumerate(BALL.edges.tolist()) if len(oracle.neighbours(BALL, p, q)) <= 3]
-    cheap, fitted = (plane_angles(BALL, "best_fitting_plane", is_split=split) for split in (True, False))
+    cheap, fitted = (plane_angles(BALL, law) for law in ("split_ring_plane", "best_fitting_plane"))
     assert len(few) > 5
     np.testing.assert_allclose(cheap[few], fitted[few], atol=1e-4)
-    even = plane_angles(edge_in_even_ring(6), "best_fitting_plane", is_split=True)
+    even = plane_angles(edge_in_even_ring(6), "split_ring_plane")
     assert even[0] < 1e-5
 
 
@@ -80,21 +67,29 @@ def edge_in_even_ring(count):
 def test_cheap_normals_of_the_beam_with_a_hole_are_as_far_from_perpendicular_as_fitted_ones():
     """What 4.4.2 asks for: in the middle the two differ by less than 2 degrees."""
     mesh = load_mesh(ASSETS / "beam_with_hole.npz")
-    cheap, fitted = (plane_angles(mesh, "best_fitting_plane", is_split=split) for split in (True, False))
+    cheap, fitted = (plane_angles(mesh, law) for law in ("split_ring_plane", "best_fitting_plane"))
     assert abs(np.median(cheap) - np.median(fitted)) < 2
     assert (cheap > 30).mean() > 0.1
 
 
-@pytest.mark.parametrize(
-    ("law", "is_split", "said"),
-    [
-        ("cmpm2", True, "leave out is_split"),
-        ("best_fitting_plane", 1, "is_split must be True or False"),
-    ],
-)
-def test_only_fitted_planes_are_split(law, is_split, said):
-    with pytest.raises(OptionError, match=said):
-        plane_angles(BALL, law, is_split=is_split)
+def test_a_ring_whose_halves_lie_in_one_line_is_refused():
+    """The fifth of six particles goes outwards to where the vectors of both splits are parallel."""
+
+    def at(angle, radius):
+        return radius * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+
+    places = zip((0, 140, 155, 225, 255, 270), (0.2, 1.9, 0.3, 0.8, 1.0, 1.7), strict=True)
+    ring = [at(angle, radius) for angle, radius in places]
+    line, others = ring[2] - ring[5], ring[0] + ring[1] - ring[3]  # parallel, once ring[4] is taken off these
+    mesh = edge_in_even_ring(6)
+    for stretch in (1.0, np.cross(line, others)[2] / np.cross(line, ring[4])[2]):
+        points = np.vstack([mesh.vertices[:2], ring[:4], [stretch * ring[4]], ring[5:]])
+        bent = TetMesh(points, mesh.tets, fix_orientation=True)
+        if stretch == 1.0:
+            assert np.isfinite(plane_angles(bent, "split_ring_plane")).all()
+        else:
+            with pytest.raises(MeshError, match=r"no plane across edge 0 .*Use law='best_fitting_plane'"):
+                plane_angles(bent, "split_ring_plane")
 
 
 def test_many_fitted_planes_of_the_beam_with_a_hole_are_far_from_perpendicular():

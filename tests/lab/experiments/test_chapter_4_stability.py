@@ -34,12 +34,30 @@ def test_angles_of_best_fitting_planes_are_numpys():
     assert counts == {n: sum(count == n for count, _, _ in found) for n in counts}
     beam = load_mesh(ASSETS / "beam_with_hole.npz")
     assert len(mesh_of("beam with hole", 4).vertices) == len(beam.vertices)
-    assert verdicts("fig-4.7", results) == {"best-fitting-plane-angles": Verdict.AGREES}
+    found = verdicts("fig-4.7", results)
+    assert found["best-fitting-plane-angles"] is Verdict.AGREES
 
     def straight(point, numbers):
         return {**numbers, "best_fitting_plane": {**numbers["best_fitting_plane"], "far": 0.0}}
 
-    assert verdicts("fig-4.7", altered(results, straight)) == {"best-fitting-plane-angles": Verdict.DIFFERS}
+    changed = verdicts("fig-4.7", altered(results, straight))
+    assert changed["best-fitting-plane-angles"] is Verdict.DIFFERS
+
+
+def test_split_rings_are_judged_by_their_angle_to_the_fitted_normals():
+    results = quick_results("fig-4.7")
+    for name in ("beam with hole", "uneven block"):
+        numbers = results.one(mesh=name)
+        assert 1.0 < numbers["between"][1] < 15.0
+        assert numbers["apart"] > 0.05
+    assert results.one(mesh="block")["between"][3] < 1e-3  # even rings: both normals are the edge
+    assert verdicts("fig-4.7", results)["split-ring-normal"] is Verdict.PARTLY
+
+    def apart(share):
+        return verdicts("fig-4.7", altered(results, lambda _, numbers: {**numbers, "apart": share}))
+
+    assert apart(0.05)["split-ring-normal"] is Verdict.AGREES
+    assert apart(0.2)["split-ring-normal"] is Verdict.DIFFERS
 
 
 def test_a_tilted_plane_follows_an_eighth_or_all_of_a_shear():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from quick import altered, quick_results, verdicts
+from quick import altered, findings, quick_results, verdicts
 
 from lab.experiments import Effort, Verdict
 from lab.experiments.cmpm_drop import FRAME, FRAMES
@@ -17,13 +17,44 @@ def test_the_best_fitting_plane_is_judged_by_time_step_and_growth():
 
     def judged(ratio, step):
         def change(point, numbers):
-            return {**numbers, "ratio": ratio, "step": {"cmpm": 1.0, "best_fitting_plane": step}}
+            steps = {"cmpm": 1.0, "best_fitting_plane": step, "split_ring_plane": 1.0}
+            ratios = {"best_fitting_plane": ratio, "split_ring_plane": 1.0}
+            return {**numbers, "ratio": ratios, "step": steps}
 
         return verdicts("best-fitting-plane-cost", altered(results, change))["best-fitting-plane-cost"]
 
     assert judged(5.0, 0.8) is Verdict.AGREES
     assert judged(0.9, 0.8) is Verdict.DIFFERS
     assert judged(5.0, 1.1) is Verdict.DIFFERS
+
+
+def test_the_split_ring_is_judged_beside_the_best_fitting_plane():
+    results = quick_results("best-fitting-plane-cost")
+
+    def judged(ratio, step, growth, only=None):
+        def change(point, numbers):
+            if only is not None and point["mesh"] != only:
+                return numbers
+            steps = {"cmpm": 1.0, "best_fitting_plane": 1.0, "split_ring_plane": step}
+            ratios = {"best_fitting_plane": 5.0, "split_ring_plane": ratio}
+            rates = {"cmpm": 1.0, "best_fitting_plane": 10.0, "split_ring_plane": growth}
+            return {**numbers, "ratio": ratios, "step": steps, "growth_rate": rates}
+
+        changed = altered(altered(results, change) if only is None else good, change)
+        return verdicts("best-fitting-plane-cost", changed)["split-ring-cost"]
+
+    def well(point, numbers):
+        steps = {"cmpm": 1.0, "best_fitting_plane": 1.0, "split_ring_plane": 1.0}
+        ratios = {"best_fitting_plane": 5.0, "split_ring_plane": 1.0}
+        rates = {"cmpm": 1.0, "best_fitting_plane": 10.0, "split_ring_plane": 2.0}
+        return {**numbers, "ratio": ratios, "step": steps, "growth_rate": rates}
+
+    good = altered(results, well)
+    assert judged(1.0, 0.95, 9.0) is Verdict.AGREES
+    assert judged(6.0, 0.95, 9.0) is Verdict.DIFFERS
+    assert judged(1.0, 0.8, 9.0) is Verdict.DIFFERS
+    assert judged(1.0, 0.95, 11.0) is Verdict.DIFFERS
+    assert judged(1.0, 0.8, 9.0, only="ball") is Verdict.PARTLY
 
 
 def test_implicit_steps_follow_a_fall_that_leapfrog_cannot_make():
@@ -41,6 +72,7 @@ def test_implicit_steps_follow_a_fall_that_leapfrog_cannot_make():
     assert results.one(integrator="leapfrog", factor=1.3)["frozen"]
     assert len(results.one(run="rates")["explicit"]) == FRAMES
     assert verdicts("implicit-step", results)["implicit-step"] is Verdict.PARTLY  # it does not bounce
+    assert "Tolerance: 13.3 to 45 times" in findings("implicit-step", results)["implicit-rate"].measured
     rises = results.one(integrator="leapfrog", factor=0.9)["height"]
 
     def judged(gain, frozen, height):
@@ -54,6 +86,7 @@ def test_implicit_steps_follow_a_fall_that_leapfrog_cannot_make():
         return list(verdicts("implicit-step", altered(results, change)).values())
 
     assert judged(25.0, False, rises[5:]) == [Verdict.AGREES, Verdict.AGREES]
-    assert judged(25.0, False, [1.0] * 7) == [Verdict.PARTLY, Verdict.AGREES]
+    assert judged(25.0, False, [1.0] * 7) == [Verdict.PARTLY, Verdict.PARTLY]
+    assert judged(13.0, False, rises[5:]) == [Verdict.AGREES, Verdict.DIFFERS]
     assert judged(5.0, True, rises[5:]) == [Verdict.DIFFERS, Verdict.DIFFERS]
     assert {point["resolution"] for point in points(Effort.FULL)} == {5}

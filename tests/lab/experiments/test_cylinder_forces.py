@@ -19,7 +19,7 @@ def results():
 
 
 def curve(results, **values):
-    return results.one(**{"young": 1e6, "slide": False, **values})
+    return results.one(**{"young": 1e6, "slide": False, "shaken": False, **values})
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.2, 0.4])
@@ -42,6 +42,16 @@ def test_with_nu_0_the_tensile_force_is_that_of_even_strain(results):
 def test_sliding_plates_leave_the_whole_contraction(results):
     numbers = curve(results, way="tension", poisson=0.2, slide=True)
     assert numbers["tension"][0] / (1e6 * numbers["area"] * 0.01) == pytest.approx(1, abs=0.01)
+
+
+def test_an_uneven_mesh_has_another_tension_and_a_little_shear(results):
+    """Small beside the tension, but not the round-off of a symmetric mesh."""
+    even, uneven = (
+        curve(results, way="tension", poisson=0.2, shaken=is_shaken) for is_shaken in (False, True)
+    )
+    assert uneven["tension"][0] != pytest.approx(even["tension"][0], rel=1e-6)
+    sideways = np.hypot(uneven["shear"], uneven["aside"]) / uneven["tension"]
+    assert 1e-5 < sideways.max() < 0.01
 
 
 def test_what_the_thesis_says_is_found(results):

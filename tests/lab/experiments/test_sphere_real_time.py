@@ -36,12 +36,12 @@ def test_the_factor_and_the_cost_of_a_tetrahedron():
     assert nanoseconds(0.45, 955) == pytest.approx(1e9 / (955 * 700 * 0.45))
 
 
-def test_the_verdict_follows_the_numbers(row):
-    fast, slow, broken = (copy.deepcopy(row) for _ in range(3))
+def test_a_rate_here_says_nothing_of_a_processor_of_2002_and_the_finding_says_so(row):
+    fast, broken = (copy.deepcopy(row) for _ in range(2))
     fast.numbers["frames"] = [0.01] * 10
-    slow.numbers["frames"] = [0.1] * 10
     broken.numbers["frozen"] = True
-    assert finding_of(fast).verdict is Verdict.AGREES
-    assert "2 times real time" in finding_of(fast).measured
-    assert finding_of(slow).verdict is Verdict.DIFFERS
-    assert finding_of(broken).verdict is Verdict.UNKNOWN
+    assert finding_of(fast).verdict is finding_of(broken).verdict is Verdict.UNKNOWN
+    assert finding_of(fast).measured.startswith("2 times real time here")
+    assert "4.44 times the thesis's 0.45" in finding_of(fast).measured
+    assert "AMD XP 1800+" in finding_of(fast).why
+    assert "non-finite" in finding_of(broken).why

@@ -55,7 +55,7 @@ def test_above_the_linear_limit_spheres_explode_and_below_none_does(rows):
 
 def test_verdicts_follow_the_numbers(rows):
     first = verdicts(rows)
-    assert first["sphere-window-0.1"] is Verdict.AGREES
+    assert first["sphere-window-0.1"] is Verdict.PARTLY  # of E from 2e5 Pa on some are dented
     assert first["sphere-window-0.4"] is Verdict.DIFFERS  # the upper edge lies at 1.9e6, not at 1e6
     assert first["sphere-collapse"] is Verdict.AGREES
     other = copy.deepcopy(rows)
@@ -100,7 +100,8 @@ def test_the_verdict_tells_for_which_line_between_dented_and_collapsed_it_holds(
         return section_of(EXPERIMENT, Results(tuple(rows))).findings[:2]
 
     low, high = told(0.58)
-    assert low.verdict is Verdict.AGREES
+    assert low.verdict is Verdict.PARTLY
+    assert "1 of 4 spheres in the thesis's interval stay dented, from 2e+05 to 2e+05 Pa" in low.why
     assert "with 0.3, 0.35, 0.4, 0.45, 0.5, 0.55 instead the verdict is the same" in low.measured
     assert "with 0.6, 0.65, 0.7, 0.75, 0.8 it is 'differs'" in low.measured
     assert "whole from 2e+05 to 3e+06 Pa, which is the thesis's very window" in low.measured

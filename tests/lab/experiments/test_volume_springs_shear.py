@@ -85,6 +85,29 @@ def test_what_is_found(results):
     assert findings["volume-springs-volume"].verdict is Verdict.AGREES
 
 
+def test_a_tensile_force_that_is_smaller_at_the_end_only_leaves_the_claim_open(results):
+    """The thesis says "a little smaller" of the whole figure."""
+
+    def judged(half, end):
+        rows = []
+        for row in results.rows:
+            less = np.interp(row.numbers["shear"], [0.0, 0.5, 1.0], [half, half, end])
+            without = results.one(seed=row.point["seed"], poisson=0.0)["tensile_force"]
+            changed = without if row.point["poisson"] == 0.0 else (np.array(without) * (1 + less)).tolist()
+            rows.append(replace(row, numbers={**row.numbers, "tensile_force": changed}))
+        (found,) = (
+            f
+            for f in section_of(EXPERIMENT, Results(tuple(rows))).findings
+            if f.claim == "volume-springs-tension"
+        )
+        return found
+
+    assert judged(-0.05, -0.05).verdict is Verdict.AGREES
+    assert judged(0.01, -0.05).verdict is Verdict.UNKNOWN
+    assert "at the end on 2 of 2 meshes, but only on 0 at a shear of 0.5 too" in judged(0.01, -0.05).why
+    assert judged(0.01, 0.02).verdict is Verdict.DIFFERS
+
+
 def test_forces_of_the_other_nu_give_other_verdicts(results):
     swapped = [
         replace(row, point={**row.point, "poisson": 0.3 - row.point["poisson"]}) for row in results.rows

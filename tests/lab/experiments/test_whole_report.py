@@ -13,16 +13,19 @@ TIMED = {claim for each in EXPERIMENTS.values() if each.is_timing for claim in e
 """Judged by a clock, which other tests disturb."""
 
 DIFFERING = {
-    *("strain-misread-edge", "cmpm2-step", "tilted-plane", "sphere-window-0.4"),
+    *("strain-misread-edge", "cmpm2-step", "tilted-plane", "sphere-window-0.4", "size-acceleration"),
     "volume-springs-drop",  # on the one irregular mesh that is quick; on others it holds
 }
-UNTOLD = {"volume-springs-limit", "shear-modulus-volume", "strain-misread-triangle"}
+UNTOLD = {
+    *("volume-springs-limit", "volume-springs-tension", "shear-modulus-volume", "strain-misread-triangle"),
+}
 PARTLY = {
     *("patch-test", "beam-tension", "beam-shear", "beam-torsion", "beam-bending", "block-shear", "hertz"),
     *("mesh-convergence", "cantilever-frequency", "free-beam-frequency", "wave-speed", "momentum-budget"),
     "energy-budget",
+    *("sphere-window-0.1", "cylinder-0.4", "split-ring-normal", "large-strain"),
 }
-"""Theory that laws along edges, or the virial law, do not meet."""
+"""Theory that laws along edges, or the virial law, do not meet; and claims that hold in a part of a range."""
 
 
 @pytest.fixture(scope="module")

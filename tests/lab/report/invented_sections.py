@@ -163,3 +163,10 @@ EXPECTED = {
     "momentum-budget": "cannot be told",
 }
 assert set(EXPECTED) <= set(CLAIMS)
+COUNTS = {
+    "55 claims of the thesis": (
+        "0 agree, 0 agree in part, 2 differ, 1 cannot be told, 52 not measured"  # all but momentum-budget
+    ),
+    "14 statements of theory": "0 agree, 0 agree in part, 0 differ, 1 cannot be told, 13 not measured",
+}
+"""The two lines that count them."""

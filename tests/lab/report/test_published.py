@@ -5,7 +5,6 @@ Nothing is measured anew: the published points are concluded again.
 
 import csv
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -17,11 +16,13 @@ from lab.report.wording import legible
 ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "report"
 MANY = {
-    Verdict.AGREES: "agree",
-    Verdict.PARTLY: "agree in part",
-    Verdict.DIFFERS: "differ",
-    Verdict.UNKNOWN: "cannot be told",
+    Verdict.AGREES: ("agrees", "agree"),
+    Verdict.PARTLY: ("agrees in part", "agree in part"),
+    Verdict.DIFFERS: ("differs", "differ"),
+    Verdict.UNKNOWN: ("cannot be told", "cannot be told"),
 }
+"""Words for one claim, and for several."""
+THEORY = "Beyond the thesis: theory"
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -89,18 +90,23 @@ def test_published_verdicts_and_reasons_follow_from_the_published_points(name):
     assert {claim for claim, *_ in told} == set(experiment.claims)
 
 
+def counted(is_theory: bool) -> tuple[int, list[str]]:
+    """Number of claims of the thesis or statements of theory, and how many have each verdict, in words."""
+    rows = [row for row in VERDICTS if (row["chapter"] == THEORY) is is_theory]
+    counts = {verdict: sum(row["verdict"] == verdict.value for row in rows) for verdict in Verdict}
+    assert sum(counts.values()) == len(rows)
+    return len(rows), [f"{count} {MANY[verdict][count != 1]}" for verdict, count in counts.items()]
+
+
 def test_report_and_readme_count_the_verdicts_of_the_table():
-    counts = {verdict: sum(row["verdict"] == verdict.value for row in VERDICTS) for verdict in Verdict}
-    assert sum(counts.values()) == len(VERDICTS)
     report = (REPORT / "report.md").read_text(encoding="utf-8")
-    of_report = ", ".join(f"{count} {MANY[verdict]}" for verdict, count in counts.items())
-    assert f"\nOf {len(CLAIMS)} claims: {of_report}, 0 not measured.\n" in report
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    sentence = re.search(r"of (\d+) claims ([^.|]*) \|", readme)
-    assert sentence
-    assert int(sentence[1]) == len(CLAIMS)
-    told = re.findall(r"(\d+) ([a-z ]+?)(?=,| and|$)", sentence[2])
-    assert {words: int(number) for number, words in told} == {MANY[v]: n for v, n in counts.items()}
+    for is_theory, kind in ((False, "claims of the thesis"), (True, "statements of theory")):
+        number, words = counted(is_theory)
+        assert f"\nOf {number} {kind}: {', '.join(words)}, 0 not measured.\n" in report
+        told = [each for each in words if not each.startswith("0 ")]
+        assert f"of {number} {kind} {', '.join(told[:-1])} and {told[-1]}" in readme
+    assert counted(False)[0] + counted(True)[0] == len(CLAIMS)
 
 
 def test_the_report_tells_every_verdict_of_the_table():

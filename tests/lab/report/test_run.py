@@ -50,7 +50,7 @@ def test_what_was_interrupted_goes_on_where_it_stopped(tmp_path, measured, conso
         patch.setattr(Store, "keep", keep_two)
         with pytest.raises(KeyboardInterrupt):
             run.run_experiments([SQUARES], Effort.FULL, tmp_path, console, workers=1)
-    assert "the same command goes on" in console.file.getvalue()
+    assert "run the same command to resume" in console.file.getvalue()
     measured()
     ((_, results, _),) = run.run_experiments([SQUARES], Effort.FULL, tmp_path, console, workers=1)
     assert measured() == ["2", "3", "4"]

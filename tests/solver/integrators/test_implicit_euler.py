@@ -451,7 +451,7 @@ def test_a_rope_swings_from_a_pin_and_falls_into_line_without_substeps():
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"schedule": "flat"}, "schedule 'flat' has no implicit_euler"),
+        ({"schedule": "flat"}, "'flat' does not support implicit_euler"),
         ({"tolerance": 0}, "tolerance must be a number from 1e-06 to 0.5, got 0"),
         ({"tolerance": 1.0}, "tolerance"),
         ({"tolerance": "fine"}, "tolerance"),

@@ -1,28 +1,29 @@
-# Steps a world from `taichi-soft export --axes y-up` together with Godot's physics.
+# A world that `taichi-soft export --axes y-up` wrote, stepped with Godot's own physics.
 #
 # Physics bodies below this node, or in the group "soft_colliders", are colliders of the soft bodies, by their
-# CollisionShapes: spheres, boxes, capsules and planes. Colliders follow kinematic and rigid bodies in each
-# physics frame, and rigid bodies are pushed. The world file needs capacity for them: World(collider_room=...).
+# CollisionShape3Ds: spheres, boxes, capsules and planes (WorldBoundaryShape3D). Those that move are followed in each
+# physics frame, and rigid bodies are pushed. The world file needs room for them: World(collider_room=...).
 class_name SoftWorld
-extends Spatial
+extends Node3D
 
-signal started()
-# `collider` is a number; `node` is the physics body of the collider, or null.
-signal contact_began(body, collider, node, impulse)
-signal contact_ended(body, collider, node, impulse, duration)
-signal soft_contact_began(body, other, impulse)
-signal soft_contact_ended(body, other, impulse, duration)
-signal body_slept(body)
-signal body_woke(body)
-signal body_froze(body)
+signal started
+## A collider is a number; `node` is the physics body that it was made of, or null.
+signal contact_began(which: int, collider: int, node: Node, impulse: Vector3)
+signal contact_ended(which: int, collider: int, node: Node, impulse: Vector3, duration: float)
+signal soft_contact_began(which: int, other: int, impulse: Vector3)
+signal soft_contact_ended(which: int, other: int, impulse: Vector3, duration: float)
+signal body_slept(which: int)
+signal body_woke(which: int)
+signal body_froze(which: int)
 
 enum Kind { BODY, ASSET, COLLIDER, FRAME, MESH, JOINT, MOTOR }
 enum Status { ACTIVE, FROZEN, ASLEEP }
 enum Shape { PLANE, SPHERE, BOX, CAPSULE }
 enum Event { CONTACT_BEGAN = 1, CONTACT_ENDED = 2, SLEPT = 4, WOKE = 8, FROZE = 16 }
 
-const Native := preload("res://addons/taichi_soft/soft_world_native.gdns")
-const AFTER_OTHERS := 100  # runs after scripts that move kinematic bodies
+const NATIVE := "SoftWorldNative"  # the class of taichi_soft.gdextension
+# Godot 3: const NATIVE := preload("res://addons/taichi_soft/soft_world_native.gdns")
+const AFTER_OTHERS := 100  # so that what moves bodies comes first
 const NEARLY := 1.0 - 1e-6
 const VALUES_PER_EVENT := 8
 const TOLD_BY := {
@@ -35,28 +36,28 @@ const TOLD_BY := {
     "body_froze": Event.FROZE,
 }
 
-export(String, DIR) var world_file := ""
-export var autostart := true
-# Substeps of a step; 0 chooses a stable number.
-export(int, 0, 1000) var substeps := 0
-# Friction of colliders that this node makes from Godot's shapes.
-export(float, 0, 2) var friction := 0.5
-# Restitution of these colliders; below 0 uses that of the bodies.
-export(float, -1, 1) var restitution := -1.0
-export(float, 0, 1) var thickness := 0.0
+@export_dir var world_file := ""
+@export var autostart := true
+## Of a step; 0 for as many as are stable.
+@export_range(0, 1000) var substeps := 0
+@export_group("Colliders of Godot's shapes")
+@export_range(0.0, 2.0, 0.01) var friction := 0.5
+## Below 0 for the bodies' own.
+@export_range(-1.0, 1.0, 0.01) var restitution := -1.0
+@export_range(0.0, 1.0, 0.001) var thickness := 0.0
 
-var native: Reference  # the functions of SoftWorldNative; null until started
+var native: RefCounted = null  # the functions of SoftWorldNative; null until started
 
 var _dt := 0.0
-var _shapes := {}  # by collider: transform from the shape's axes to those of its resource
-var _followed := []
-var _nodes := {}  # by collider: WeakRef of its physics body
-var _nodes_gone := {}  # the same for colliders removed since the last step
+var _shapes := {}  # by a collider's number, from the shape's axes to those of its resource
+var _followed: Array[Dictionary] = []
+var _nodes := {}  # by a collider's number, a WeakRef of the physics body that it was made of
+var _nodes_gone := {}  # the same of those that were taken out since the last step
 var _recorded := 0  # bits of Event
 
 
 func _ready() -> void:
-    process_priority = AFTER_OTHERS
+    process_physics_priority = AFTER_OTHERS
     set_physics_process(false)
     if autostart and world_file != "":
         start()
@@ -66,21 +67,25 @@ func _physics_process(delta: float) -> void:
     step(delta)
 
 
-# Load the world file. Returns false if that failed.
+## Load the world file: takes seconds. Returns whether it could be done.
 func start() -> bool:
     stop()
-    var fresh: Reference = Native.new()
+    var fresh: RefCounted = ClassDB.instantiate(NATIVE) if ClassDB.class_exists(NATIVE) else null
+    # Godot 3: var fresh: Reference = NATIVE.new()
+    if fresh == null:
+        push_error("there is no class SoftWorldNative: Godot has not loaded the library of addons/taichi_soft")
+        return false
     if fresh.load(ProjectSettings.globalize_path(world_file)) == null:
         return false
     native = fresh
-    for body in _physics_bodies():
-        _follow(body)
+    for node in _physics_bodies():
+        _follow(node)
     set_physics_process(true)
-    emit_signal("started")
+    started.emit()
     return true
 
 
-# Destroy the world and its bodies.
+## Give the world back. Bodies are no more.
 func stop() -> void:
     set_physics_process(false)
     native = null
@@ -92,14 +97,14 @@ func stop() -> void:
     _recorded = 0
 
 
-# Make one step of `delta` seconds; called in each physics frame.
+## One step of `delta` seconds; called in each physics frame.
 func step(delta: float) -> bool:
     if not _is_started("step") or not _set_step(delta):
         return false
     for each in _followed.duplicate():
         _move(each)
     _record()
-    # Godot has made its step. It receives the impulses of this step in its next one.
+    # Godot has made its own step. It gets what the bodies give in this one with its next.
     if native.advance(delta) == null:
         return false
     for each in _followed:
@@ -108,7 +113,7 @@ func step(delta: float) -> bool:
     return true
 
 
-# Return the body with a name of the world's script; 0 for none.
+## The body of that name in the script of the world; 0 for none.
 func body(body_name: String) -> int:
     if not _is_started("body"):
         return 0
@@ -116,8 +121,8 @@ func body(body_name: String) -> int:
     return 0 if slot == null else native.body(slot)
 
 
-# Spawn a body. Returns 0 if that is refused.
-func spawn(asset_name: String, place: Transform, velocity := Vector3(), spin := Vector3()) -> int:
+## A new body; 0 where that is refused.
+func spawn(asset_name: String, place: Transform3D, velocity := Vector3(), spin := Vector3()) -> int:
     if not _is_started("spawn"):
         return 0
     var asset = native.find(Kind.ASSET, asset_name)
@@ -131,36 +136,41 @@ func despawn(which: int) -> bool:
     return _is_started("despawn") and native.despawn(which) != null
 
 
-# Move a collider over the next step. `which` is a name of the world's script or a number from add_collider.
-func move_collider(which, place: Transform) -> bool:
+## Be there at the end of the coming step. `which` is a name of the world's script or a number of add_collider.
+func move_collider(which: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.COLLIDER, which, "move_collider")
-    return number >= 0 and native.move_collider(number, place * _shapes.get(number, Transform())) != null
+    if number < 0:
+        return false
+    var turn: Transform3D = _shapes.get(number, Transform3D())
+    return native.move_collider(number, place * turn) != null
 
 
-# Add a collider from one of Godot's shapes. Returns its number, or -1 if that is refused.
-func add_collider(shape: Resource, place: Transform) -> int:
+## A collider of one of Godot's shapes; returns its number, or -1 where that is refused.
+func add_collider(shape: Resource, place: Transform3D) -> int:
     if not _is_started("add_collider"):
         return -1
     var kind: int = Shape.SPHERE
     var size := Vector3()
-    var turn := Transform()
-    if shape is SphereShape:
+    var turn := Transform3D()
+    if shape is SphereShape3D:
         size.x = shape.radius
-    elif shape is BoxShape:
+    elif shape is BoxShape3D:
         kind = Shape.BOX
-        size = 2.0 * shape.extents
-    elif shape is CapsuleShape:
+        size = shape.size
+        # Godot 3: size = 2.0 * shape.extents
+    elif shape is CapsuleShape3D:
         kind = Shape.CAPSULE
-        size = Vector3(shape.radius, shape.height, 0.0)
-        turn.basis = Basis(Vector3.RIGHT, PI / 2)  # Godot's capsule is along z, the library's along y
-    elif shape is PlaneShape:
+        size = Vector3(shape.radius, maxf(shape.height - 2.0 * shape.radius, 0.0), 0.0)  # without its caps
+        # Godot 3: size = Vector3(shape.radius, shape.height, 0.0)
+        # Godot 3: turn.basis = Basis(Vector3.RIGHT, PI / 2)  # Godot's lies along z, the library's along y
+    elif shape is WorldBoundaryShape3D:
         kind = Shape.PLANE
         turn = _above(shape.plane)
     else:
-        push_error("%s is not a SphereShape, BoxShape, CapsuleShape or PlaneShape" % shape)
+        push_error("%s is no SphereShape3D, BoxShape3D, CapsuleShape3D or WorldBoundaryShape3D" % shape)
         return -1
     if not place.basis.get_scale().is_equal_approx(Vector3.ONE):
-        push_error("a collider has the scale %s: change the size of its shape instead" % place.basis.get_scale())
+        push_error("a collider has the scale %s: change the shape's own size instead" % place.basis.get_scale())
         return -1
     var made = native.add_collider(kind, size, place * turn, friction, restitution, thickness, 1, -1)
     if made == null:
@@ -179,18 +189,18 @@ func remove_collider(number: int) -> bool:
     return true
 
 
-# Impulse of bodies on a collider in the last step [N s].
-func collider_impulse(which) -> Vector3:
+## What bodies gave it in the last step [N s].
+func collider_impulse(which: Variant) -> Vector3:
     var number := _number(Kind.COLLIDER, which, "collider_impulse")
     var found = null if number < 0 else native.collider_impulse(number)
     return Vector3() if found == null else found[0]
 
 
-# Find the first soft body on a ray: body, point, normal, distance, and triangle, weights and vertices of its surface.
-# Returns an empty Dictionary if there is none.
+## The first soft body on a ray: body, point, normal, distance, triangle, weights and vertices of its own surface.
+## Empty where there is none.
 func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     var found = native.raycast(origin, direction, reach) if _is_started("raycast") else null
-    if not found:
+    if found == null or found.is_empty():
         return {}
     return {
         "body": found[0],
@@ -203,27 +213,27 @@ func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     }
 
 
-# Return the bodies that touch or enclose a sphere.
+## Bodies that touch a sphere, or enclose it.
 func overlap_sphere(center: Vector3, radius: float) -> Array:
     var found = native.overlap_sphere(center, radius) if _is_started("overlap_sphere") else null
     return [] if found == null else found
 
 
-# Return the bodies that touch or enclose a box with edges of `size`.
-func overlap_box(place: Transform, size: Vector3) -> Array:
+## Bodies that touch a box with edges of `size`, or enclose it.
+func overlap_box(place: Transform3D, size: Vector3) -> Array:
     var found = native.overlap_box(place, size) if _is_started("overlap_box") else null
     return [] if found == null else found
 
 
-# Grab a body at a hit of `raycast`. Returns the number of the grab; 0 if nothing was hit.
+## Take hold where `raycast` has hit, and pull towards there. Returns a number; 0 where nothing was hit.
 func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
-    if not _is_started("grab") or hit.empty():
+    if not _is_started("grab") or hit.is_empty():
         return 0
     var made = native.grab(hit.body, hit.triangle, hit.weights, hit.point, frequency, max_force)
     return 0 if made == null else made
 
 
-# Move a grab to another point.
+## Pull towards another point.
 func move_grab(which: int, point: Vector3) -> bool:
     return _is_started("move_grab") and native.move_grab(which, point) != null
 
@@ -232,36 +242,35 @@ func release_grab(which: int) -> bool:
     return _is_started("release_grab") and native.release_grab(which) != null
 
 
-# Force of a grab [N].
+## With what it pulls [N].
 func grab_force(which: int) -> Vector3:
     var found = native.grab_force(which) if _is_started("grab_force") else null
     return Vector3() if found == null else found
 
 
-# Gravity [m/s^2], from the next step on.
+## Gravity [m/s^2], from the next step on.
 func set_gravity(gravity: Vector3) -> bool:
     return _is_started("set_gravity") and native.set_gravity(gravity) != null
 
 
-# Coulomb coefficient of a body against other bodies. For a collider, by name or number, use set_collider_friction.
+## Coulomb's coefficient of a body against others. That of a collider by its name or number: set_collider_friction.
 func set_body_friction(which: int, friction: float) -> bool:
     return _is_started("set_body_friction") and native.set_body_friction(which, friction) != null
 
 
-func set_collider_friction(collider, friction: float) -> bool:
+func set_collider_friction(collider: Variant, friction: float) -> bool:
     var number := _number(Kind.COLLIDER, collider, "set_collider_friction")
     return number >= 0 and native.set_collider_friction(number, friction) != null
 
 
-# Attach vertices to another body, at their current positions in it or each to one of its vertices. Returns the number
-# of the joint, or 0 if that is refused.
-func join(which: int, vertices: PoolIntArray, other: int, onto := PoolIntArray()) -> int:
+## Let vertices be held by another body: where they are in it, or each at a vertex of it. Returns a number, or 0.
+func join(which: int, vertices: PackedInt32Array, other: int, onto := PackedInt32Array()) -> int:
     var made = native.join(which, vertices, other, onto) if _is_started("join") else null
     return 0 if made == null else made
 
 
-# Return the joint with a name of the world's script; 0 for none.
-func joint(called) -> int:
+## The joint of the world's script of this name; 0 for none.
+func joint(called: Variant) -> int:
     var number := _number(Kind.JOINT, called, "joint")
     var found = null if number < 0 else native.joint_of(number)
     return 0 if found == null else found
@@ -271,23 +280,22 @@ func release_joint(which: int) -> bool:
     return _is_started("release_joint") and native.release_joint(which) != null
 
 
-# Force of the other body of a joint [N].
+## With what the other body pulls [N].
 func joint_force(which: int) -> Vector3:
     var found = native.joint_force(which) if _is_started("joint_force") else null
     return Vector3() if found == null else found
 
 
-# Rotate vertices about an axis that rotates with them, with a limited torque. Returns the number of the motor, or 0 if
-# that is refused.
-func add_motor(which: int, vertices: PoolIntArray, axis: Vector3, speed: float, max_torque: float) -> int:
+## Turn vertices about an axis that turns with them, with so much torque at most. Returns a number, or 0.
+func add_motor(which: int, vertices: PackedInt32Array, axis: Vector3, speed: float, max_torque: float) -> int:
     if not _is_started("add_motor"):
         return 0
     var made = native.add_motor(which, vertices, 1, 0, 0, axis, Vector3(), speed, max_torque)
     return 0 if made == null else made
 
 
-# Return the motor with a name of the world's script; 0 for none.
-func motor(called) -> int:
+## The motor of the world's script of this name; 0 for none.
+func motor(called: Variant) -> int:
     var number := _number(Kind.MOTOR, called, "motor")
     var found = null if number < 0 else native.motor_of(number)
     return 0 if found == null else found
@@ -297,7 +305,7 @@ func set_motor_speed(which: int, speed: float) -> bool:
     return _is_started("set_motor_speed") and native.set_motor_speed(which, speed) != null
 
 
-# Limit of the torque; with 0 the vertices coast.
+## With 0 its vertices coast.
 func set_motor_limit(which: int, limit: float) -> bool:
     return _is_started("set_motor_limit") and native.set_motor_limit(which, limit) != null
 
@@ -306,77 +314,77 @@ func remove_motor(which: int) -> bool:
     return _is_started("remove_motor") and native.remove_motor(which) != null
 
 
-# Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments prevent it;
-# with `release` they are released. Each level has its own vertices.
+## Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments bar the change;
+## with `release` they are released. Each level has its own vertices.
 func set_level(which: int, level: int, release := false) -> bool:
     return _is_started("set_level") and native.set_level(which, level, int(release)) != null
 
 
-# Return the level of detail of a body; -1 for no body.
+## The level of detail of a body; -1 for no body.
 func get_level(which: int) -> int:
     var found = native.get_level(which) if _is_started("get_level") else null
     return -1 if found == null else found
 
 
-# Return the number of levels of detail of a body; 0 for no body.
+## Number of levels of detail that a body has; 0 for no body.
 func level_count(which: int) -> int:
     var asset = native.asset_of(which) if _is_started("level_count") else null
     return 0 if asset == null else native.level_count(asset)
 
 
-# Return the positions of a body's vertices at its level of detail.
-func positions(which: int) -> PoolVector3Array:
+## Positions of the vertices of a body at its level of detail, by their numbers.
+func positions(which: int) -> PackedVector3Array:
     var found = native.positions(which) if _is_started("positions") else null
-    return PoolVector3Array() if found == null else found
+    return PackedVector3Array() if found == null else found
 
 
-# Add a frame, a pose that the game moves and bodies attach to. Returns its number, or -1 if that is refused.
-func add_frame(place: Transform) -> int:
+## A place that moves as the game says, for bodies to hang from. Returns its number, or -1 where that is refused.
+func add_frame(place: Transform3D) -> int:
     var made = native.add_frame(place) if _is_started("add_frame") else null
     return -1 if made == null else made
 
 
-# Move a frame over the next step. `frame` is a name of the world's script or a number from add_frame.
-func move_frame(frame, place: Transform) -> bool:
+## Be there at the end of the coming step. `frame` is a name of the world's script or a number of add_frame.
+func move_frame(frame: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.FRAME, frame, "move_frame")
     return number >= 0 and native.move_frame(number, place) != null
 
 
-# Remove a frame and detach its vertices.
-func remove_frame(frame) -> bool:
+## What hangs from it is let go.
+func remove_frame(frame: Variant) -> bool:
     var number := _number(Kind.FRAME, frame, "remove_frame")
     return number >= 0 and native.remove_frame(number) != null
 
 
-# Attach vertices to a frame at their current positions. Set `feels` to use frame_load later.
-func attach(which: int, vertices: PoolIntArray, frame, feels := false) -> bool:
+## Let vertices go with a frame, from where both are now. `feels` where frame_load is asked later.
+func attach(which: int, vertices: PackedInt32Array, frame: Variant, feels := false) -> bool:
     var number := _number(Kind.FRAME, frame, "attach")
     return number >= 0 and native.attach(which, vertices, number, int(feels)) != null
 
 
-# Detach vertices from frames; an empty array detaches all.
-func detach(which: int, vertices := PoolIntArray()) -> bool:
+## Let vertices go; none stands for all that hang from frames.
+func detach(which: int, vertices := PackedInt32Array()) -> bool:
     return _is_started("detach") and native.detach(which, vertices) != null
 
 
-# Force of a body on a frame in the last step [N].
-func frame_load(which: int, frame) -> Vector3:
+## What a body pulled a frame with in the last step [N].
+func frame_load(which: int, frame: Variant) -> Vector3:
     var number := _number(Kind.FRAME, frame, "frame_load")
     var found = null if number < 0 else native.frame_load(which, number)
     return Vector3() if found == null else found[0]
 
 
-# Hash of the state, equal to that of Python's world in the same state. (Object already has a function hash.)
+## Tells states apart: that of Python's world in the same state.
 func state_hash() -> String:
-    return "" if not _is_started("state_hash") else native.state_hash()
+    return native.state_hash() if _is_started("state_hash") else ""
 
 
-# Snapshot of the soft bodies and their colliders, without Godot's bodies.
-func snapshot() -> PoolByteArray:
-    return native.snapshot() if _is_started("snapshot") else PoolByteArray()
+## The soft bodies and their colliders; Godot's own bodies are not in it.
+func snapshot() -> PackedByteArray:
+    return native.snapshot() if _is_started("snapshot") else PackedByteArray()
 
 
-func restore(bytes: PoolByteArray) -> bool:
+func restore(bytes: PackedByteArray) -> bool:
     return _is_started("restore") and native.restore(bytes) != null
 
 
@@ -390,11 +398,12 @@ func _is_started(what: String) -> bool:
     return native != null
 
 
-func _number(kind: int, which, what: String) -> int:
+func _number(kind: Kind, which: Variant, what: String) -> int:
     if not _is_started(what):
         return -1
     var number = which
-    if which is String:
+    if which is String or which is StringName:
+    # Godot 3: if which is String:
         number = native.find(kind, which)
     if typeof(number) != TYPE_INT or number < 0:
         if number != null:
@@ -409,47 +418,50 @@ func _set_step(delta: float) -> bool:
     if native.set_fixed_step(delta, substeps, 1) == null:
         return false
     _dt = delta
-    # Bodies are drawn at alpha between the last two steps. Adding almost a full step here keeps alpha near 1, the
-    # time at which Godot draws its bodies.
+    # The picture is alpha of the way from the step before to the last one. With nearly a step of time put in
+    # here it stays that of the last step, where Godot draws its own bodies.
     return native.advance(NEARLY * delta) != null
 
 
-# Transform from a plane to axes with y along its normal.
-func _above(plane: Plane) -> Transform:
+# From a plane to axes whose y stands on it.
+func _above(plane: Plane) -> Transform3D:
     var up := plane.normal.normalized()
-    var aside := Vector3.RIGHT if abs(up.x) < 0.9 else Vector3.BACK
+    var aside := Vector3.RIGHT if absf(up.x) < 0.9 else Vector3.BACK
     var right := up.cross(aside).normalized()
-    return Transform(Basis(right, up, right.cross(up)), plane.d / plane.normal.length() * up)
+    return Transform3D(Basis(right, up, right.cross(up)), plane.d / plane.normal.length() * up)
 
 
-func _physics_bodies() -> Array:
-    var found := []
-    var waiting := [self]
-    while waiting:
+func _physics_bodies() -> Array[PhysicsBody3D]:
+    var found: Array[PhysicsBody3D] = []
+    var waiting: Array[Node] = [self]
+    while not waiting.is_empty():
         var node: Node = waiting.pop_back()
-        if node is PhysicsBody:
+        if node is PhysicsBody3D:
             found.append(node)
         var children := node.get_children()
-        children.invert()  # keeps the order of the scene
-        waiting += children
+        children.reverse()  # so that they come out in the order of the scene
+        for child in children:
+            waiting.append(child)
     for node in get_tree().get_nodes_in_group("soft_colliders"):
-        if node is PhysicsBody and not node in found:
+        if node is PhysicsBody3D and not node in found:
             found.append(node)
     return found
 
 
-func _follow(body: PhysicsBody) -> void:
-    for shape in body.get_children():
-        if not shape is CollisionShape or shape.disabled or shape.shape == null:
+func _follow(physics_body: PhysicsBody3D) -> void:
+    # The class of bodies that move can inherit that of bodies that do not.
+    var stays := physics_body is StaticBody3D and not physics_body is AnimatableBody3D
+    for shape in physics_body.get_children():
+        if not shape is CollisionShape3D or shape.disabled or shape.shape == null:
             continue
         var number := add_collider(shape.shape, shape.global_transform)
         if number < 0:
             continue
-        _nodes[number] = weakref(body)
-        if not body is StaticBody:
+        _nodes[number] = weakref(physics_body)
+        if not stays:
             _followed.append(
                 {
-                    "body": weakref(body),
+                    "body": weakref(physics_body),
                     "shape": weakref(shape),
                     "number": number,
                     "place": shape.global_transform,
@@ -458,7 +470,7 @@ func _follow(body: PhysicsBody) -> void:
             )
 
 
-# Record only events with a connected signal, because recording contacts takes time.
+# Only what somebody is connected to: to look for contacts takes time.
 func _record() -> void:
     var kinds := 0
     for told_by in TOLD_BY:
@@ -484,22 +496,22 @@ func _tell() -> void:
         match events[i]:
             Event.CONTACT_BEGAN:
                 if collider < 0:
-                    emit_signal("soft_contact_began", who, other, impulse)
+                    soft_contact_began.emit(who, other, impulse)
                 else:
                     var node := _node(_nodes.get(collider))
-                    emit_signal("contact_began", who, collider, node, impulse)
+                    contact_began.emit(who, collider, node, impulse)
             Event.CONTACT_ENDED:
                 if collider < 0:
-                    emit_signal("soft_contact_ended", who, other, impulse, duration)
+                    soft_contact_ended.emit(who, other, impulse, duration)
                 else:
                     var node := _node(gone.get(collider, _nodes.get(collider)))
-                    emit_signal("contact_ended", who, collider, node, impulse, duration)
+                    contact_ended.emit(who, collider, node, impulse, duration)
             Event.SLEPT:
-                emit_signal("body_slept", who)
+                body_slept.emit(who)
             Event.WOKE:
-                emit_signal("body_woke", who)
+                body_woke.emit(who)
             Event.FROZE:
-                emit_signal("body_froze", who)
+                body_froze.emit(who)
 
 
 func _node(reference: WeakRef) -> Node:
@@ -507,16 +519,17 @@ func _node(reference: WeakRef) -> Node:
 
 
 func _move(each: Dictionary) -> void:
-    var shape: CollisionShape = each.shape.get_ref()
+    var shape: CollisionShape3D = each.shape.get_ref()
     if shape == null or not shape.is_inside_tree():
         remove_collider(each.number)
         _followed.erase(each)
         return
     var place := shape.global_transform
-    var rigid := each.body.get_ref() as RigidBody
+    var rigid := each.body.get_ref() as RigidBody3D
     if rigid != null:
-        # With Bullet the node's transform is one step late, which would add energy to coupled bodies.
-        var state := PhysicsServer.body_get_direct_state(rigid.get_rid())
+        # As the server says: under Bullet the node itself is one step behind. Then soft and rigid bodies would gain
+        # energy.
+        var state := PhysicsServer3D.body_get_direct_state(rigid.get_rid())
         if state != null:
             place = state.transform * shape.transform
     if place != each.place:
@@ -524,18 +537,20 @@ func _move(each: Dictionary) -> void:
         move_collider(each.number, place)
 
 
-# The engine receives impulses one step late. So half of each is applied in advance and subtracted later, see
-# docs/coupling.md.
+# The engine feels an impulse one step late. So it gets half of it in advance, and that is taken back later:
+# the page docs/coupling.md says why.
 func _push_back(each: Dictionary) -> void:
-    var rigid := each.body.get_ref() as RigidBody
-    if rigid == null or rigid.mode != RigidBody.MODE_RIGID and rigid.mode != RigidBody.MODE_CHARACTER:
+    var rigid := each.body.get_ref() as RigidBody3D
+    if rigid == null or rigid.freeze:
+    # Godot 3: if rigid == null or rigid.mode != RigidBody.MODE_RIGID and rigid.mode != RigidBody.MODE_CHARACTER:
         return
     var now: Array = native.collider_impulse(each.number)
     var impulse: Vector3 = 1.5 * now[0] - 0.5 * each.last[0]
     var moment: Vector3 = 1.5 * now[1] - 0.5 * each.last[1]
     each.last = now
     if impulse != Vector3() or moment != Vector3():
-        var state := PhysicsServer.body_get_direct_state(rigid.get_rid())
+        var state := PhysicsServer3D.body_get_direct_state(rigid.get_rid())
         var middle := rigid.global_transform.origin if state == null else state.transform.origin
-        rigid.apply_impulse(native.collider_position(each.number) - middle, impulse)
+        rigid.apply_impulse(impulse, native.collider_position(each.number) - middle)
+        # Godot 3: rigid.apply_impulse(native.collider_position(each.number) - middle, impulse)
         rigid.apply_torque_impulse(moment)

@@ -1,0 +1,118 @@
+"""The part of a body that a hand takes hold of, in 64-bit floats."""
+
+from taichi_soft.control.kernels.grabs import PATCH_ROWS
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def _row(rows: ti.template(), i):
+    return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
+
+
+@ti.func
+def _dot(a, b):
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@ti.func
+def _count_within(patch: ti.template(), distance):
+    count = 0
+    for v in range(patch.shape[0]):
+        count += int(patch[v, 0] <= distance)
+    return count
+
+
+@ti.func
+def _distance_of_last(patch: ti.template(), radius):
+    """Find the least distance up to which there are more vertices than a patch has, by bisection.
+
+    The bits of floats of 0 or more have the order of the floats.
+    """
+    lowest, highest = ti.cast(0, ti.i64), ti.bit_cast(radius, ti.i64)
+    while lowest < highest:
+        middle = lowest + ((highest - lowest) >> 1)
+        if _count_within(patch, ti.bit_cast(middle, ti.f64)) > PATCH_ROWS:
+            highest = middle
+        else:
+            lowest = middle + 1
+    return ti.bit_cast(lowest, ti.f64)
+
+
+@ti.func
+def _square_of_slope(x: ti.template(), elements: ti.template(), patch: ti.template(), e):
+    """Square of the falloff's slope in a tetrahedron, or of its rise along a spring."""
+    first = elements[e, 0]
+    rise, is_near = ti.Vector.zero(ti.f64, 3), patch[first, 0] != 0.0
+    for i in ti.static(range(3)):
+        if i + 1 < elements.shape[1]:
+            rise[i] = patch[elements[e, i + 1], 0] - patch[first, 0]
+            is_near = is_near or patch[elements[e, i + 1], 0] != 0.0
+    square = rise.x * rise.x
+    if elements.shape[1] == 4 and is_near:
+        start = _row(x, first)
+        a, b, c = _row(x, elements[e, 1]), _row(x, elements[e, 2]), _row(x, elements[e, 3])
+        a, b, c = a - start, b - start, c - start
+        bc, ca, ab = b.cross(c), c.cross(a), a.cross(b)
+        slope = (rise.x * bc + rise.y * ca + rise.z * ab) / _dot(a, bc)
+        square = _dot(slope, slope)
+    return square
+
+
+@ti.kernel
+def shape_patch(
+    corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    weights: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    limits: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    x: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    masses: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    elements: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    stiffness: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    patch: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    strength: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    """Find the patch round a point at rest.
+
+    Its strength is `FARTHEST_PULL` of its radius times the least force per distance that holds back vertices
+    which are each moved by its falloff w. That is twice the energy of that shape per distance squared: the
+    sum of V mu |grad w|^2 in tetrahedra, of k (w_i - w_j)^2 / 3 in springs.
+
+    Args:
+        corners: vertices between which the point lies, three or four.
+        weights: its barycentric coordinates.
+        limits: as `control.grab_patch.LIMITS`.
+        x: rest positions, (n, 3) [m].
+        masses: of vertices, (n,) [kg].
+        elements: vertices of springs (e, 2) or tetrahedra (e, 4).
+        stiffness: of them, k / 3 [N/m] or V mu [N m], (e,).
+        patch: (n, 2), gets the falloff of each vertex, 0 for one outside, and its share of a pull.
+        strength: (1,), gets the strength [N].
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        point, lower, upper = ti.Vector.zero(ti.f64, 3), _row(x, 0), _row(x, 0)
+        for i in range(corners.shape[0]):
+            point += weights[i] * _row(x, corners[i])
+        for v in range(x.shape[0]):
+            lower, upper = ti.min(lower, _row(x, v)), ti.max(upper, _row(x, v))
+            arm = _row(x, v) - point
+            patch[v, 0] = ti.sqrt(_dot(arm, arm))
+        farthest, size = ti.cast(0.0, ti.f64), upper - lower
+        for i in range(corners.shape[0]):
+            farthest = ti.max(farthest, patch[corners[i], 0])
+        radius = ti.max(limits[0] * ti.sqrt(_dot(size, size)), limits[1] * farthest)
+        if _count_within(patch, radius) > PATCH_ROWS:
+            radius = _distance_of_last(patch, radius)
+        total = ti.cast(0.0, ti.f64)
+        for v in range(x.shape[0]):
+            part = patch[v, 0] / radius
+            left = ti.max(1.0 - part * part, 0.0)
+            falloff = left * left
+            falloff = ti.select(falloff >= limits[2], falloff, 0.0)
+            patch[v, 0], patch[v, 1] = falloff, falloff * masses[v]
+            total += falloff * masses[v]
+        for v in range(x.shape[0]):
+            patch[v, 1] = patch[v, 1] / total
+        held = ti.cast(0.0, ti.f64)
+        for e in range(stiffness.shape[0]):
+            held += stiffness[e] * _square_of_slope(x, elements, patch, e)
+        strength[0] = limits[3] * radius * held

@@ -1,0 +1,95 @@
+"""Calls of Taichi from any thread.
+
+Taichi takes what one thread compiles for what all do, and two threads that compile at once for one. It starts
+and allocates fields in one and the same thread only: its binary asserts that. Here each kernel and each
+number in a field is a turn of one thread, for which others wait. A thread of our own starts Taichi and
+allocates fields, as whichever thread comes first may end soon.
+
+Needless once Taichi can be used from several threads: https://github.com/taichi-dev/taichi/issues/2022 is
+open, and https://github.com/taichi-dev/taichi/issues/4542 has the assertion; main branch has both faults.
+"""
+
+import functools
+import threading
+from _thread import start_new_thread
+from collections.abc import Callable
+from concurrent.futures import Future
+from importlib import import_module
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+from taichi_soft.core.taichi_workarounds.subnormals import with_usual_floats
+from taichi_soft.core.threads import in_turn
+
+Result = TypeVar("Result")
+
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of our own thread
+_is_served = threading.Lock()
+_home = 0  # identity of that thread
+
+
+def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
+    """Make kernels and numbers in fields turns of one thread.
+
+    Args:
+        lay_out_now: calls Taichi's own function, which lays out fields, with its argument.
+    """
+    compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
+    ti.lang.impl.PyTaichi.inside_kernel = property(
+        lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
+    )
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(with_usual_floats(ti.lang.kernel_impl.Kernel.__call__))
+    make = accessor.__init__
+
+    def make_in_turn(self: Any, snode: Any) -> None:
+        make(self, snode)
+        self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
+
+    accessor.__init__ = make_in_turn  # its kernels go where Taichi adds others with the GIL released
+    lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
+    ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
+
+
+def must_go_home() -> bool:
+    """True if there are fields to lay out and this is not our own thread."""
+    root = ti.lang.impl._root_fb
+    return not (root.finalized or root.empty) and threading.get_ident() != _home
+
+
+def at_home(function: Callable[[], Result]) -> Result:
+    """Call a function in our own thread. On Ctrl-C, let it finish what it does, half of which would be the
+    end of all worlds."""
+    found: Future[Result] = Future()
+
+    def work() -> None:
+        try:
+            found.set_result(function())
+        except BaseException as error:
+            found.set_exception(error)
+
+    if not _is_served.locked():
+        start_new_thread(_serve, ())
+    try:
+        _jobs.put(work)
+        return found.result()
+    except KeyboardInterrupt:
+        last = threading.Event()
+        _jobs.put(last.set)
+        last.wait()
+        raise
+
+
+def _serve() -> None:
+    global _home
+    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+        _home = threading.get_ident()
+        while True:
+            _jobs.get()()
+
+
+def leave_home() -> None:
+    """Forget the thread, in a process that was forked before Taichi started: it has none of the other's
+    threads."""
+    global _is_served
+    _is_served = threading.Lock()

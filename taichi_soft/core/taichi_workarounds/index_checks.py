@@ -1,0 +1,48 @@
+"""Check of indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and without a line for each hash.
+
+Taichi's bounds check skips the body of a `ti.real_func`. With `debug` it also prints a line for each whole
+number that overflows, which hashes do on purpose.
+
+Needless once Taichi runs `check_out_of_bound` on real functions, and once
+https://github.com/taichi-dev/taichi/issues/8725 is closed (an option for the report of overflows); main
+branch has neither.
+"""
+
+from typing import Any
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+
+
+def check_real_functions() -> None:
+    """Assert each index in a real function before its row is used. A wrong index becomes 0, so that the
+    process survives to report it."""
+    impl = ti.lang.impl
+    plain = impl.subscript
+
+    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
+        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
+        if is_real and isinstance(value, ti.Field) and value.shape:
+            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
+            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
+            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
+            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
+            indices = (ti.select(is_inside, index, 0),)
+        return plain(builder, value, *indices, **options)
+
+    impl.subscript = checked
+
+
+def let_whole_numbers_overflow() -> None:
+    """Compile without the report of overflows."""
+    program = ti._lib.core.Program
+    plain = program.compile_kernel
+
+    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
+        config.debug = False  # the bounds check has its own option; the rest depends on this one
+        try:
+            return plain(self, config, *arguments)
+        finally:
+            config.debug = True  # the launch reads it, and raises what was found
+
+    program.compile_kernel = compiled

@@ -1,0 +1,75 @@
+"""Keys of Taichi's cache on disk that are the same on every machine, and others in every version of the
+package.
+
+Taichi compiles into each parallel loop how many threads may run it: as many as the machine has. The number is
+part of the key too. Another machine would not find the kernel, or would run it on too few threads.
+
+Needless once Taichi reads the number of threads when a loop starts, and takes a part of the key from its
+caller. Main branch does neither; we know of no thread about it.
+"""
+
+import threading
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+
+_MOST_THREADS = 1 << 20
+"""Threads that a kernel may use: no machine has as many."""
+
+
+def let_any_number_of_threads_run() -> None:
+    """Compile `_MOST_THREADS` into each loop. Taichi uses those threads that it has started."""
+    builder, given = ti._lib.core.ASTBuilder, threading.local()
+    parallelize = builder.parallelize
+
+    def give(self: Any, threads: int) -> None:  # 1 where the next loop is to be serial
+        given.within = ti.lang.impl.get_runtime().compiling_callable
+        parallelize(self, threads)
+
+    def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
+        def begin_loop(self: Any, *arguments: Any) -> Any:
+            # Finding the end of a loop can compile a real function, which has loops of its own.
+            if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
+                given.within = None
+            else:
+                parallelize(self, _MOST_THREADS)
+            return begin(self, *arguments)
+
+        return begin_loop
+
+    builder.parallelize = give
+    for kind in ("range_for", "struct_for_on_snode", "struct_for_on_external_tensor"):
+        name = f"begin_frontend_{kind}"
+        setattr(builder, name, opening(getattr(builder, name)))
+
+
+def keep_kernels_apart(version: str) -> None:
+    """Use another key in each version of the package. Call it once Taichi runs.
+
+    The number of threads in the key becomes one that no machine reaches, made of the version.
+    """
+    ti.lang.impl.current_cfg().cpu_max_num_threads = (
+        _MOST_THREADS + zlib.crc32(version.encode()) % _MOST_THREADS
+    )
+
+
+def code_options() -> str:
+    """List all options of the running Taichi on which code depends."""
+    config = ti.lang.impl.current_cfg()
+    names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
+    numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
+    return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})
+
+
+@contextmanager
+def not_kept() -> Iterator[None]:
+    """Keep kernels that are compiled within out of Taichi's cache."""
+    config = ti.lang.impl.current_cfg()
+    usual, config.offline_cache = config.offline_cache, False
+    try:
+        yield
+    finally:
+        config.offline_cache = usual

@@ -1,0 +1,266 @@
+"""Kernels that an earlier process compiled, found without walking through their source.
+
+Taichi keeps compiled kernels on disk under a hash of what it makes of their source. To get at that hash it
+walks through the source of each kernel at every start, which takes most of a start with a full cache.
+
+Here a kernel that is known from earlier is made with a short body instead. That body holds a digest of all
+that the kernel's source depends on. When the process ends that compiled the kernel, its code is put into the
+file of the short body. There Taichi finds it, by the hash of the short body, which takes next to no time.
+
+The short body sets a flag. If Taichi does not find the file, it compiles that body, and the flag shows it
+after the launch. Nothing else has happened then: the kernel is made from its source and launched.
+
+Needless once Taichi looks for a kernel before it walks through its source, as its fork Quadrants does
+(https://github.com/Genesis-Embodied-AI/quadrants/pull/131). Main branch does not; it was planned in
+https://github.com/taichi-dev/taichi/issues/4401.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.core.compilation import BURST
+from taichi_soft.core.taichi_workarounds.importing import ti
+from taichi_soft.core.taichi_workarounds.kernel_digest import UnknownPartError, digest_of
+
+kernels = ti.lang.kernel_impl
+Make = Callable[..., None]
+
+INDEX = "taichi_soft.json"
+"""File beside Taichi's own, with the digests of kernels that can be found."""
+
+FLAG = "__flag"
+"""Name in the short body of the field that it sets."""
+
+HEADER = 1 << 17
+"""Bytes at the front of Taichi's file of a kernel, among which the names of its functions stand."""
+
+
+class KnownKernels:
+    """Known kernels in one folder of Taichi's."""
+
+    def __init__(self, folder: Path, options: str) -> None:
+        """Read the index of a folder.
+
+        Args:
+            folder: in which Taichi keeps kernels.
+            options: as `digest_of` takes them.
+        """
+        self.folder, self.options = folder, options
+        self._known = self._read()
+
+    def __contains__(self, digest: object) -> bool:
+        return digest in self._known
+
+    def _read(self) -> set[str]:
+        try:
+            return set(json.loads((self.folder / INDEX).read_text()))
+        except (OSError, ValueError, TypeError):
+            return set()
+
+    def keep(self, names: dict[str, str]) -> None:
+        """Put the code of kernels into the files of their short bodies. Taichi has written all files.
+
+        Args:
+            names: by digest, names of the kernels that were made from their source.
+        """
+        files = self._files_of({*names.values(), *map(_short_name_of, names)})
+        kept = []
+        for digest, name in names.items():
+            code, place = files.get(name), files.get(_short_name_of(digest))
+            if code and place:
+                _write(place, code.read_bytes())
+                kept.append(digest)
+        if kept:
+            _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
+
+    def _files_of(self, names: set[str]) -> dict[str, Path]:
+        """Find the files of these kernels, by name."""
+        found = {}
+        for path in self.folder.glob("*.tic"):
+            with path.open("rb") as file:
+                match = re.search(rb'"name":"(\w+?)_kernel_\d+_', file.read(HEADER))
+            if match and match.group(1).decode() in names:
+                found[match.group(1).decode()] = path
+        return found
+
+
+class FirstLaunches:
+    """First launches of all kernels of a process: each kernel is found among those known, or made from its
+    source."""
+
+    def __init__(self) -> None:
+        self._known: KnownKernels | None = None
+        self._flag: Any = None
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, what Taichi tells its arrays apart by, digest
+
+    def make_flag(self) -> None:
+        """Make the field that short bodies set, as Taichi starts."""
+        self._flag = ti.field(ti.i32, ())
+
+    def open(self, known: KnownKernels) -> None:
+        """Look for kernels among those known from now on."""
+        self._known = known
+
+    @contextmanager
+    def making_anew(self, functions: set[Any]) -> Iterator[None]:
+        """Make these kernels from their source within, even if they are known or were made before."""
+        known, self._known = self._known, None
+        made = [vars(function)["_primal"] for function in functions]  # Taichi's own object behind each
+        before = [(kernel, kernel.compiled_kernels) for kernel in made]
+        for kernel in made:
+            kernel.compiled_kernels = {}
+        try:
+            yield
+        finally:
+            self._known = known
+            for kernel, compiled in before:
+                kernel.compiled_kernels = compiled
+
+    def install(self) -> None:
+        """Replace the function with which Taichi makes a kernel."""
+        plain = kernels.Kernel.materialize
+
+        def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
+            if key not in kernel.compiled_kernels:
+                self._prepare(kernel, plain, key, args, arg_features)
+
+        kernels.Kernel.materialize = materialize
+
+    def close(self) -> None:
+        """Let Taichi keep a file with a short body for each kernel that was made from its source."""
+        for kernel, features, digest in self._made:
+            program = ti.lang.impl.get_runtime().prog
+            short = self._create_short(kernel, features, digest)
+            program.compile_kernel(program.config(), program.get_device_caps(), short)
+        if self._made:
+            _ = self._flag[None]  # reading it is a kernel too, that the next process asks for
+
+    def keep(self) -> None:
+        """Put the code of these kernels into the files of the short bodies. Call it once Taichi has ended."""
+        if self._known is not None:
+            self._known.keep({digest: _name_of(kernel, digest) for kernel, _, digest in self._made})
+
+    def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
+        """Make a kernel, and check the flag after its first launch."""
+        name = kernel.func.__name__
+        start = BURST.begin(name)
+        kernel.runtime.materialize()  # lays out fields, of whose places digests are made
+        digest = self._digest_of(kernel, args, features)
+        is_short = self._known is not None and digest in self._known
+        if digest is None:
+            plain(kernel, key, args, features)
+        elif is_short:
+            kernel.compiled_kernels[key] = self._create_short(kernel, features, digest)
+        else:
+            self._make(kernel, key, args, features, digest)
+        is_found = is_short
+
+        def launch_first(compiled: Any, *given: Any) -> Any:
+            nonlocal is_found
+            del kernel.launch_kernel  # from now on that of the class
+            try:
+                found = kernel.launch_kernel(compiled, *given)
+                if is_short and digest is not None and self._flag[None] != 0:  # nothing else has happened
+                    self._flag[None], is_found = 0, False
+                    self._make(kernel, key, args, features, digest)
+                    found = kernel.launch_kernel(kernel.compiled_kernels[key], *given)
+                return found
+            finally:
+                BURST.end(name, start, is_found)
+
+        kernel.launch_kernel = launch_first
+
+    def _digest_of(self, kernel: Any, args: Any, features: Any) -> str | None:
+        """Return the digest of a kernel; None if no digest can be made of it."""
+        is_ours = kernel.func.__module__.startswith("taichi_soft.")
+        if self._known is None or not is_ours or kernel.autodiff_mode != kernels.AutodiffMode.NONE:
+            return None
+        slots = kernel.template_slot_locations
+        given = [(args[i] if i in slots else features[i], i in slots) for i in range(len(args))]
+        try:
+            return digest_of(kernel.func, self._known.options, given)
+        except UnknownPartError:
+            return None
+
+    def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
+        """Make a kernel from its source, under a name by which its file is found again."""
+        slots = kernel.template_slot_locations
+        tree, context = ti.lang.kernel_impl._get_tree_and_ctx(
+            kernel, args=args, excluded_parameters=slots, arg_features=features
+        )
+        kernel.compiled_kernels[key] = _create(kernel, tree, context, _name_of(kernel, digest))
+        self._made.append((kernel, features, digest))
+
+    def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
+        """Make a kernel with the same arguments and the short body."""
+        names = [argument.name for argument in kernel.arguments]
+        returned = " -> None" if kernel.return_type else ""
+        head = f"def {kernel.func.__name__}({', '.join(names)}){returned}:"
+        lines = [head, *(f"    {statement}" for statement in _short_body(digest))]
+        tree = ast.parse("\n".join(lines))
+        context = kernels.ASTTransformerContext(
+            excluded_parameters=kernel.template_slot_locations,
+            is_kernel=True,
+            func=kernel,
+            arg_features=features,
+            global_vars={FLAG: self._flag, **dict.fromkeys(names)},
+            argument_data=None,
+            src=lines,
+            start_lineno=1,
+            file=__file__,
+        )
+        return _create(kernel, tree, context, _short_name_of(digest))
+
+
+def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
+    """Make Taichi's own kernel from the tree of a function, as `Kernel.materialize` of Taichi 1.7.4 does."""
+    runtime = kernel.runtime
+
+    def taichi_ast_generator(made: Any) -> None:  # Taichi looks for this name
+        kernel.kernel_cpp = made
+        runtime.inside_kernel, runtime.current_kernel = True, kernel
+        assert runtime.compiling_callable is None
+        runtime.compiling_callable = made
+        try:
+            context.ast_builder = made.ast_builder()
+            kernels.transform_tree(tree, context)
+        finally:
+            runtime.inside_kernel, runtime.current_kernel, runtime.compiling_callable = False, None, None
+
+    return runtime.prog.create_kernel(taichi_ast_generator, name, kernel.autodiff_mode)
+
+
+def _short_body(digest: str) -> list[str]:
+    """Statements that set the flag, once with each part of the digest. Each takes time at every start."""
+    words = np.frombuffer(bytes.fromhex(digest), np.int32)
+    return [f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1)]
+
+
+def _name_of(kernel: Any, digest: str) -> str:
+    """Name, in Taichi's file, of a kernel that is made from its source."""
+    return f"{kernel.func.__name__}_{digest}"
+
+
+def _short_name_of(digest: str) -> str:
+    """Name, in Taichi's file, of a kernel with the short body."""
+    return f"known_{digest}"
+
+
+def _write(path: Path, contents: bytes) -> None:
+    """Write all of a file at once: other processes may read it meanwhile."""
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.write_bytes(contents)
+    part.replace(path)
+
+
+FIRST_LAUNCHES = FirstLaunches()

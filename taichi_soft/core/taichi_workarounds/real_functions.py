@@ -1,0 +1,18 @@
+"""Branches and loops in real functions.
+
+A `ti.real_func` is compiled once and separately, where a `ti.func` is copied to wherever it is called. But
+Taichi puts the branches and loops of a `ti.func` that a real function calls into the kernel. Their statements
+then run whatever the condition is, or Taichi crashes.
+
+Needless once https://github.com/taichi-dev/taichi/issues/8514 is closed; it is open, and main branch has the
+fault.
+"""
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+
+
+def keep_branches_in_real_functions() -> None:
+    """Add the statements of a `ti.func` to the kernel or real function that is being compiled."""
+    ti.lang.kernel_impl.Kernel.ast_builder = lambda _: (
+        ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+    )

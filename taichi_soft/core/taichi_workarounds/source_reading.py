@@ -1,0 +1,66 @@
+"""Read the source of kernels and functions once.
+
+Taichi reads the lines around each function where it is defined: more than half of the time of our import. It
+reads the whole source again wherever a `ti.func` is called, and wraps the lines around every expression for a
+message.
+
+Needless once Taichi's `_inside_class` reads no source and its `get_pos_info` keeps what it made. Main branch
+does neither; https://github.com/taichi-dev/taichi/issues/7711 asked for the import. Quadrants, a fork of
+Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import textwrap
+import types
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+
+
+def read_sources_once() -> None:
+    """Read each source when it is first compiled. Messages show the first line of an expression,
+    unwrapped."""
+    kernels = ti.lang.kernel_impl
+    ti.lang.kernel_impl._inside_class = _is_in_class
+    kernels.getsourcefile = _remember(kernels.getsourcefile)
+    kernels.getsourcelines = _remember(kernels.getsourcelines)
+    kernels.textwrap = types.SimpleNamespace(
+        fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
+    )
+    ti.lang.ast.ast_transformer_utils.ASTTransformerContext.get_pos_info = _place_of
+
+
+def _is_in_class(level_of_class_stackframe: int) -> bool:
+    """True if a decorated function is defined in the body of a class.
+
+    Args:
+        level_of_class_stackframe: number of frames between this one and that of the class statement, which
+            Taichi reads. The body of the class is the frame before.
+    """
+    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
+
+
+def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return `look_up` with a memory: it is called once for each object, as long as the object exists."""
+    known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+
+    def remembered(key: Any) -> Any:
+        if key not in known:
+            known[key] = look_up(key)
+        return known[key]
+
+    return remembered
+
+
+def _place_of(context: Any, node: Any) -> str:
+    """Describe where a node of a source stands: file, line, function, the line itself and a mark below it."""
+    number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
+    start = context.indent + node.col_offset
+    end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)
+    mark = " " * start + "^" * (end - start)
+    return f'File "{context.file}", line {number}, in {context.func.func.__name__}:\n{line}\n{mark}\n'

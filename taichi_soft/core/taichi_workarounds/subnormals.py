@@ -1,0 +1,107 @@
+"""Floats as IEEE 754 has them, in the thread that calls a kernel and in Taichi's workers.
+
+Taichi has the processor take numbers below 1e-38 for zero, in the thread that starts it and in its workers.
+WebAssembly cannot do that, and other libraries change it for threads of their own. A kernel would give other
+bits from one place to the next.
+
+Needless once Taichi has an option for it: https://github.com/taichi-dev/taichi/pull/2143 made it fixed, and
+main branch has it so. `with_usual_floats` round a kernel stays needed for what other libraries do.
+"""
+
+import ctypes
+import os
+import sys
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from taichi_soft.core.taichi_workarounds.importing import ti
+from taichi_soft.core.taichi_workarounds.kernel_keys import not_kept
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+Environment = ctypes.c_char * 64
+"""Room for C's `fenv_t`: 32 bytes at most where Taichi runs."""
+
+
+def _unchanged(_: Any) -> None:
+    """Stand in for C's functions where the system's library has none."""
+
+
+try:
+    _c = ctypes.PyDLL("ucrtbase" if os.name == "nt" else None)
+    _read, _write = _c.fegetenv, _c.fesetenv
+except (AttributeError, OSError):
+    _read = _write = _unchanged  # type: ignore[assignment]
+
+
+def _usual_environment() -> Any:
+    """Return C's `FE_DFL_ENV`; where we do not know it, the environment of the thread that imports the
+    package."""
+    here, usual = Environment(), Environment()
+    _read(here)
+    if sys.platform == "linux":
+        _write(ctypes.c_void_p(-1))
+    _read(usual)
+    _write(here)
+    return usual
+
+
+_usual = _usual_environment()
+
+
+def with_usual_floats(function: Function) -> Function:
+    """Let a function compute as IEEE 754 says, and leave its thread as it was."""
+
+    @wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        here = Environment()
+        _read(here)
+        try:
+            _write(_usual)
+            return function(*arguments, **options)
+        finally:
+            _write(here)
+
+    return cast("Function", call)
+
+
+def give_workers_usual_floats(count: int) -> None:
+    """Undo in all `count` workers what Taichi set as it started.
+
+    A loop has as many parts as there are workers. Each part calls C's `fesetenv` and waits for the others, so
+    that no worker runs two.
+    """
+    address = ctypes.cast(_write, ctypes.c_void_p).value if _write is not _unchanged else None
+    if address is None:
+        return
+
+    set_environment = _calling(address)
+
+    @ti.kernel  # type: ignore[untyped-decorator]
+    def set_everywhere(environment: ti.i64, arrived: ti.types.ndarray(dtype=ti.i32, ndim=1)):  # type: ignore
+        ti.loop_config(block_dim=1)
+        for _ in range(count):
+            set_environment(environment)
+            ti.atomic_add(arrived[0], 1)
+            while ti.atomic_max(arrived[0], -1) < count:
+                pass
+
+    with not_kept():  # with the function's address
+        set_everywhere(ctypes.addressof(_usual), np.zeros(1, np.int32))
+
+
+def _calling(function: int) -> Callable[[Any], None]:
+    """Return what calls the C function at an address with one argument, for use in a kernel."""
+
+    def call(argument: Any) -> None:
+        runtime = ti.lang.impl.get_runtime()
+        place = ti._lib.core.DebugInfo(runtime.get_current_src_info())
+        given, nothing = ti.lang.expr.make_expr_group([argument]), ti.lang.expr.make_expr_group([])
+        builder = runtime.compiling_callable.ast_builder()
+        builder.insert_external_func_call(function, "", "", "", given, nothing, place)
+
+    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # or Taichi warns of it
+    return call

@@ -1,0 +1,32 @@
+"""What the integrators have in common that take the forces of the old positions."""
+
+from taichi_soft.control.kernels.drives import add_reactions
+from taichi_soft.control.kernels.grabs import pull_grabs
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.internal_forces import accumulate_forces
+
+
+@ti.func
+def whole_substep(lag, h, s):
+    """Forces act for a whole substep."""
+    return h
+
+
+@ti.func
+def before_each(h, s, substeps):
+    """Drives act before each substep, for a whole one [s]."""
+    return ti.select(s < substeps, h, 0.0)
+
+
+@ti.func
+def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
+    """Internal forces, reactions of pins and grabs."""
+    accumulate_forces(state, program, body)
+    add_reactions(state, body, felt)
+    pull_grabs(state, body, h, felt)
+
+
+@ti.func
+def any_shape(state: ti.template(), body, h, is_last):
+    """Changes of velocity are what is checked."""
+    return 1
