@@ -20,7 +20,7 @@ class NodeCollider:
     """
 
     def __init__(self, path: Any, placed: PlacedShape, collider: Collider) -> None:
-        """Made by `add_colliders`."""
+        """Use `add_colliders` instead."""
         self.path, self.collider = path, collider
         self._placed = placed
 

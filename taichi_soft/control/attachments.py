@@ -31,7 +31,7 @@ class Attachment(Handle):
     def __init__(
         self, frames: Frames, body: SoftBody, particles: NDArray[np.int32], frame: Frame, *, two_way: bool
     ) -> None:
-        """Made by `Body.attach`."""
+        """Use `Body.attach` instead."""
         self._frames = frames
         self.body = body
         self.particles = particles

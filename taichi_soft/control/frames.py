@@ -135,7 +135,7 @@ class Frame(Handle):
     """A pose that the game moves: a bone, a vehicle, a hand. Returned by `World.add_frame`."""
 
     def __init__(self, frames: Frames, position: ArrayLike, rotation: Any) -> None:
-        """Made by `World.add_frame`."""
+        """Use `World.add_frame` instead."""
         self._frames = frames
         self._number = frames.add(self, _pose(position, rotation))
 

@@ -44,7 +44,7 @@ class Grab(Handle):
     """A grab of a body. Returned by `Body.grab` and `World.grab`."""
 
     def __init__(self, body: SoftBody, number: int, point: NDArray[np.float64]) -> None:
-        """Made by `Body.grab`."""
+        """Use `Body.grab` instead."""
         self.body = body
         self._number = number
         self._point = point

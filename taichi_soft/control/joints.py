@@ -50,7 +50,7 @@ class Joint(Handle):
     """Particles of a body attached to another body. Returned by `Body.attach_to`."""
 
     def __init__(self, body: SoftBody, other: SoftBody, number: int, particles: NDArray[np.int32]) -> None:
-        """Made by `Body.attach_to`."""
+        """Use `Body.attach_to` instead."""
         self.body = body
         self.other = other
         self.particles = particles

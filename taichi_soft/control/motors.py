@@ -59,7 +59,7 @@ class Motor(Handle):
     """A motor that rotates or pushes a part of a body. Returned by `World.add_motor`."""
 
     def __init__(self, body: SoftBody, number: int, particles: NDArray[np.int32], drive: Drive) -> None:
-        """Made by `World.add_motor`."""
+        """Use `World.add_motor` instead."""
         self.body = body
         self.particles = particles
         self._number = number

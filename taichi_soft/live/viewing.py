@@ -34,7 +34,7 @@ class View:
     """
 
     def __init__(self, world: World, colors: Mapping[Body, Color], height: int) -> None:
-        """Made by `view`."""
+        """Use `view` instead."""
         self._world, self._height = world, height
         self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-view-", ignore_cleanup_errors=True)
         key = secrets.token_bytes(16)

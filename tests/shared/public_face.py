@@ -612,7 +612,7 @@ READERS: dict[str, str] = {
     "Joint": """body force is_attached other particles""",
     "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
-    "EngineAdapter": """alpha budget_status dropped_time fixed_step given_up time total_dropped_time world""",
+    "EngineAdapter": """alpha budget_status dropped_time fixed_step time total_dropped_time world""",
     "Rollback": """steps""",
 }
 """What is asked without arguments and changes nothing."""
