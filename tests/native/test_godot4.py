@@ -95,10 +95,10 @@ def test_sizes_hashes_and_constructors_are_those_of_every_version(api):
         (["--without", "variant_get_type"], "this Godot lacks function variant_get_type, which 4.1"),
         (
             ["--without", "classdb_register_extension_class"],
-            "this Godot has no function classdb_register_extension_class",
+            "this Godot lacks function classdb_register_extension_class",
         ),
-        (["--without", "print_error"], "this Godot has no function print_error"),
-        (["--without", "resize"], "this Godot has no resize of type 28"),
+        (["--without", "print_error"], "this Godot lacks function print_error"),
+        (["--without", "resize"], "this Godot lacks resize of type 28"),
         (["--double"], "this Godot is built with double precision"),
         (["--old"], "this is Godot 4.0: use 4.1 or later"),
     ],
@@ -522,7 +522,7 @@ def test_bad_arguments_are_errors_and_no_crash(host, world):
         ("load", ["no/such/folder"], "cannot read no/such/folder/world.tsw"),
         ("load", [7], "argument 1 is not a String"),
         ("state_hash", [], "world 0 does not exist"),
-        ("mesh_info", [0], "there is no scene 0"),
+        ("mesh_info", [0], "scene 0 does not exist"),
         ("load", [str(world)], None),
         ("status", [12345], "body 12345 is not in this world"),
         ("despawn", ["rider"], "argument 1 is not a whole number"),
@@ -571,7 +571,7 @@ def test_bad_arguments_are_errors_and_no_crash(host, world):
         ("count", [True], "argument 1 is not a whole number"),
         ("restore", [b"abc"], "3 bytes are not a snapshot"),
         ("restore", [b""], "bytes is null"),
-        ("restore", ["abc"], "argument 1 is no PackedByteArray"),
+        ("restore", ["abc"], "argument 1 is not a PackedByteArray"),
         ("body", [1 << 40], "argument 1 is 1099511627776: too large"),
     ]
     for name, arguments, said in refused:
