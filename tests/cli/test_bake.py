@@ -92,7 +92,7 @@ def test_what_has_no_triangles_is_left_out_and_named(folder):
         (("scene.py:nowhere", "--out", "a.glb"), "has no function 'nowhere'"),
         (("scene.py:nothing", "--out", "a.glb"), "must return a World or an EngineAdapter, got None"),
         (("scene.py:make_world", "--out", "a.abc"), ".glb, .npz, .vat, .usdc"),
-        (("scene.py:make_world", "--out", "a.glb", "--limit", "0.001"), "the limit is 0.001 MB"),
+        (("scene.py:make_world", "--out", "a.glb", "--limit", "0.001"), "limit of 0.001 MB"),
         (("scene.py:make_world", "--out", "/proc/nowhere/a.npz"), "cannot write /proc/nowhere/a.npz"),
     ],
 )

@@ -343,11 +343,11 @@ def test_a_file_that_is_too_large_ends_its_connection_and_nothing_else(visitor, 
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("notes.txt", b"hello", "none of"),
-        ("scene.gltf", b"{}", "none of"),
-        ("broken.obj", b"v 0 0\nf 1 2 3\n", "no body"),
-        ("broken.glb", b"glTF" + bytes(40), "no body"),
-        ("broken.stl", bytes(90), "no body"),
+        ("notes.txt", b"hello", "wrong format"),
+        ("scene.gltf", b"{}", "wrong format"),
+        ("broken.obj", b"v 0 0\nf 1 2 3\n", "cannot be made into a body"),
+        ("broken.glb", b"glTF" + bytes(40), "cannot be made into a body"),
+        ("broken.stl", bytes(90), "cannot be made into a body"),
         ("empty.ply", b"", "bytes"),
     ],
 )

@@ -66,7 +66,7 @@ print(json.dumps([found, are_same, count.value, joint, levels]))
 WANTED = {
     "below": (ARGUMENT, "level is -1, and asset 1 has 3: give 0 to 2"),
     "beyond": (ARGUMENT, "level is 3, and asset 1 has 3: give 0 to 2"),
-    "joined": (STATE, "has joints that name its vertices"),
+    "joined": (STATE, "has joints on its vertices"),
     "joined from the other side": (STATE, "release = 1"),
     "positions": (-6, "give room for 162"),
     "mesh": (STATE, "mesh 1 is for level 0, the body is at level 1"),

@@ -90,7 +90,7 @@ def test_one_bit_of_an_input_is_noticed_by_both_at_the_next_hash(sample, arena):
     [
         (["--ticks", "0"], "--ticks is 0: give 1 or more"),
         (["--ticks", "50", "--cheat", "50"], "--cheat is 50: give a tick from 0 to 49"),
-        (["--world", "nowhere"], "--world is nowhere: give a folder that taichi-soft export --for web wrote"),
+        (["--world", "nowhere"], "--world is nowhere: give a folder from taichi-soft export --for web"),
         (["--world", "."], "the game was not played to its end, for the reason above: node did not begin"),
     ],
 )
@@ -222,7 +222,7 @@ def test_a_message_that_is_not_of_this_session_is_refused_by_name_and_changes_no
         datagram(f"{int(start, 16) ^ 1:016x}", 0, THEIRS[:2]): f"initial state is .*{start}",
         datagram(start, 0, THEIRS[:2], ticks=5): r"are \(2, 3, 5, 2\) there and \(2, 3, 4, 2\) here",
         datagram(start, 0, THEIRS[:2], players=3): r"are \(3, 3, 4, 2\) there",
-        datagram(start, 0, THEIRS[:2], player=0): "player 0 is no other player",
+        datagram(start, 0, THEIRS[:2], player=0): "player 0 is not another player",
         datagram(start, 3, THEIRS[3:5]): "no input before tick 3, and that of 2 is missing",
         datagram(start, 0, [THEIRS[0], OWN[0]]): "sends another input for tick 1 than before",
         datagram(start, 0, THEIRS[:2], heard=4): "acknowledges an input that was not sent",

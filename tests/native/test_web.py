@@ -214,7 +214,7 @@ def test_mistakes_of_a_game_are_refused_and_nothing_leaks(node, export, tmp_path
     assert found.pop("dropped") == 6
     assert found.pop("confirmed") == [20, 20]
     assert [found.pop(name) for name in ("untouched", "rewound", "named")] == [True] * 3
-    wanted = {"body": 5, "asset": 5, "mesh": 5, "frame": 1, "collider": 0, "joint": 0, "motor": 0}
+    wanted = {"body": 5, "asset": 5, "mesh": 5, "frame": 1, "collider": 1, "joint": 0, "motor": 0}
     assert found.pop("counted") == wanted
     wanted = {
         **dict.fromkeys(["a freed mesh", "a destroyed world", "an unloaded scene"], "HANDLE"),
