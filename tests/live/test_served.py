@@ -372,7 +372,7 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.say("upload", name="../../etc/my crate.obj")
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
-    assert any("mycrate falls in" in words for words in visitor.said)
+    assert any("mycrate was added" in words for words in visitor.said)
     visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
     visitor.say("spawn", name="mycrate")
     visitor.until(lambda: visitor.states[0]["bodies"] == 8)

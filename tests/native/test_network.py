@@ -91,7 +91,7 @@ def test_one_bit_of_an_input_is_noticed_by_both_at_the_next_hash(sample, arena):
         (["--ticks", "0"], "--ticks is 0: give 1 or more"),
         (["--ticks", "50", "--cheat", "50"], "--cheat is 50: give a tick from 0 to 49"),
         (["--world", "nowhere"], "--world is nowhere: give a folder from taichi-soft export --for web"),
-        (["--world", "."], "the game was not played to its end, for the reason above: node did not begin"),
+        (["--world", "."], "the game stopped early, for the reason above: node did not start"),
     ],
 )
 def test_a_game_that_cannot_begin_ends_at_once_with_the_reason(options, reason, tmp_path):
