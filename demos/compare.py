@@ -19,7 +19,7 @@ SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_
 HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 3
-COLORS = (*PALETTE, (0.93, 0.92, 0.88), (0.58, 0.16, 0.24), (0.70, 0.85, 0.30))
+COLORS = (*PALETTE, (0.93, 0.92, 0.88), (0.58, 0.16, 0.24), (0.70, 0.85, 0.30), (0.45, 0.75, 0.72))
 NO_BODY = (0.09, 0.10, 0.13)  # colour of a line of the legend without a sphere
 PITCH, DEPTH = 2.8, 3.2  # distance between spheres, across and along the view [m]
 

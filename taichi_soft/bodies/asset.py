@@ -25,6 +25,15 @@ from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.cages import tetrahedra_of
 from taichi_soft.cages.hull import as_hull
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
+from taichi_soft.core.conflicts import (
+    ANISOTROPIC_FAILURE,
+    EDGE_LAW_CAGE,
+    EDGE_LAW_CUTS,
+    EDGE_LAW_FLOW,
+    HULL_CUTS,
+    HULL_ITSELF,
+    NO_TETRAHEDRA,
+)
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.math.rotations import turned
@@ -124,22 +133,16 @@ class SoftBodyAsset:
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
         as_count(self.spare_vertices, "spare_vertices", 0)
         if self.spare_vertices and model.has_bonds:
-            raise OptionError(
-                f"law {self.law!r} cannot be cut, because it acts along edges: use one on tetrahedra, "
-                "such as 'virial'"
-            )
+            raise OptionError(EDGE_LAW_CUTS.message(f"law {self.law!r}"))
         if self.tearing is not None:
             self._require_tears(model)
         if self.plasticity is not None:
             self._require_flow(model)
         surfaces = () if isinstance(self.skin, tuple) and not self.skin else read_surfaces(self.skin)
         if surfaces and not isinstance(self.mesh, TetMesh):
-            raise MeshError(f"a skin needs tetrahedra, but {self.mesh!r} has none")
+            raise MeshError(NO_TETRAHEDRA.message(repr(self.mesh), "skins"))
         if model.has_bonds and isinstance(self.mesh, CageMesh):
-            raise OptionError(
-                f"law {self.law!r} is not possible with a cage, because it acts along edges: use one on "
-                "tetrahedra, such as 'virial'"
-            )
+            raise OptionError(EDGE_LAW_CAGE.message(f"law {self.law!r}"))
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
@@ -247,11 +250,11 @@ class SoftBodyAsset:
 
     def _require_hull(self) -> None:
         if not isinstance(self.mesh, TetMesh):
-            raise MeshError(f"a hull needs tetrahedra, but {self.mesh!r} has none")
+            raise MeshError(NO_TETRAHEDRA.message(repr(self.mesh), "hulls"))
         if self.spare_vertices:
-            raise OptionError("a hull cannot follow a cut: leave out hull, or spare_vertices and tearing")
+            raise OptionError(HULL_CUTS.message())
         if self.contact.itself:
-            raise OptionError("a hull is not possible with self-contact: leave out hull or contact.itself")
+            raise OptionError(HULL_ITSELF.message())
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
@@ -259,18 +262,15 @@ class SoftBodyAsset:
         if self.spare_vertices == 0:
             raise OptionError("tearing needs spare_vertices: a tear copies vertices")
         if model.is_anisotropic:
-            raise MaterialError("an AnisotropicMaterial cannot tear: its strength would depend on direction")
+            raise MaterialError(ANISOTROPIC_FAILURE.message(feature="tearing"))
 
     def _require_flow(self, model: ElementModel) -> None:
         if not isinstance(self.plasticity, Plasticity):
             raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
         if model.has_bonds:
-            raise OptionError(
-                f"law {self.law!r} has no plasticity, because it acts along edges: use one on tetrahedra, "
-                "such as 'virial'"
-            )
+            raise OptionError(EDGE_LAW_FLOW.message(f"law {self.law!r}"))
         if model.is_anisotropic:
-            raise MaterialError("an AnisotropicMaterial has no plasticity: it does not yield by von Mises")
+            raise MaterialError(ANISOTROPIC_FAILURE.message(feature="plasticity"))
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
 from taichi_soft.core.checks import as_indices
+from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.types import Schedule
 
@@ -67,4 +68,4 @@ def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
 def require_per_body(context: Context, what: str) -> None:
     """Raise a StateError if the schedule does not support `what`."""
     if context.settings.schedule is Schedule.FLAT:
-        raise StateError(f"schedule 'flat' does not support {what}: make the world with schedule='per_body'")
+        raise StateError(FLAT.message(feature=what))

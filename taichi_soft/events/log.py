@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
@@ -65,10 +66,7 @@ class EventLog:
                 f"kind must be a class of events, for example ContactBegan or Event, got {kind!r}"
             )
         if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
-            raise StateError(
-                f"{kind.__name__} needs contact, which schedule 'flat' does not support: make the "
-                "world with schedule='per_body'"
-            )
+            raise StateError(FLAT.message(feature=kind.__name__))
         return kinds
 
     def _record(self, kinds: frozenset[type[Event]]) -> None:

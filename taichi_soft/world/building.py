@@ -19,6 +19,7 @@ from taichi_soft.contact.shapes import PlaneShape
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
+from taichi_soft.core.conflicts import FLAT, FLAT_SOLVES, ONLY_FLAT, SOLVED_HULLS
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
@@ -125,10 +126,9 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     settings, contact = context.settings, context.contact
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
-    name = integrator.name.value
     if integrator.only_flat:
         if asked is Schedule.PER_BODY:
-            raise OptionError(f"integrator {name!r} has no colliders: use schedule 'flat' or 'auto'")
+            raise OptionError(ONLY_FLAT.message())
         asked = Schedule.FLAT
     for feature, is_asked in {
         "bodies that are cut or have levels of detail": any(
@@ -138,20 +138,14 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
         "colliders": len(context.colliders.handles) + contact.collider_room > 0,
         "soft contact": contact.soft,
         "sleep": contact.sleep_speed > 0.0,
-        "implicit Euler": integrator.takes_solves,
+        FLAT_SOLVES.features: integrator.takes_solves,
     }.items():
         if is_asked and asked is Schedule.FLAT:
-            raise OptionError(
-                f"schedule 'flat' does not support {feature}: use 'per_body' or 'auto', and another "
-                "integrator than 'explicit_euler'"
-            )
+            raise OptionError(FLAT.message(feature=feature))
         if is_asked:
             asked = Schedule.PER_BODY
     if not integrator.has_hulls and _has_hulls(context):
-        raise OptionError(
-            f"integrator {name!r} does not support hulls, because its solves hold vertices: use 'leapfrog', "
-            "or assets without hull"
-        )
+        raise OptionError(SOLVED_HULLS.message())
     return choose_schedule(asked, context.layout, device)
 
 

@@ -15,6 +15,7 @@ from taichi_soft.control.change import require_per_body
 from taichi_soft.control.drives import ForceField, apply_force_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
+from taichi_soft.core.conflicts import FLAT_SOLVES
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
 from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
@@ -121,7 +122,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         )
         model = INTEGRATORS[settings.integrator]
         if model.takes_solves and settings.schedule is Schedule.FLAT:
-            raise OptionError("schedule 'flat' does not support implicit_euler: use 'per_body' or 'auto'")
+            raise OptionError(FLAT_SOLVES.message())
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
         touching = ContactSettings(

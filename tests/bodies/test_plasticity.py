@@ -235,10 +235,10 @@ def test_bad_numbers_are_refused(options, message):
 
 def test_bodies_that_cannot_flow_are_refused():
     clay = Plasticity(yield_strain=0.1)
-    with pytest.raises(OptionError, match=r"law 'springs' has no plasticity.*'virial'"):
+    with pytest.raises(OptionError, match=r"law 'springs' .* plasticity.*'virial'"):
         SoftBodyAsset(MESH, CLAY, law="springs", plasticity=clay)
     with pytest.raises(OptionError, match="must be a Plasticity or None"):
         SoftBodyAsset(MESH, CLAY, plasticity=0.1)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
-    with pytest.raises(MaterialError, match="AnisotropicMaterial has no plasticity"):
+    with pytest.raises(MaterialError, match=r"AnisotropicMaterial .* plasticity"):
         SoftBodyAsset(MESH, wood, plasticity=clay)

@@ -328,5 +328,5 @@ def test_the_same_bits_for_one_and_two_threads(tmp_path):
 def test_explicit_euler_still_takes_no_colliders():
     world = World(integrator="explicit_euler", collider_room=1)
     world.add_body(CUBE, JELLY, position=(0, 0, 1))
-    with pytest.raises(OptionError, match="'explicit_euler' has no colliders"):
+    with pytest.raises(OptionError, match=r"colliders, .*'explicit_euler'"):
         world.build()

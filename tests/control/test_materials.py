@@ -172,7 +172,7 @@ def test_the_number_of_substeps_follows_at_once():
             Material(1e5, 0.2, 1000.0, damping_ratio=0.0),
             "has a SpringMaterial, and its type cannot change",
         ),
-        ("virial", AnisotropicMaterial(WOOD, 1000.0, damping_ratio=0.0), "stays so"),
+        ("virial", AnisotropicMaterial(WOOD, 1000.0, damping_ratio=0.0), "cannot change"),
         ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0, damping_ratio=0.0), "7 values for a mesh of 40"),
         (
             "virial",

@@ -36,7 +36,7 @@ def test_device_schedule_substeps_and_compile_times_are_logged():
     lines = [line.split(":", 2) for line in log.splitlines() if ":taichi_soft" in line]
     said = {level: [text for each, _, text in lines if each == level] for level in ("INFO", "DEBUG")}
     assert any("Taichi runs on cpu with 1 threads" in text for text in said["INFO"])
-    assert any("schedule per_body, leapfrog, without contact" in text for text in said["INFO"])
+    assert any("schedule per_body, leapfrog, with contact" in text for text in said["INFO"])
     assert any("a step of 0.0166667 s is made in" in text for text in said["INFO"])
     assert any(text.startswith("kernel step_islands took ") for text in said["DEBUG"])
     names = [text.split()[1] for text in said["DEBUG"]]

@@ -281,5 +281,5 @@ def test_bad_options_are_refused():
     with pytest.raises(OptionError, match="needs spare_vertices"):
         asset(spare_vertices=0)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
-    with pytest.raises(MaterialError, match="AnisotropicMaterial cannot tear"):
+    with pytest.raises(MaterialError, match="AnisotropicMaterial does not support tearing"):
         SoftBodyAsset(BAR, wood, spare_vertices=5, tearing=Tearing(1.0))

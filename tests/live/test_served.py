@@ -343,11 +343,11 @@ def test_a_file_that_is_too_large_ends_its_connection_and_nothing_else(visitor, 
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("notes.txt", b"hello", "none of"),
-        ("scene.gltf", b"{}", "none of"),
-        ("broken.obj", b"v 0 0\nf 1 2 3\n", "no body"),
-        ("broken.glb", b"glTF" + bytes(40), "no body"),
-        ("broken.stl", bytes(90), "no body"),
+        ("notes.txt", b"hello", "wrong format"),
+        ("scene.gltf", b"{}", "wrong format"),
+        ("broken.obj", b"v 0 0\nf 1 2 3\n", "cannot be made into a body"),
+        ("broken.glb", b"glTF" + bytes(40), "cannot be made into a body"),
+        ("broken.stl", bytes(90), "cannot be made into a body"),
         ("empty.ply", b"", "bytes"),
     ],
 )
@@ -372,7 +372,7 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.say("upload", name="../../etc/my crate.obj")
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
-    assert any("mycrate falls in" in words for words in visitor.said)
+    assert any("mycrate was added" in words for words in visitor.said)
     visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
     visitor.say("spawn", name="mycrate")
     visitor.until(lambda: visitor.states[0]["bodies"] == 8)

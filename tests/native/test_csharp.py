@@ -142,7 +142,7 @@ def test_names_are_found_in_a_folder_with_a_name_beyond_ascii(export, checks, ru
     folder.symlink_to(export("free"))
     found = run(checks, folder, "names")
     assert "Frame 0 frame0" in found
-    assert len(found) == 5 + 5 + 1 + 5  # bodies, assets, a frame, meshes
+    assert len(found) == 5 + 5 + 1 + 5 + 1  # bodies, assets, a frame, meshes, the floor
 
 
 @pytest.fixture

@@ -39,15 +39,15 @@ def test_a_gpu_takes_the_flat_schedule(make_world):
 
 
 def test_one_launch_per_substep_makes_the_same_motion(make_world):
-    """To the rounding of sums in another order, over 30 steps through the first contact."""
+    """To the rounding of sums in another order, and the difference of the floors, at the first contact."""
     usual, gpu = make_world("per_body"), as_on_gpu(make_world("flat"))
     for _ in range(30):
         usual.step(1 / 100, 6)
         gpu.step(1 / 100, 6)
     for one, other in zip(usual.bodies, gpu.bodies, strict=True):
         assert one.positions()[:, 2].min() < 0.01
-        np.testing.assert_allclose(one.positions(), other.positions(), atol=2e-4)
-        np.testing.assert_allclose(one.velocities(), other.velocities(), atol=2e-2)
+        np.testing.assert_allclose(one.positions(), other.positions(), atol=1e-3)
+        np.testing.assert_allclose(one.velocities(), other.velocities(), atol=5e-2)
 
 
 @pytest.mark.filterwarnings("ignore::taichi_soft.UnstableStepWarning")

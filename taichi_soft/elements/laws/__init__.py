@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 
 from taichi_soft.core.checks import choose_one_of
+from taichi_soft.core.conflicts import ANISOTROPIC_LAW, NO_TETRAHEDRA
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.types import (
     ChoiceT,
@@ -198,10 +199,7 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
             raise MaterialError("a SpringMaterial has no density: convert the mesh to a ParticleMesh first")
         return model
     if not isinstance(mesh, TetMesh):
-        raise MeshError(
-            f"law {law.name!r} needs tetrahedra: pass a TetMesh, or law='springs' and a SpringMaterial for a "
-            "ParticleMesh"
-        )
+        raise MeshError(NO_TETRAHEDRA.message(feature=f"law {law.name!r} of a {type(material).__name__}"))
     if isinstance(material, SpringMaterial):
         raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")
     if isinstance(material, AnisotropicMaterial):
@@ -217,10 +215,7 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
 
 def _fit_anisotropic(model: ElementModel, tet_count: int, material: AnisotropicMaterial) -> ElementModel:
     if not model.law.takes_anisotropy:
-        supported = ", ".join(repr(law.name) for law in LAWS.values() if law.takes_anisotropy)
-        raise MaterialError(
-            f"law {model.law.name!r} does not support an AnisotropicMaterial: use {supported}"
-        )
+        raise MaterialError(ANISOTROPIC_LAW.message(feature=f"law {model.law.name!r}"))
     material.require_count(tet_count)
     return replace(model, is_anisotropic=True)
 

@@ -232,9 +232,9 @@ class TestGivenSprings:
         x = self.MESH.vertices
         with pytest.raises(MaterialError, match="stiffness has 3 values for a mesh of 2 edges"):
             internal_forces(self.MESH, SpringMaterial([1.0, 2, 3]), x, law="springs")
-        with pytest.raises(MeshError, match="law 'virial' needs tetrahedra: pass a TetMesh"):
+        with pytest.raises(MeshError, match=r"does not support law 'virial' .* TetMesh"):
             internal_forces(self.MESH, springs, x)
-        with pytest.raises(MeshError, match=r"law 'springs' needs tetrahedra.*SpringMaterial"):
+        with pytest.raises(MeshError, match=r"does not support law 'springs' of a Material.*SpringMaterial"):
             internal_forces(self.MESH, Material(1e6, 0.3, 1000.0), x, law="springs")
         with pytest.raises(MaterialError, match="law 'cmpm' needs a Material, got SpringMaterial"):
             internal_forces(solid, springs, solid.vertices, law="cmpm")

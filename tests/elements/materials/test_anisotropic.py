@@ -154,9 +154,7 @@ def test_constants_for_another_mesh_are_refused(material, message):
 @pytest.mark.parametrize("law", ["neo_hookean", "springs", "volume_springs", "cmpm2"])
 def test_laws_that_know_no_direction_refuse_it_and_name_those_that_do(law):
     world = World()
-    message = (
-        f"law '{law}' does not support an AnisotropicMaterial: use 'virial', 'face', 'st_venant_kirchhoff'"
-    )
+    message = f"does not support law '{law}', .*'virial', 'face' or 'st_venant_kirchhoff'"
     with pytest.raises(MaterialError, match=message):
         world.add_body(CUBE, AnisotropicMaterial(WOOD, 500.0), law=law)
     assert world.bodies == ()
@@ -164,7 +162,7 @@ def test_laws_that_know_no_direction_refuse_it_and_name_those_that_do(law):
 
 def test_particles_have_no_frames():
     rope = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
-    with pytest.raises(MeshError, match="needs tetrahedra"):
+    with pytest.raises(MeshError, match="no tetrahedra"):
         internal_forces(rope, AnisotropicMaterial(WOOD, 500.0), rope.vertices, law="springs")
 
 
