@@ -15,7 +15,7 @@ def save_particle(state: ti.template(), p):
 
 @ti.func
 def highest_speed(state: ti.template(), body):
-    """Of the particles of a body [m/s]."""
+    """Highest speed of a body's particles [m/s]."""
     particles, speed2 = state.body_particles[body], ti.Vector.zero(state.real, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS

@@ -154,9 +154,9 @@ def forget_contacts(state: ti.template(), body: ti.i32):
 
 @ti.func
 def collide_particle(state: ti.template(), body, p, h, since):
-    """Let a particle that its velocity has moved in a substep collide on that way.
+    """Collide a particle on the way that its velocity has moved it in a substep.
 
-    One that touches nothing stays where it is: the result does not depend on what else is looked at.
+    A particle that touches nothing is not written: the result does not depend on which colliders are listed.
     Args:
         h: substep [s].
         since: time from the start of the fixed step to that of the substep [s].

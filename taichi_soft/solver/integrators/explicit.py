@@ -1,4 +1,4 @@
-"""What the integrators have in common that take the forces of the old positions."""
+"""Functions of the integrators that use the forces of the old positions."""
 
 from taichi_soft.control.kernels.drives import add_reactions
 from taichi_soft.control.kernels.grabs import pull_grabs
@@ -8,13 +8,13 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 
 @ti.func
 def whole_substep(lag, h, s):
-    """Forces act for a whole substep."""
+    """Forces act for the whole substep [s]."""
     return h
 
 
 @ti.func
 def before_each(h, s, substeps):
-    """Drives act before each substep, for a whole one [s]."""
+    """Drives act for the whole substep, before it [s]."""
     return ti.select(s < substeps, h, 0.0)
 
 
@@ -28,5 +28,5 @@ def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def any_shape(state: ti.template(), body, h, is_last):
-    """Changes of velocity are what is checked."""
+    """Every shape is accepted: `kick_by_forces` checks changes of velocity instead."""
     return 1

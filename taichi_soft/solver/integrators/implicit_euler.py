@@ -15,7 +15,7 @@ from taichi_soft.solver.kernels.implicit_kick import kick_implicitly
 
 @ti.func
 def felt_time(lag, h, s):
-    """Forces of the old positions do not act."""
+    """Forces of the old positions do not act [s]."""
     return 0.0 * h
 
 
@@ -33,7 +33,7 @@ def predict(state: ti.template(), program: ti.template(), body, job, felt):
 
 @ti.func
 def check(state: ti.template(), body, h, is_last):
-    """What changes too much in the last attempt loses speed: it would be thrown apart."""
+    """Check the shape. In the last attempt, slow a body down whose shape changed too much."""
     if is_last == 1:
         slow_down(state, body, h)
     return int(keeps_shape(state, body))

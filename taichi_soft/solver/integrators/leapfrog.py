@@ -21,13 +21,13 @@ def advance(x, v, a, h, kick):
 
 @ti.func
 def felt_time(lag, h, s):
-    """The first kick of a step ends the lag."""
+    """The first kick of a step includes the lag of the velocities [s]."""
     return 0.5 * (lag + h) if s == 0 else h
 
 
 @ti.func
 def drive_time(h, s, substeps):
-    """Half of the first comes after the last."""
+    """Drives act for half a substep before the first substep and after the last one [s]."""
     return 0.5 * h if s == 0 or s == substeps else h
 
 

@@ -14,17 +14,16 @@ from taichi_soft.solver.step_fields import Job
 
 @ti.func
 def look_for_colliders(state: ti.template(), body, speed, since, left):
-    """List the colliders that a body may meet at a speed [m/s] in what is left of the step, and a quarter
-    beyond."""
+    """List the colliders that a body can reach at 1.25 times a speed [m/s] in the rest of the step."""
     place_points(state, body)
     find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
 
 
 @ti.func
 def can_drift_at_once(state: ti.template(), body, way):
-    """Whether a body alone can go its next `way` [m] before it collides (1): near colliders are known.
+    """1 if a body alone can move its next `way` [m] first and collide afterwards.
 
-    Points of hulls that are near a collider change the velocities of particles before they move.
+    The colliders near it must be known. Points of a hull near a collider change velocities before the move.
     """
     is_known = int(state.contact.gone[body] + way <= state.contact.reach[body])
     if ti.static(state.capacity.contact.hull):
@@ -54,10 +53,10 @@ def _move_block(state: ti.template(), first, count, h):
 
 @ti.func
 def _collide_body(state: ti.template(), body, h, since, gone):
-    """Let the particles of a body that have moved by their velocities collide on that way.
+    """Collide the particles of a body on the way that they have just moved.
 
     Args:
-        gone: way since near colliders were listed, this one included [m].
+        gone: way since near colliders were listed, including this one [m].
     """
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
@@ -76,10 +75,10 @@ def _collide_body(state: ti.template(), body, h, since, gone):
 
 @ti.real_func
 def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone: ti.f32):
-    """Let a body collide that has moved by its velocities, and note how fast it is then.
+    """Collide a body that has moved by its velocities, and report its speed to sleep.
 
     Args:
-        gone: way since near colliders were listed, this one included [m].
+        gone: way since near colliders were listed, including this one [m].
     """
     state.contact.gone[body] = gone
     if state.contact.near_count[body] > 0:
@@ -114,7 +113,10 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
 
 @ti.func
 def has_drifted(state: ti.template(), body, speed, h, since):
-    """Collide a body alone that the kick has moved; put it back if near colliders are not known (0)."""
+    """Collide a body alone that the kick has moved. Undo the move if near colliders are not known.
+
+    Returns: 1 if the body has moved.
+    """
     is_known = can_drift_at_once(state, body, speed * h)
     if is_known == 1:
         end_drift(state, body, h, since, state.contact.gone[body] + speed * h)

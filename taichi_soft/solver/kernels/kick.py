@@ -59,10 +59,9 @@ def _put_last_block(state: ti.template(), first, count, positions: ti.template()
 
 @ti.func
 def _note_block(state: ti.template(), first, count, common, velocities: ti.template()):
-    """Write the speed beside the `common` velocity of up to `LANES` particles from `first` on, for the search
-    for contacts, before the kick's new velocities are written.
+    """Write the speeds of up to `LANES` particles relative to the `common` velocity, for contacts.
 
-    Returns: the square of that with which each may strike another.
+    Called before new velocities are written. Returns: the squares of possible impact speeds.
     """
     speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -85,8 +84,9 @@ def _note_block(state: ti.template(), first, count, common, velocities: ti.templ
 
 @ti.func
 def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, job):
-    """New velocities of up to `LANES` particles from `first` on, and positions after the job's `drift_time`
-    with them. Forces are cleared. The rows behind are computed too, and count nothing.
+    """Compute new velocities of up to `LANES` particles from `first` on, and positions after `drift_time`.
+
+    Forces are cleared. Rows beyond the last particle are computed too, and ignored.
 
     Returns: of each the square of its speed, of that with which it may strike another, and of its
     acceleration, which counts less where something held it.
@@ -123,8 +123,7 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
 @ti.func
 def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
-    """New velocities after `kick` [s] of the forces, which are cleared, and positions after the job's
-    `drift_time`.
+    """Compute velocities after `kick` [s] of the forces, and positions after the job's `drift_time`.
 
     Returns: the highest speed [m/s]; the highest and the mean with which it may strike another, if it has
     pairs; and whether forces changed no velocity by too much at once (1).
@@ -162,10 +161,9 @@ def _note_speeds(
 
 @ti.real_func
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
-    """New velocities of one body that has felt its forces for so long [s].
+    """Compute new velocities of one body, on which forces act for `felt` [s], and write its speeds.
 
-    Notes the highest speed [m/s], the highest and the mean beside the job's `velocity`, and what it returns.
-    Returns: whether forces changed no velocity by too much at once (1).
+    Returns: 1 if forces changed no velocity by too much at once.
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):

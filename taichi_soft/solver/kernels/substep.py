@@ -9,7 +9,7 @@
     each body by itself     drift: new positions
 
 Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
-of them. A body alone drifts in its kick, in one pass over its particles, and collides after it.
+of them. A body alone drifts in the same pass as its kick, and collides afterwards.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -165,7 +165,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
-    """Whether nothing but colliders can touch what is in an island, and its kick can move it (1)."""
+    """1 if an island is one body that only colliders can touch, and its kick can move it."""
     body = state.contact.island_body[state.contact.island_first[island]]
     bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
@@ -198,7 +198,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """Whether the bodies of an island are at new positions already (1): one alone that the kick moved."""
+    """1 if the bodies of an island are at their new positions: a body alone that its kick has moved."""
     has_moved = 0
     body = state.contact.island_body[state.contact.island_first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
@@ -243,7 +243,7 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 
 @ti.func
 def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Whether the integrator takes the new shape of every body."""
+    """Note if the integrator rejects the new shape of a body."""
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
