@@ -14,7 +14,7 @@ from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
-from taichi_soft.contact.fields import NO_COLLIDER, ContactCapacity, ContactFields
+from taichi_soft.contact.fields import MOST_IMPULSE, NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
     forget_collider,
@@ -33,9 +33,6 @@ Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
 """Of all grids that come after `World.build`: 400 MB."""
-
-MOST_IMPULSE = 1e30
-"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
 
 
 def ignore(lower: Floats, upper: Floats) -> None:
@@ -257,12 +254,6 @@ class Colliders(Slice):
         """Number of handle, what each row is and how it moves. A shape without a grid is there in full."""
         return [entry_of(handle) for handle in self._handles]
 
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Of particles, of bodies, of pairs of a body and a collider."""
-        bodies = len(self.context.slots.slots)
-        assert self._contact is not None
-        return [self.context.layout.particle_count, bodies, bodies * self._contact.capacity.colliders]
-
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, ColliderRow]]:
@@ -276,19 +267,13 @@ class Colliders(Slice):
         return [(int(entry[0]), read_row(entry, self.shapes, room.samples)) for entry in entries]
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where an impulse that contact goes on with is not finite."""
-        impulses: list[Any] = []
-        if self._contact is not None and self._contact.capacity.soft:
-            soft = self.context.built.state.soft
-            impulses += [soft.kept_normal_impulse, soft.kept_friction_impulse]
-        rows = [rows_of(field) for field in impulses]
+        """Raises: ValueError if an impulse on a point that something holds is not finite."""
         if self._contact is not None and self._contact.capacity.hull:
             hull = self.context.built.state.hull
-            is_held = rows_of(hull.held_by).max(axis=1) > 0  # what lies in the other rows is never read
-            rows += [rows_of(field)[is_held] for field in hull.held_impulses]
-        for row in rows:
-            if not np.abs(row).max(initial=0.0) <= MOST_IMPULSE:
-                raise ValueError("particles are out of reach, or not finite")
+            is_held = rows_of(hull.held_by).max(axis=1) > 0
+            for field in hull.held_impulses:
+                if not np.abs(rows_of(field)[is_held]).max(initial=0.0) <= MOST_IMPULSE:
+                    raise ValueError("impulses on hulls are too large, or not finite")
 
     def restore(self, read: Any) -> None:
         """Let there be the colliders that were `read`, and no other."""

@@ -1,6 +1,7 @@
 """Fields of the step: how far each island has come in it, and what threads have to know of each other."""
 
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.field_table import BODY, WORLD, FieldGroup, declare
+from taichi_soft.core.runtime import ti
 
 MOST_PARTS = 16
 """Parts of an island's bodies: threads beyond these share theirs."""
@@ -52,15 +53,13 @@ class Job:
     shift: ti.math.vec3
 
 
-@holds_fields
-class JobFields:
+class JobFields(FieldGroup):
     """What threads share islands by: see `kernels/jobs.py`."""
 
-    def __init__(self, bodies: int) -> None:
-        """Allocate; contents are zero."""
-        self.job = Job.field(shape=bodies)  # type: ignore[attr-defined]  # of each island, what is called for
-        self.unfinished_islands = ti.field(ti.i32, ())  # of several bodies
-        self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
-        self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
-        self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
-        self.unfinished = ti.field(ti.i32, bodies)  # bodies of each island whose phase is not made yet
+    when = "has_contact"
+    job = declare(BODY, Job, below={})  # of each island, what is called for
+    unfinished_islands = declare(WORLD, ti.i32)  # of several bodies
+    useful_helpers = declare(WORLD, ti.i32)  # threads beside their owners that could find a body there
+    parts = declare(WORLD, ti.i32)  # of the bodies of an island, one for each thread
+    untaken = declare(BODY, ti.i32, each=MOST_PARTS)  # bodies of each part that wait for a thread
+    unfinished = declare(BODY, ti.i32)  # bodies of each island whose phase is not done yet

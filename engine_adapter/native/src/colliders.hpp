@@ -5,13 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "constants.hpp"
 #include "archive.hpp"
 #include "rotations.hpp"
 
 namespace taichi_soft {
 
-// Kinds of shapes with a grid, after TS_PLANE to TS_CAPSULE, as in taichi_soft/contact/distances/kinds.py.
-enum { kHeightField = 4, kMeshShape = 5 };
 
 struct Pose {
   Vector position;

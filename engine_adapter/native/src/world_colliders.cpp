@@ -38,16 +38,16 @@ void World::remove_collider(int32_t number) {
 }
 
 void World::write_colliders() {
-  collider_count_(0) = int32_t(colliders_.rows.size());
+  fields_.contact.collider_count(0) = int32_t(colliders_.rows.size());
   for (size_t c = 0; c < colliders_.rows.size(); ++c) {
     const Collider& row = colliders_.rows[c];
-    collider_kind_(c) = row.is_alive ? row.kind : -1;
-    for (int k = 0; k < 8; ++k) collider_parameters_(c, k) = row.parameters[k];
-    collider_surface_(c, 0) = as_float(row.friction);
-    collider_surface_(c, 1) = as_float(row.restitution);
-    collider_surface_(c, 2) = as_float(row.skin);
-    collider_filter_(c, 0) = row.group;
-    collider_filter_(c, 1) = row.mask;
+    fields_.contact.collider_kind(c) = row.is_alive ? row.kind : -1;
+    for (int k = 0; k < 8; ++k) fields_.contact.collider_parameters(c, k) = row.parameters[k];
+    fields_.contact.collider_surface(c, 0) = as_float(row.friction);
+    fields_.contact.collider_surface(c, 1) = as_float(row.restitution);
+    fields_.contact.collider_surface(c, 2) = as_float(row.skin);
+    fields_.contact.collider_filter(c, 0) = row.group;
+    fields_.contact.collider_filter(c, 1) = row.mask;
   }
 }
 
