@@ -18,7 +18,7 @@ Measured with `taichi-soft profile --crossover`: with both cores free, two threa
 off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
 300 times slower than on one thread, and only the largest still won."""
 
-STRETCH = 2_000_000
+MAX_CALL_WORK = 2_000_000
 """Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, several times as
 much where bodies touch, and up to 23 times where a step is made again. While a kernel runs, Python hears no
 Ctrl-C. A longer step takes a snapshot first: some 5 % of its time, and it is no step of a game."""
@@ -47,10 +47,10 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
     return Schedule.FLAT
 
 
-def most_substeps(scene: Scene, integrator: IntegratorModel) -> int:
+def substeps_per_call(scene: Scene, integrator: IntegratorModel) -> int:
     """How many substeps a step of a world may have that one call of a kernel makes."""
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
-    return max(1, STRETCH // max(1, integrator.work * sum(sizes)))
+    return max(1, MAX_CALL_WORK // max(1, integrator.work * sum(sizes)))
 
 
 def make_launch(
@@ -64,7 +64,7 @@ def make_launch(
     blocks, edges = scene.block_count, scene.edge_count
 
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
-    stretch = most_substeps(scene, program.integrator)
+    stretch = substeps_per_call(scene, program.integrator)
 
     def by_islands(substeps: int, h: float) -> int:
         most = stretch if substeps > stretch else ALL

@@ -35,7 +35,7 @@ from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bod
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
-from taichi_soft.solver.kernels.untangling import REPORTED
+from taichi_soft.solver.kernels.untangling import REPORTED_AFTER
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch
@@ -89,7 +89,7 @@ class Simulation:
             self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
         if colliders is not None:
             colliders.finish(seconds)
-        reports = self._note_failures(substeps, h) if self.troubled else []
+        reports = self._record_failures(substeps, h) if self.troubled else []
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
@@ -112,7 +112,7 @@ class Simulation:
         self.state.body_status.to_numpy()  # as where a body fails
         self.state.body_patience.to_numpy()  # as where a body stays inside out
 
-    def _note_failures(self, substeps: int, h: float) -> list[str]:
+    def _record_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
         clock, reports = self.clock, []
         # What freezes a body is the last of several attempts.
@@ -129,14 +129,14 @@ class Simulation:
             self.events.record_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
-                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"
+                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._suggest_fix(body)}"
             )
         return reports
 
-    def _way_out(self, body: SoftBody) -> str:
+    def _suggest_fix(self, body: SoftBody) -> str:
         """What may help a body that the last step froze."""
         lower, upper = body.aabb()
-        way, size = self.frames.way(body), float((upper - lower).max())
+        way, size = self.frames.displacement(body), float((upper - lower).max())
         if way > size:
             return (
                 f"It is {size:.3g} m large, and its frame moved it by {way:.3g} m in this step: move frames "
@@ -149,7 +149,7 @@ class Simulation:
         patience = self.state.body_patience.to_numpy()
         for body in self.pools.occupants:
             index = body.index
-            if patience[index] < REPORTED or index in self._inverted or body.is_frozen:
+            if patience[index] < REPORTED_AFTER or index in self._inverted or body.is_frozen:
                 continue
             self._inverted.add(index)
             warnings.warn(

@@ -33,7 +33,7 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
-from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
+from taichi_soft.solver.schedules import choose_schedule, make_launch, substeps_per_call
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.state import Capacity, State
 from taichi_soft.solver.substeps import FRAME
@@ -84,7 +84,7 @@ def build(context: WorldContext) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
-        most_substeps(scene, program.integrator),
+        substeps_per_call(scene, program.integrator),
         EventLog(Observer(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )

@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import before_each
 from taichi_soft.solver.integrators.model import IntegratorModel
-from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES, keeps_shape, slow_down
+from taichi_soft.solver.kernels.implicit_euler import MAX_PIECES, keeps_shape, slow_down
 from taichi_soft.solver.kernels.implicit_kick import kick_implicitly
 
 
@@ -49,6 +49,6 @@ IMPLICIT_EULER = IntegratorModel(
     has_stable_step=False,
     has_hulls=False,  # it holds vertices
     drifts_at_once=False,
-    halvings=MOST_PIECES.bit_length() - 1,
+    halvings=MAX_PIECES.bit_length() - 1,
     work=50,  # so many products with the matrix
 )

@@ -1,25 +1,25 @@
-"""A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
+"""Attempts at a step: save and restore bodies, and decide whether an attempt was fine enough.
 
-Substeps are chosen for small deformation, and more of them for a shape that is found to be stiffer. An impact
-faster than sound flattens tetrahedra, and flat ones are stiffer. Where forces change a velocity by more than
-`JOLT` at once an attempt ends, or where it comes out non-finite. The island is put back, and makes the step
-again with twice as many substeps, and so on. The last attempt brakes vibrations sharply; momentum and spin
-stay.
+The number of substeps is chosen for small deformation, and raised for shapes that are found to be stiffer. An
+impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces change a
+velocity by more than `MAX_VELOCITY_CHANGE` at once, or if its result is not finite. The island is then
+restored and retries the step with twice as many substeps, and so on. The last attempt damps vibrations
+strongly; momentum and angular momentum are conserved.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
-from taichi_soft.contact.kernels.candidates import forget_candidates
-from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.candidates import clear_candidates
+from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull import place_points
-from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
-from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
-from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, clear_warm_start_if_free
+from taichi_soft.contact.kernels.rebound import begin_rebounds, restore_rebounds
+from taichi_soft.contact.kernels.touches import clear_touches
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
+from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 
 @ti.func
@@ -47,8 +47,8 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
                     # A forged snapshot may say anything.
-                    refinement = ti.min(state.body_refinement[body], MOST_REFINEMENT)
-                    least = ti.max(least, ti.min(at_rest * refinement, MOST_REFINEMENT * substeps))
+                    refinement = ti.min(state.body_refinement[body], MAX_REFINEMENT)
+                    least = ti.max(least, ti.min(at_rest * refinement, MAX_REFINEMENT * substeps))
                 row = row_behind(row)
     return ti.cast(ti.ceil(least), ti.i32)
 
@@ -77,8 +77,8 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
             state.prev_contact[p] = state.particle_contact[p]
     begin_rebounds(state, body)
     if ti.static(state.capacity.contact.hull):
-        forget_held_if_free(state, body)
-    forget_contacts(state, body)
+        clear_warm_start_if_free(state, body)
+    clear_contacts(state, body)
     state.contact.is_exploding[body] = 0
     if ti.static(program.has_soft_contact):
         if state.body_status[body] != ACTIVE:
@@ -92,7 +92,7 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
 
 
 @ti.func
-def _put_back_body(state: ti.template(), program: ti.template(), body):
+def _restore_body(state: ti.template(), program: ti.template(), body):
     """Put a body back to where it was before the step."""
     state.body_jolted[body] = 1
     particles = state.body_particles[body]
@@ -105,22 +105,22 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     clear_forces(state, body)
-    take_back_rebounds(state, body)
-    forget_contacts(state, body)
+    restore_rebounds(state, body)
+    clear_contacts(state, body)
     if ti.static(state.capacity.contact.hull):
-        forget_held(state, body)
+        clear_warm_start(state, body)
     if ti.static(program.has_soft_contact):
-        forget_candidates(state, body)  # for good, as the island looks for others before it goes on
+        clear_candidates(state, body)  # for good, as the island looks for others before it goes on
 
 
 @ti.real_func
-def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32):
+def restore_island(state: ti.template(), program: ti.template(), island: ti.i32):
     """Put an island back to where it was before the step."""
     first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
-        _put_back_body(state, program, state.contact.island_body[row])
+        _restore_body(state, program, state.contact.island_body[row])
     if ti.static(program.has_soft_contact):
-        forget_touches(state, island)
+        clear_touches(state, island)
 
 
 @ti.func
@@ -134,7 +134,7 @@ def brake_island(state: ti.template(), island, is_braked):
 
 
 @ti.func
-def body_is_sound(state: ti.template(), body):
+def body_is_valid(state: ti.template(), body):
     """Whether all of a body can still be computed with (1)."""
     particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
@@ -146,12 +146,12 @@ def body_is_sound(state: ti.template(), body):
 
 
 @ti.func
-def island_is_sound(state: ti.template(), island):
+def island_is_valid(state: ti.template(), island):
     """Whether all that moves in an island can still be computed with (1)."""
     sound = 1
     first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
         body = state.contact.island_body[row]
         if state.body_status[body] == ACTIVE:
-            sound = sound & body_is_sound(state, body)
+            sound = sound & body_is_valid(state, body)
     return sound

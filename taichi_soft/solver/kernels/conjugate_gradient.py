@@ -12,7 +12,7 @@ SLIDES, STICKS = 0.0, 1.0
 
 
 @ti.func
-def held(state: ti.template(), p, v):
+def constrained(state: ti.template(), p, v):
     """`v` without what a pin, or the floor or a collider under particle `p`, takes up."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
     if state.particle_contact[p] > 0:
@@ -70,10 +70,10 @@ def _correct_common_velocity(state: ti.template(), body):
     particles = state.body_particles[body]
     total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     for p in range(particles[0], particles[1]):
-        total += held(state, p, state.residual[p])
+        total += constrained(state, p, state.residual[p])
         mass += state.particle_mass[p]
     for p in range(particles[0], particles[1]):
-        state.direction[p] = held(state, p, total / mass)
+        state.direction[p] = constrained(state, p, total / mass)
     multiply(state, body, state.direction, state.image)
     gain, curvature = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
@@ -101,8 +101,8 @@ def solve_system(state: ti.template(), body, load):
     particles = state.body_particles[body]
     left = ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
-        r = held(state, p, state.residual[p])
-        d = held(state, p, state.particle_block_inverse[p] @ r)
+        r = constrained(state, p, state.residual[p])
+        d = constrained(state, p, state.particle_block_inverse[p] @ r)
         state.residual[p] = r
         state.direction[p] = d
         left += _dot(r, d)
@@ -112,7 +112,7 @@ def solve_system(state: ti.template(), body, load):
         multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
-            state.image[p] = held(state, p, state.image[p])
+            state.image[p] = constrained(state, p, state.image[p])
             curvature += _dot(state.direction[p], state.image[p])
         if curvature > 0.0:
             step = ti.cast(left / curvature, state.real)
@@ -121,7 +121,7 @@ def solve_system(state: ti.template(), body, load):
             for p in range(particles[0], particles[1]):
                 state.solution[p] = state.solution[p] + step * state.direction[p]
                 r = state.residual[p] - step * state.image[p]
-                z = held(state, p, state.particle_block_inverse[p] @ r)
+                z = constrained(state, p, state.particle_block_inverse[p] @ r)
                 state.residual[p] = r
                 state.image[p] = z
                 left += _dot(r, z)

@@ -3,17 +3,17 @@
 from taichi_soft.bodies.kernels.particles import highest_speed
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
 from taichi_soft.contact.kernels.hull import has_hull, place_points
-from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
+from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import note_motion
+from taichi_soft.solver.kernels.sleep import reset_rest_timer
 from taichi_soft.solver.step_fields import Job
 
 
 @ti.func
-def look_for_colliders(state: ti.template(), body, speed, since, left):
+def list_near_colliders(state: ti.template(), body, speed, since, left):
     """List the colliders that a body can reach at 1.25 times a speed [m/s] in the rest of the step."""
     place_points(state, body)
     find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
@@ -86,9 +86,11 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone
     place_points(state, body)
     is_noted = int(state.contact.calm[body] != 0.0)
     if ti.static(state.capacity.contact.hull):
-        is_noted = is_noted & int(not has_hull(state, body))  # whose way a step counts: `note_way_of_hulled`
+        is_noted = is_noted & int(
+            not has_hull(state, body)
+        )  # whose way a step counts: `reset_rest_timer_of_hull`
     if is_noted == 1:
-        note_motion(state, body, highest_speed(state, body))
+        reset_rest_timer(state, body, highest_speed(state, body))
 
 
 @ti.real_func
@@ -97,13 +99,13 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
     gone = state.contact.gone[body] + job.fastest * job.h
     is_new = int(not (state.contact.reach[body] >= gone))
     if is_new == 1:
-        look_for_colliders(state, body, job.fastest, job.since, job.left)
+        list_near_colliders(state, body, job.fastest, job.since, job.left)
         gone = job.fastest * job.h
     if ti.static(state.capacity.contact.hull):
         if state.contact.near_count[body] > 0:
             collide_points(state, body, job.h, job.since, gone)
         elif is_new == 1:
-            forget_held(state, body)
+            clear_warm_start(state, body)
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS

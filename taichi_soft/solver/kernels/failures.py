@@ -2,7 +2,7 @@
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
-from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
@@ -12,7 +12,7 @@ from taichi_soft.solver.step_fields import Moment
 
 
 @ti.kernel
-def find_broken_element(
+def find_failed_element(
     state: ti.template(),
     program: ti.template(),
     body: ti.i32,
@@ -52,4 +52,4 @@ def find_broken_element(
         clear_forces(state, body)
         forget_loads(state, body)
         if ti.static(program.has_contact):
-            forget_contacts(state, body)
+            clear_contacts(state, body)

@@ -26,7 +26,7 @@ from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressu
 from taichi_soft.elements.kernels.edges import edge_force_of
 from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clear_forces
-from taichi_soft.solver.kernels.kick import JOLT
+from taichi_soft.solver.kernels.kick import MAX_VELOCITY_CHANGE
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
 _FAILING, _DONE = 5, 6  # above the status of any body: the step is made again, or need not be
@@ -43,7 +43,7 @@ def _block_is_active(state: ti.template(), block):
 
 
 @ti.func
-def _remember_phase(state: ti.template(), p):
+def _save_phase(state: ti.template(), p):
     if _status_of(state, p) != ABSENT:
         save_particle(state, p)
 
@@ -118,7 +118,7 @@ def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
         x, v, a = _moved_particle(state, program, p, force, gravity, h, kick)
         state.particle_position[p] = x
         state.particle_velocity[p] = v
-        if not (kick * a.norm() <= JOLT * state.body_sound_speed[body]):
+        if not (kick * a.norm() <= MAX_VELOCITY_CHANGE * state.body_sound_speed[body]):
             state.body_jolted[body] = 1
 
 
@@ -167,7 +167,7 @@ def substep_alone(state: ti.template(), program: ti.template(), body, h, s, subs
 def _begin_phase(state: ti.template(), p, is_again):
     """Remember a particle; where its body makes the step again, it was put back."""
     if is_again == 0:
-        _remember_phase(state, p)
+        _save_phase(state, p)
 
 
 @ti.func
@@ -180,7 +180,7 @@ def _check_phase(state: ti.template(), p, is_last):
 
 
 @ti.func
-def _fall_back_phase(state: ti.template(), p):
+def _restore_phase(state: ti.template(), p):
     if _status_of(state, p) == _FAILING:
         restore_particle(state, p)
 
@@ -193,7 +193,7 @@ def _flow_phase(state: ti.template(), block, dt):
 
 
 @ti.func
-def _settle_body(state: ti.template(), body, h, is_braked, is_last):
+def _end_attempt(state: ti.template(), body, h, is_braked, is_last):
     """Returns 1 for a body that failed: it makes the step again, or is frozen after the last attempt."""
     failed = 0
     state.body_jolted[body] = 0
@@ -217,7 +217,7 @@ def _end_step(state: ti.template(), body_count):
 
 
 @ti.func
-def _meet(state: ti.template(), worker_count: ti.template()):
+def _wait_for_workers(state: ti.template(), worker_count: ti.template()):
     """Wait until all workers have come here as often as this one."""
     arrived = ti.atomic_add(state.barrier[0], 1) + 1
     target = (arrived + worker_count - 1) // worker_count * worker_count
@@ -260,29 +260,29 @@ def step_flat_cpu(
             for block in range(b0, b1):
                 _block_phase(state, program, block)
             if ti.static(program.reads_expansion):
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
             for e in range(e0, e1):
                 _edge_phase(state, program, e)
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
             is_damped = 0
             for body in range(body_count):
                 is_damped = is_damped | int(_is_damped_now(state, body, h, s, substeps))
             if is_damped == 1:
                 for p in range(p0, p1):
                     _gather_phase(state, p, h, s, substeps)
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
                 for i in range((body_count - worker + workers - 1) // workers):
                     _damp_phase(state, program, worker + i * workers, h, s, substeps)
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
             for p in range(p0, p1):
                 _move_phase(state, program, p, h, s)
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
         if last == substeps:
             for p in range(p0, p1):
                 _check_phase(state, p, int(attempt == attempts - 1))
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
             for p in range(p0, p1):
-                _fall_back_phase(state, p)
+                _restore_phase(state, p)
             if ti.static(program.has_plasticity):
                 for block in range(b0, b1):
                     _flow_phase(state, block, substeps * h)
@@ -291,7 +291,7 @@ def step_flat_cpu(
         if last == substeps:
             for body in range(body_count):
                 is_last = int(attempt == attempts - 1)
-                failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+                failed += _end_attempt(state, body, h, int(attempt == attempts - 2), is_last)
             if failed == 0 or attempt == attempts - 1:
                 _end_step(state, body_count)
     return failed
@@ -301,7 +301,7 @@ def step_flat_cpu(
 def begin_flat(state: ti.template(), particle_count: ti.i32):
     """Remember where every particle is."""
     for p in range(particle_count):
-        _remember_phase(state, p)
+        _save_phase(state, p)
 
 
 @ti.kernel
@@ -353,13 +353,13 @@ def end_flat(
     for p in range(particle_count):
         _check_phase(state, p, int(attempt == attempts - 1))
     for p in range(particle_count):
-        _fall_back_phase(state, p)
+        _restore_phase(state, p)
     if ti.static(program.has_plasticity):
         for block in range(block_count):
             _flow_phase(state, block, substeps * h)
     for body in range(body_count):
         is_last = int(attempt == attempts - 1)
-        failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+        failed += _end_attempt(state, body, h, int(attempt == attempts - 2), is_last)
     return failed
 
 

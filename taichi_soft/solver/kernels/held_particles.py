@@ -12,16 +12,16 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system, squared_load
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
-HARDEST = 1e24
+MAX_IMPULSE = 1e24
 """Impulse [N s] from which the solve of a body torn to pieces has overflowed: it counts as none."""
 
-MOST_SOLVES = 6
+MAX_SOLVES = 6
 """In one substep, to find which particles stick, slide and leave."""
 
-CLOSE = 0.003
+TOLERANCE = 0.003
 """Error of the impulses by Coulomb's law, over their sum, at which a substep is not solved again."""
 
-GIVEN_BACK = 0.1
+MAX_REVERSAL = 0.1
 """Largest relative change of a sliding velocity where friction was too strong: a larger one keeps a body from
 coming to rest."""
 
@@ -33,7 +33,7 @@ def _friction_on(state: ti.template(), p):
 
 
 @ti.func
-def hold_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
+def constrain_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
     """Hold a particle for which `particle_contact` says by what.
 
     It sticks in the first solve if it slides no faster than what gravity changes in a substep.
@@ -87,7 +87,7 @@ def _impulse_of(state: ti.template(), p):
 
 
 @ti.func
-def _judge(state: ti.template(), body):
+def _measure_errors(state: ti.template(), body):
     """Measure how far impulses are from Coulomb's law.
 
     Returns: sums over all particles [N s]: of impulses, of those that pull, of what is beyond friction where
@@ -112,7 +112,7 @@ def _judge(state: ti.template(), body):
 
 
 @ti.func
-def _correct(state: ti.template(), body, releases):
+def _update_constraints(state: ti.template(), body, releases):
     """Change what holds particles, and friction on them, after a solve.
 
     Args:
@@ -145,20 +145,20 @@ def solve_held(state: ti.template(), body, held_count, h):
     """
     load = squared_load(state, body, h)
     residual, solves = ti.cast(0.0, state.real), 0
-    while solves < MOST_SOLVES:
+    while solves < MAX_SOLVES:
         if held_count > 0:
             _begin_solve(state, body)
         residual = solve_system(state, body, load)
         multiply(state, body, state.solution, state.image)
         solves += 1
         if held_count == 0:
-            solves = MOST_SOLVES
-        elif solves < MOST_SOLVES:
-            total, pulling, beyond, wrong = _judge(state, body)
-            if pulling + beyond + wrong > CLOSE * total:
-                _correct(state, body, int(beyond <= CLOSE * total))
+            solves = MAX_SOLVES
+        elif solves < MAX_SOLVES:
+            total, pulling, beyond, wrong = _measure_errors(state, body)
+            if pulling + beyond + wrong > TOLERANCE * total:
+                _update_constraints(state, body, int(beyond <= TOLERANCE * total))
             else:
-                solves = MOST_SOLVES
+                solves = MAX_SOLVES
     return residual
 
 
@@ -171,11 +171,11 @@ def held_velocity(state: ti.template(), p):
     Returns: the velocity [m/s], the impulse along the normal [N s], and that across.
     """
     pressing, across, most, sliding = _impulse_of(state, p)
-    if not ti.abs(pressing) + across.norm() < HARDEST:
+    if not ti.abs(pressing) + across.norm() < MAX_IMPULSE:
         pressing, across = ti.cast(0.0, state.real), ti.Vector.zero(state.real, 3)
     elif state.particle_hold[p].w == SLIDES:
         momentum = state.particle_mass[p] * sliding.norm()
-        brake = ti.min(ti.max(most - across.norm(), -GIVEN_BACK * momentum), momentum)
+        brake = ti.min(ti.max(most - across.norm(), -MAX_REVERSAL * momentum), momentum)
         if across.dot(sliding) > 0.0:
             brake = momentum
         share = brake / ti.max(momentum, 1e-30)

@@ -19,7 +19,7 @@ from taichi_soft.elements.kernels.linear_system import (
 )
 from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks
 from taichi_soft.solver.kernels.held_particles import solve_held
-from taichi_soft.solver.kernels.rigid_rotation import multiply, split_off_rotation
+from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rotation
 
 FARTHEST = 0.5
 """Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
@@ -27,7 +27,7 @@ FARTHEST = 0.5
 LEAST_LENGTH = 0.1
 """Of the mean length of edges: shorter ones count as that long."""
 
-MOST_PIECES = 32
+MAX_PIECES = 32
 """Of one step, so that it ends."""
 
 
@@ -40,7 +40,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
     particles = state.body_particles[body]
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
-    split_off_rotation(state, body, h)
+    project_out_rotation(state, body, h)
     multiply(state, body, state.particle_velocity, state.image)
     gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
@@ -77,14 +77,14 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 
 @ti.func
-def keep_residual(state: ti.template(), body, residual, is_first):
+def record_residual(state: ti.template(), body, residual, is_first):
     """Keep the largest residual of a step's solves. That of a body that goes non-finite does not count."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
     state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
-def _keep_share(state: ti.template(), body, h, share):
+def _scale_motion(state: ti.template(), body, h, share):
     """Leave a substep of `h` [s] a share of its motion, but all that the body's particles have in common."""
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
@@ -129,4 +129,4 @@ def slow_down(state: ti.template(), body, h):
     """Take speed from a body of which an edge has changed by more than `FARTHEST` in a substep of `h` [s]."""
     change = _largest_change(state, body)
     if change > FARTHEST:
-        _keep_share(state, body, h, FARTHEST / change)
+        _scale_motion(state, body, h, FARTHEST / change)

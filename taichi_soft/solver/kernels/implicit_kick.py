@@ -7,8 +7,8 @@ from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle
-from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, keep_residual, solve_body
+from taichi_soft.solver.kernels.held_particles import constrain_particle, held_velocity
+from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, record_residual, solve_body
 
 
 @ti.func
@@ -38,7 +38,7 @@ def _surface_below(contact: ti.template(), c, x, since):
 
 
 @ti.func
-def _lay_on_colliders(state: ti.template(), body, h, since):
+def _constrain_to_colliders(state: ti.template(), body, h, since):
     """Hold particles that lie on colliders; release others.
 
     A particle lies there while gravity alone would bring it back within the substep.
@@ -62,13 +62,15 @@ def _lay_on_colliders(state: ti.template(), body, h, since):
                     velocity_so_far, _ = _surface_velocity(state.contact, c, x, since, -h)
                     state.particle_contact[p] = c + 1
                     approach = ti.max(distance - TOUCHING, 0.0) / h
-                    hold_particle(state, p, n, v - velocity_so_far, surface_velocity - approach * n, fall)
+                    constrain_particle(
+                        state, p, n, v - velocity_so_far, surface_velocity - approach * n, fall
+                    )
                     count += 1
     return count
 
 
 @ti.func
-def _press(state: ti.template(), body, p, h, since):
+def _apply_impulse(state: ti.template(), body, p, h, since):
     """Velocity of a particle on a collider after the solve [m/s]; the collider feels its impulse."""
     c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
     velocity, pressing, across = held_velocity(state, p)
@@ -96,8 +98,8 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
         is_first: 1 in the first substep of a step.
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
-    held_count = _lay_on_colliders(state, body, h, since)
-    keep_residual(state, body, solve_body(state, program, body, h, held_count), is_first)
+    held_count = _constrain_to_colliders(state, body, h, since)
+    record_residual(state, body, solve_body(state, program, body, h, held_count), is_first)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -108,7 +110,7 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
         else:
             v += state.solution[p]
             if state.particle_contact[p] > 0:
-                v = _press(state, body, p, h, since)
+                v = _apply_impulse(state, body, p, h, since)
         state.particle_velocity[p] = v
         state.direction[p] = state.particle_position[p]
         state.particle_force[p] = ti.Vector.zero(state.real, 4)

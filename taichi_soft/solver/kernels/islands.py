@@ -12,7 +12,7 @@ from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-SPARE = 0.25
+ISLAND_MARGIN = 0.25
 """Mean edges by which bodies may come nearer than their velocities say, and still be in one island."""
 
 
@@ -44,7 +44,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
         surface = state.soft.body_surface[body]
         # What its parts do beside each other, they may do otherwise before the step is over.
         fall = gravity_on(state, body).norm() * dt * dt
-        reach = 0.5 * (fast - slow) * dt + fall + surface.y + SPARE * surface.z
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.contact.body_lower[body] = lower - reach
         state.contact.body_upper[body] = upper + reach
 

@@ -4,21 +4,21 @@ Between the two the island takes velocities away, in joints and in contact of bo
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.contact.kernels.hull import note_points
+from taichi_soft.contact.kernels.hull import update_points
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import Job
 
-JOLT = 1.0
-"""By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
-body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
-cross the smallest tetrahedron."""
+MAX_VELOCITY_CHANGE = 1.0
+"""Largest change of a particle's velocity by the forces of one substep, over the speed of sound in its body.
+Stable vibrations stay below it, even of slivers: a stable substep is about the time in which sound crosses
+the smallest tetrahedron."""
 
 PRESSED = 4.0
-"""The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
-by what it presses against."""
+"""Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep: contact removes
+most of its change."""
 
 EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
@@ -26,7 +26,7 @@ taken to be exploding: others pass through it until it is frozen or calm."""
 
 
 @ti.func
-def _put_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
+def _store_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
     """Write what a kick made of `LANES` particles from `first` on, and clear what the next one begins with.
 
     Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
@@ -44,7 +44,9 @@ def _put_block(state: ti.template(), first, positions: ti.template(), velocities
 
 
 @ti.func
-def _put_last_block(state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()):
+def _store_last_block(
+    state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()
+):
     """The same of the last particles of a body, fewer than `LANES`."""
     lane = 0
     while lane < count:
@@ -58,7 +60,7 @@ def _put_last_block(state: ti.template(), first, count, positions: ti.template()
 
 
 @ti.func
-def _note_block(state: ti.template(), first, count, common, velocities: ti.template()):
+def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
     """Write the speeds of up to `LANES` particles relative to the `common` velocity, for contacts.
 
     Called before new velocities are written. Returns: the squares of possible impact speeds.
@@ -113,11 +115,11 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if ti.static(program.has_soft_contact):
         if job.has_pairs == 1:
-            striking2 = _note_block(state, first, count, job.velocity, velocities)
+            striking2 = _store_speeds(state, first, count, job.velocity, velocities)
     if count >= LANES:
-        _put_block(state, first, positions, velocities)
+        _store_block(state, first, positions, velocities)
     else:
-        _put_last_block(state, first, count, positions, velocities)
+        _store_last_block(state, first, count, positions, velocities)
     return speed2, striking2, acceleration2
 
 
@@ -137,12 +139,12 @@ def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick
         v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, job)
         speed2, striking2 = ti.max(speed2, v2), ti.max(striking2, b2)
         acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
-    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= JOLT * state.body_sound_speed[body])
+    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= MAX_VELOCITY_CHANGE * state.body_sound_speed[body])
     return ti.sqrt(speed2.max()), ti.sqrt(striking2.max()), ti.sqrt(total2.sum() / count), is_stable
 
 
 @ti.func
-def _note_speeds(
+def _store_body_speeds(
     state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
 ):
     """For the island, and for the search for contacts."""
@@ -167,7 +169,7 @@ def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: J
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):
-        of_points, beside_of_points = note_points(state, body, job.velocity)
+        of_points, beside_of_points = update_points(state, body, job.velocity)
         speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
-    _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
+    _store_body_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
     return is_stable

@@ -34,7 +34,7 @@ def _arm(state: ti.template(), body, p):
 
 
 @ti.func
-def split_off_rotation(state: ti.template(), body, h):
+def project_out_rotation(state: ti.template(), body, h):
     """Prepare products with P^T K P for a body whose blocks hold h^2 K."""
     particles, edges = state.body_particles[body], state.body_edges[body]
     first = state.particle_position[particles[0]]

@@ -5,10 +5,10 @@ As sleepers, they make the step after all where something comes near that moves:
 
 from taichi_soft.bodies.kernels.particles import save_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
-from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import note_boxes_of_skipping
+from taichi_soft.solver.kernels.sleep import store_boxes_of_skipping
 
 
 @ti.kernel
@@ -26,7 +26,7 @@ def begin_skips(state: ti.template(), body_count: ti.i32):
     """Before a step that some skip: where they are now is where something may come near them."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        note_boxes_of_skipping(state, body_count)
+        store_boxes_of_skipping(state, body_count)
 
 
 @ti.kernel
@@ -46,7 +46,7 @@ def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
                 save_particle(state, p)
                 p = row_behind(p)
             if ti.static(state.capacity.has_contact):
-                forget_contacts(state, body)
+                clear_contacts(state, body)
             state.body_drives[body] = state.body_drives[body] & ~PUSHED
             state.body_status[body] = ACTIVE
             skipped += 1

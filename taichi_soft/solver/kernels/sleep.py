@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 CALM_TIME = 0.5
 """Time [s] for which all bodies of an island must be slow: longer than the turning point of a throw."""
 
-NEAR = 0.01
+WAKE_MARGIN = 0.01
 """Way [m] beside a sleeping body's box within which what happens wakes it."""
 
 
@@ -20,7 +20,7 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
     for body in range(body_count):
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
             above = (lower - state.contact.body_upper[body]).max()
-            if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= NEAR:
+            if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= WAKE_MARGIN:
                 state.body_status[body] = ACTIVE
                 woken += 1
     return woken
@@ -53,25 +53,25 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 
 
 @ti.func
-def note_motion(state: ti.template(), body, speed):
+def reset_rest_timer(state: ti.template(), body, speed):
     """Start to count anew where a body is fast."""
     if not (speed <= state.contact.sleep_speed[None]) and state.contact.calm[body] != 0.0:
         state.contact.calm[body] = 0.0
 
 
 @ti.func
-def note_way_of_hulled(state: ti.template(), body, dt):
+def reset_rest_timer_of_hull(state: ti.template(), body, dt):
     """The same of a body with a hull, by its way through a step of `dt` [s]: what carries points in contact
     goes to and fro from substep to substep, and stays where it is."""
     if has_hull(state, body):
         way = ti.cast(0.0, ti.f32)
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
             way = ti.max(way, (state.particle_position[p] - state.prev_position[p]).norm())
-        note_motion(state, body, way / dt)
+        reset_rest_timer(state, body, way / dt)
 
 
 @ti.func
-def note_box(state: ti.template(), body):
+def store_box(state: ti.template(), body):
     """Remember the box round a body that stands still, and round its hull."""
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
@@ -90,12 +90,12 @@ def note_box(state: ti.template(), body):
 
 
 @ti.real_func
-def note_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
+def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
     """Remember the boxes round bodies that skip the coming step: they may have been moved since they were
     told to."""
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
-            note_box(state, body)
+            store_box(state, body)
 
 
 @ti.func
@@ -108,14 +108,14 @@ def _put_to_sleep(state: ti.template(), body):
         state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
         state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
         p = row_behind(p)
-    note_box(state, body)
+    store_box(state, body)
     state.body_velocity_lag[body] = 0.0
     state.contact.calm[body] = 0.0
     state.body_status[body] = ASLEEP
 
 
 @ti.real_func
-def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
+def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
     """Count the calm of an island after a step of `dt` [s], and let it fall asleep together.
 
     Returns: whether it is still awake (1).
@@ -157,7 +157,7 @@ def wake_near(
     woken = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
-        note_boxes_of_skipping(state, body_count)
+        store_boxes_of_skipping(state, body_count)
         lower, upper = ti.Vector([box[0], box[1], box[2]]), ti.Vector([box[3], box[4], box[5]])
         woken = _wake_in_box(state, body_count, lower, upper)
     return woken

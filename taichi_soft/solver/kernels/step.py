@@ -16,13 +16,13 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
     attempts_of,
     brake_island,
-    island_is_sound,
-    put_back_island,
+    island_is_valid,
     refined_substeps,
+    restore_island,
 )
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
-from taichi_soft.solver.kernels.sleep import settle_island, wake_by_colliders, wake_island
+from taichi_soft.solver.kernels.sleep import update_sleep, wake_by_colliders, wake_island
 from taichi_soft.solver.kernels.substep import (
     BEGIN,
     END,
@@ -70,13 +70,13 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         if is_last == 0 and run.is_stable == 0:
             _put_back(state, program, island, run, halvings)
         elif run.s == count:
-            if (is_last | island_is_sound(state, island)) == 1:
+            if (is_last | island_is_valid(state, island)) == 1:
                 is_good = 1
             else:
                 _put_back(state, program, island, run, halvings)
     if is_good == 1:
         _end(state, program, island, run, finer * least, longest / finer)
-        run.is_awake = settle_island(state, island, substeps * h)  # what was calm for long enough sleeps
+        run.is_awake = update_sleep(state, island, substeps * h)  # what was calm for long enough sleeps
     state.progress[island] = run
     return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake
 
@@ -139,7 +139,7 @@ def _mean_velocity(state: ti.template(), island):
 @ti.func
 def _put_back(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
     """Put an island back to where it was, for the next attempt."""
-    put_back_island(state, program, island)
+    restore_island(state, program, island)
     run.attempt += 1
     run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
     run.fastest, run.shift = 0.0, ti.Vector.zero(ti.f32, 3)

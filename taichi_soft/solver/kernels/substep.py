@@ -18,20 +18,20 @@ from taichi_soft.contact.kernels.broad_phase import (
     begin_search,
     has_contact_pairs,
     is_outdated,
-    note_way,
     search_body,
+    update_displacement,
 )
 from taichi_soft.contact.kernels.contact_solver import solve_island
-from taichi_soft.contact.kernels.narrow_phase import find_gaps
+from taichi_soft.contact.kernels.narrow_phase import find_contacts
 from taichi_soft.contact.kernels.touches import add_touches
-from taichi_soft.control.kernels.drives import blow_on, push_particles
+from taichi_soft.control.kernels.drives import apply_external_forces, apply_wind
 from taichi_soft.control.kernels.joints import solve_joints
 from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, look_for_colliders
+from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, list_near_colliders
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_body
 from taichi_soft.solver.kernels.vibration import damp_body, to_positions
@@ -43,7 +43,7 @@ BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
 NONE, OUTDATED, VALID = range(3)
 """Candidates of an island: the last step has forgotten its own; those of an attempt at this one; usable."""
 
-BLOW = 0.1
+MAX_IMPULSE_STEP = 0.1
 """Mean edges within a substep from which a body that is struck may strike the next one in the same substep.
 A slower one may go into the next body by that much, and is moved out again."""
 
@@ -69,8 +69,8 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
 def _advance_body(state: ti.template(), program: ti.template(), body, job):
     """The phases of one body by itself: wind, drives and forces, damping, kick."""
     felt = program.integrator.felt_time(state.body_velocity_lag[body], job.h, job.s)
-    blow_on(state, body, job.h)
-    push_particles(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
+    apply_wind(state, body, job.h)
+    apply_external_forces(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
     program.integrator.hold(state, program, body, job.h, felt)
     run_motors(state, body, job.h, felt, int(job.s == 0))
     if job.s == 0:
@@ -106,7 +106,7 @@ def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: J
     if job.phase == BROAD_PHASE:
         search_body(state, body, island)
     if job.phase == NARROW_PHASE:
-        find_gaps(state, body, job.impact_speed, job.h)
+        find_contacts(state, body, job.impact_speed, job.h)
 
 
 @ti.real_func
@@ -121,7 +121,7 @@ def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32
         drift_body(state, body, job)
     if ti.static(program.has_soft_contact):
         if job.phase == DRIFT and has_contact_pairs(state, island) == 1:
-            note_way(state, body, job.shift)
+            update_displacement(state, body, job.shift)
         if job.phase == BOXES or job.phase == BROAD_PHASE or job.phase == NARROW_PHASE:
             _do_contact_phase(state, island, body, job)
 
@@ -139,7 +139,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
     is_free = is_alone(state, program, island)
     if is_free == 1:
         if not (state.contact.gone[body] + run.fastest * now.h <= state.contact.reach[body]):
-            look_for_colliders(state, body, run.fastest, now.since, now.left)
+            list_near_colliders(state, body, run.fastest, now.since, now.left)
         is_free = can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
     has_pairs = 0
@@ -193,7 +193,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
             run.is_stable = run.is_stable & state.contact.is_stable[body]
         least_edge = ti.min(least_edge, state.body_edge[body])
     run.fastest = highest
-    return highest, ti.select(striking * now.h > BLOW * least_edge, striking, 0.0)
+    return highest, ti.select(striking * now.h > MAX_IMPULSE_STEP * least_edge, striking, 0.0)
 
 
 @ti.func

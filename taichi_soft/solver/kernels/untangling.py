@@ -1,13 +1,13 @@
-"""What brings back a body that is caught inside out.
+"""Restore bodies with inverted tetrahedra.
 
-Forces alone turn nearly all tetrahedra that are inside out back again. Every `PATIENCE` steps
-the body is checked for tetrahedra that are flat or inside out, and its vibrations fade until a check finds
-none. A body that its own weight folds may keep a few for ever, as their forces balance. Such a body is
-reported after `REPORTED` steps, and left as it is. A body that is wrecked altogether has no shape to go back
-to: its particles move to where the rest shape fits best to them, within a second.
+Forces alone turn nearly all inverted tetrahedra back. Every `PATIENCE` steps a body is checked for flat or
+inverted tetrahedra. If there are any, its vibrations are damped until a check finds none. A body that is
+folded by its own weight can keep a few for ever, because their forces balance. It is reported after
+`REPORTED_AFTER` steps and left as it is. A body with too many of them has lost its shape: within a third of a
+second, its particles move to the best fit of the rest shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-may be too long for these, and parts of them would tremble for ever. They get more substeps.
+can be too long for these: parts of them would vibrate for ever. They get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -24,13 +24,13 @@ from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
 
-REPORTED = 8 * PATIENCE
+REPORTED_AFTER = 8 * PATIENCE
 """Fixed steps after which a body with such tetrahedra is reported: two seconds."""
 
-WRECKED = 0.1
+FAILED_FRACTION = 0.1
 """Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
 
-RAISING_STEPS, CALMING = 20, 0.8
+RESTORING_STEPS, CALMING = 20, 0.8
 """Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
 about itself twice without being inside out anywhere would stay so otherwise."""
 
@@ -38,10 +38,10 @@ FADING = 20.0
 """At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
 out would keep each other trembling otherwise, light ones for seconds."""
 
-SPARE = 0.9
+STEP_MARGIN = 0.9
 """Square of the substep that is chosen for a deformed body over that of its own limit, as estimated here."""
 
-MOST_REFINEMENT = 4.0
+MAX_REFINEMENT = 4.0
 """Substeps over those at rest, at most: shorter ones are left to attempts."""
 
 RELAXING = 0.8
@@ -52,7 +52,7 @@ FLAT = 1e-5
 
 
 @ti.func
-def _is_caught(state: ti.template(), positions: ti.template(), block, lane):
+def _is_inverted(state: ti.template(), positions: ti.template(), block, lane):
     """Whether a tetrahedron is flat or inside out (1)."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
@@ -61,11 +61,11 @@ def _is_caught(state: ti.template(), positions: ti.template(), block, lane):
 
 
 @ti.func
-def _caught_count(state: ti.template(), positions: ti.template(), body):
+def _count_inverted(state: ti.template(), positions: ti.template(), body):
     caught, blocks = 0, state.body_blocks[body]
     row = blocks[0] * LANES
     while row < blocks[1] * LANES:
-        caught += _is_caught(state, positions, row // LANES, row % LANES)
+        caught += _is_inverted(state, positions, row // LANES, row % LANES)
         row = row_behind(row)
     return caught
 
@@ -111,17 +111,17 @@ def _refinement_of(state: ti.template(), body):
         stiffness, stiffness_at_rest = _stiffness_of(state, row // LANES, row % LANES)
         now, rest = ti.max(now, stiffness), ti.max(rest, stiffness_at_rest)
         row = row_behind(row)
-    return ti.max(1.0, ti.min(ti.sqrt(SPARE * now / rest), MOST_REFINEMENT))
+    return ti.max(1.0, ti.min(ti.sqrt(STEP_MARGIN * now / rest), MAX_REFINEMENT))
 
 
 @ti.func
-def _is_wrecked(state: ti.template(), body):
+def _needs_rest_shape(state: ti.template(), body):
     """Whether much was caught before a step that had to be made again, or to which somebody put the body."""
     is_wrecked = False
     if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
         blocks = state.body_blocks[body]
-        caught = _caught_count(state, state.prev_position, body)
-        is_wrecked = caught >= WRECKED * LANES * (blocks[1] - blocks[0])
+        caught = _count_inverted(state, state.prev_position, body)
+        is_wrecked = caught >= FAILED_FRACTION * LANES * (blocks[1] - blocks[0])
     return is_wrecked
 
 
@@ -154,7 +154,7 @@ def _best_fit(state: ti.template(), body):
 
 
 @ti.func
-def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
+def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, steps_left, seconds):
     """Move all particles of a wreck a part of the way to where they fit best, in the last step all of it.
 
     Pinned particles stay, and the floor stops the others. Among colliders, which may be in the way, particles
@@ -200,7 +200,7 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 
 @ti.func
-def kept_while_caught(state: ti.template(), body, h, is_first):
+def kept_while_inverted(state: ti.template(), body, h, is_first):
     """Part of its vibration that a body of which some is caught keeps in a substep of `h` [s].
 
     In every substep: vibrations of twice the period of the steps never moved at their beginning, and went on
@@ -209,7 +209,7 @@ def kept_while_caught(state: ti.template(), body, h, is_first):
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
         keep = exp(-FADING * h)
-    elif is_first and age >= -RAISING_STEPS and age < 0:
+    elif is_first and age >= -RESTORING_STEPS and age < 0:
         keep = CALMING
     return keep
 
@@ -223,10 +223,10 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
     is_reported = 0
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
-        age = ti.max(before, -RAISING_STEPS - 1) + 1
+        age = ti.max(before, -RESTORING_STEPS - 1) + 1
         if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
-            if _is_wrecked(state, body):
-                age = -RAISING_STEPS
+            if _needs_rest_shape(state, body):
+                age = -RESTORING_STEPS
             elif before == PLACED:
                 age = 0
         is_look = age >= 0 and age % PATIENCE == 0
@@ -234,11 +234,11 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
             kept = 1.0 + RELAXING * (state.body_refinement[body] - 1.0)
             state.body_refinement[body] = ti.max(_refinement_of(state, body), kept)
         if is_look:
-            if _caught_count(state, state.particle_position, body) == 0:
+            if _count_inverted(state, state.particle_position, body) == 0:
                 age = 0
-            is_reported = int(age == REPORTED)
+            is_reported = int(age == REPORTED_AFTER)
         if age < 0:
-            _raise(state, program, body, -age, seconds)
+            _move_to_rest_shape(state, program, body, -age, seconds)
         state.body_patience[body] = age
         state.body_jolted[body] = 0
     return is_reported

@@ -18,9 +18,9 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.untangling import kept_while_caught
+from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
-MOST_FADING = 0.43
+MAX_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
 of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
 That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A wreck loses
@@ -44,7 +44,7 @@ line: it does not feel a turn about that."""
 
 
 @ti.func
-def _solved(rows: ti.template(), b):
+def _solve_symmetric(rows: ti.template(), b):
     """x of rows x = b for a symmetric matrix given by its rows, scaled so that their trace is 1."""
     a0, a1, a2 = rows
     c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
@@ -140,7 +140,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
             ti.Vector([-d.x, s.z + s.x, -d.y]) / trace,
             ti.Vector([-d.z, -d.y, s.x + s.y]) / trace,
         )
-        angular_velocity = _solved(rows, spin / trace)
+        angular_velocity = _solve_symmetric(rows, spin / trace)
     return center, velocity, angular_velocity
 
 
@@ -193,13 +193,13 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
                 if turn == 0:
                     kicked = _kicked_velocity(state, p, gravity, kick)
                     rigid = v0 + velocity + spin.cross(arm)
-                    change = rigid + _slower(kicked - rigid, farthest) - kicked
+                    change = rigid + _limited(kicked - rigid, farthest) - kicked
                 state.particle_velocity[p] = state.particle_velocity[p] + change
             p = row_behind(p)
 
 
 @ti.func
-def _slower(beside, most):
+def _limited(beside, most):
     """A velocity beside the rigid motion, no faster than `most` [m/s]."""
     speed = beside.norm()
     slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
@@ -223,12 +223,12 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
             if state.contact.rest_state[body] == RESTING:
                 rate = ti.max(rate, RESTING_RATE)
         whole = substeps * h
-        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
+        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MAX_FADING))
         times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
         while times < substeps and substeps % times == 0:
             times += 1
         if (s + 1) * times // substeps > s * times // substeps:
-            keep = exp(-ti.min(rate * whole / times, MOST_FADING))
+            keep = exp(-ti.min(rate * whole / times, MAX_FADING))
     return keep
 
 
@@ -269,7 +269,7 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
     rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
-    keep *= kept_while_caught(state, body, h, s == 0)
+    keep *= kept_while_inverted(state, body, h, s == 0)
     if keep < 1.0:
         _fade_body(state, program, body, to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
