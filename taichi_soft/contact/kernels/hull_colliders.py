@@ -41,7 +41,10 @@ def clear_warm_start(state: ti.template(), body):
 
 @ti.func
 def clear_warm_start_if_free(state: ti.template(), body):
-    """Do so before a step if nothing touched the body in the last one, whose impulses are not cleared yet."""
+    """Clear these impulses before a step if nothing touched the body in the last one.
+
+    Call it before the impulses of the last step are cleared.
+    """
     felt = ti.cast(0.0, ti.f32)
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         felt = ti.max(felt, ti.abs(state.contact.impulse[row]).max())

@@ -20,8 +20,8 @@ SAME_NORMAL = 0.7
 gives one contact however it is triangulated, and a corner two."""
 
 SAME_NORMAL_INSIDE = 0.95
-"""The same for a vertex inside both triangles, which lies in a valley or a dent, or on two bodies. Both sides
-of a valley must hold it. In a dent, several contacts would make it oscillate."""
+"""`SAME_NORMAL` for a vertex inside both triangles, which lies in a valley or a dent, or on two bodies. Both
+sides of a valley must hold it. In a dent, several contacts would make it oscillate."""
 
 MIN_ADVANTAGE = 0.01
 """Fraction of the thickness by which a contact at an edge must be nearer to replace one that carries a

@@ -1,4 +1,4 @@
-"""What a step asks of an integrator."""
+"""The interface of an integrator."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,38 +8,37 @@ from taichi_soft.core.types import Integrator
 
 @dataclass(frozen=True, repr=False)
 class IntegratorModel:
-    """How forces become motion: five functions of Taichi, and what a world has to know beside them.
+    """Five Taichi functions that convert forces to motion, and the properties that a world must know.
 
-    Nothing else in the project asks which integrator runs.
+    No other code asks which integrator runs.
     """
 
     name: Integrator
     felt_time: Any
-    """(lag, h, s) -> for how long forces of the old positions act on velocities in substep `s` of `h` [s].
+    """(lag, h, s) -> time for which forces of the old positions act on velocities in substep `s` of `h` [s].
 
-    `lag` is how far velocities are behind positions [s].
-    """
+    `lag` is the time by which velocities are behind positions [s]."""
     drive_time: Any
-    """(h, s, substeps) -> for how long drives act before substep `s` [s]; after the last one if it is
-    `substeps`."""
+    """(h, s, substeps) -> time for which external forces act before substep `s`, or after the last one if `s`
+    is `substeps` [s]."""
     hold: Any
-    """(state, program, body, h, felt): add the forces of the old positions, and of what holds the body."""
+    """(state, program, body, h, felt): add the forces of the old positions, and those of pins and grabs."""
     predict: Any
-    """(state, program, body, job, felt) -> new velocities: highest speed [m/s]; highest and mean beside the
-    job's velocity; whether forces changed no velocity by too much (1)."""
+    """(state, program, body, job, felt) -> new velocities. Returns the highest speed [m/s]; the highest and
+    the mean relative to the job's velocity; 1 if forces changed no velocity by too much."""
     check: Any
-    """(state, body, h, is_last) -> whether a body has kept its shape in a substep (1)."""
+    """(state, body, h, is_last) -> 1 if a body kept its shape in a substep."""
     advance: Any = None
     """(x, v, a, h, kick) -> position and velocity of one particle, for the schedule `flat`; or None."""
-    lag: float = 0.0  # of velocities behind positions, over the substep
-    is_lag_told: bool = False  # those that are read are brought to the time of the positions
+    lag: float = 0.0  # time by which velocities are behind positions, over the substep
+    is_lag_told: bool = False  # readers get velocities at the time of the positions
     has_stable_step: bool = True  # longer substeps explode
     has_hulls: bool = True
-    drifts_at_once: bool = True  # a body alone, with its new velocities
-    halvings: int = 0  # of substeps that fail; 0: as the world says by `retries`
-    work: int = 1  # of a substep, about, over one of leapfrog
+    drifts_at_once: bool = True  # the kick can move a single body at once
+    halvings: int = 0  # of failed substeps; 0: the world's `retries`
+    work: int = 1  # approximate cost of a substep over one of leapfrog
     only_flat: bool = False  # it has no colliders
-    warning: str = ""  # to those who use it
+    warning: str = ""  # shown to its users
 
     @property
     def takes_solves(self) -> bool:
@@ -47,5 +46,5 @@ class IntegratorModel:
         return self.advance is None
 
     def __repr__(self) -> str:
-        """Its name: addresses of functions would differ from run to run."""
+        """Return the name: addresses of functions would differ from run to run."""
         return f"IntegratorModel({self.name.value!r})"

@@ -24,8 +24,10 @@ from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 @ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
-    """How often substeps are halved; and the number of the last attempt, which is as fine as the one before
-    and braked, or the same number."""
+    """Number of halvings of the substep, and the number of the last attempt.
+
+    If they differ, the last attempt has the same substeps as the one before, and strong damping.
+    """
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
     if ti.static(program.integrator.halvings > 0):
@@ -35,8 +37,9 @@ def attempts_of(state: ti.template(), program: ti.template()):
 
 @ti.func
 def refined_substeps(state: ti.template(), program: ti.template(), island, substeps, dt):
-    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or as many as the shapes of an
-    island's bodies ask for."""
+    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or more if the shapes of the island's
+    bodies require it.
+    """
     least = ti.cast(substeps, ti.f32)
     if ti.static(program.integrator.has_stable_step):
         if state.retries[None] > 0:
@@ -46,7 +49,7 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
                 body = state.contact.island_body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
-                    # A forged snapshot may say anything.
+                    # Limited: a forged snapshot can contain any number.
                     refinement = ti.min(state.body_refinement[body], MAX_REFINEMENT)
                     least = ti.max(least, ti.min(at_rest * refinement, MAX_REFINEMENT * substeps))
                 row = row_behind(row)
@@ -55,15 +58,14 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
 
 @ti.real_func
 def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
-    """Remember how a body is before the step: to interpolate from, and to put it back there. Forget what it
-    touched in the last one."""
+    """Save the state of a body before the step, for interpolation and retries. Clear its last contacts."""
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             save_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
-                if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
+                if state.body_status[body] == FROZEN:  # its pins have no targets, which would reset it
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
         _begin_contacts(state, program, body)
@@ -93,7 +95,7 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _restore_body(state: ti.template(), program: ti.template(), body):
-    """Put a body back to where it was before the step."""
+    """Restore the state of a body before the step."""
     state.body_jolted[body] = 1
     particles = state.body_particles[body]
     p = particles[0]
@@ -110,12 +112,12 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
     if ti.static(state.capacity.contact.hull):
         clear_warm_start(state, body)
     if ti.static(program.has_soft_contact):
-        clear_candidates(state, body)  # for good, as the island looks for others before it goes on
+        clear_candidates(state, body)  # not stored: the island searches again before it continues
 
 
 @ti.real_func
 def restore_island(state: ti.template(), program: ti.template(), island: ti.i32):
-    """Put an island back to where it was before the step."""
+    """Restore the state of an island before the step."""
     first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
         _restore_body(state, program, state.contact.island_body[row])
@@ -125,7 +127,7 @@ def restore_island(state: ti.template(), program: ti.template(), island: ti.i32)
 
 @ti.func
 def brake_island(state: ti.template(), island, is_braked):
-    """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
+    """Damp the vibrations of all bodies of an island strongly (1), or no longer (0)."""
     first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     row = first
     while row < end:
@@ -135,7 +137,7 @@ def brake_island(state: ti.template(), island, is_braked):
 
 @ti.func
 def body_is_valid(state: ti.template(), body):
-    """Whether all of a body can still be computed with (1)."""
+    """1 if all particles of a body have valid positions and velocities."""
     particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -147,7 +149,7 @@ def body_is_valid(state: ti.template(), body):
 
 @ti.func
 def island_is_valid(state: ti.template(), island):
-    """Whether all that moves in an island can still be computed with (1)."""
+    """1 if all active bodies of an island are valid."""
     sound = 1
     first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):

@@ -1,4 +1,4 @@
-"""What comes after the last substep of a step, body by body."""
+"""End of a step, body by body."""
 
 from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body
@@ -18,7 +18,7 @@ from taichi_soft.solver.kernels.untangling import untangle_body
 
 @ti.func
 def _freeze_if_invalid(state: ti.template(), body):
-    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
+    """Freeze a body that became invalid, in its last valid state. Returns: 1 if that happened."""
     sound = body_is_valid(state, body)
     if sound == 0:
         particles = state.body_particles[body]
@@ -26,7 +26,7 @@ def _freeze_if_invalid(state: ti.template(), body):
         while p < particles[1]:
             restore_particle(state, p)
             p = row_behind(p)
-        place_points(state, body)  # or they would not be finite, and no snapshot would be taken back
+        place_points(state, body)  # a snapshot with non-finite points cannot be restored
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN
@@ -35,7 +35,7 @@ def _freeze_if_invalid(state: ti.template(), body):
 
 @ti.func
 def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """Returns 1 where it failed, stays inside out, or was not solved as exactly as asked."""
+    """Returns: 1 if it failed, stays inverted, or its solve was inexact."""
     apply_external_forces(state, body, program.integrator.drive_time(h, substeps, substeps))
     failed = _freeze_if_invalid(state, body)
     if failed == 0:
@@ -49,7 +49,7 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         if ti.static(state.capacity.implicit):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
     else:
-        clear_contacts(state, body)  # it was put back: nothing has touched it
+        clear_contacts(state, body)  # a restored body has touched nothing
     return failed
 
 
@@ -57,9 +57,9 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
 def end_body(
     state: ti.template(), program: ti.template(), body: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
-    """After the last of so many substeps of `h` [s]: drives end, plasticity flows, what is caught is freed.
+    """End the step of a body after `substeps` of `h` [s]: external forces, plastic flow, inverted tetrahedra.
 
-    Returns: whether the body failed, stays inside out, or was not solved as exactly as asked (1).
+    Returns: 1 if the body failed, stays inverted, or its solve was inexact.
     """
     failed = 0
     if state.body_status[body] == ACTIVE:

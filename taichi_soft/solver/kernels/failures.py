@@ -1,4 +1,4 @@
-"""What broke a frozen body: its last step made again, element by element."""
+"""Find why a body was frozen: repeat its last step, element by element."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
@@ -21,11 +21,11 @@ def find_failed_element(
     is_braked: ti.i32,
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Make the last step of a frozen body again, up to the substep in which it breaks, and undo it.
+    """Repeat the last step of a frozen body up to the substep in which it fails, and undo it.
 
     Args:
-        found: receives the tetrahedron (block times `LANES` plus lane) or edge that broke first and the
-            substep; left alone where nothing breaks.
+        found: receives the tetrahedron (block times `LANES` plus lane) or edge that failed first, and the
+            substep; unchanged if nothing fails.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

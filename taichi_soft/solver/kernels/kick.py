@@ -1,6 +1,6 @@
-"""Kick among colliders: new velocities from forces. Positions follow in the drift.
+"""Kick among colliders: new velocities from forces. The drift then moves positions.
 
-Between the two the island takes velocities away, in joints and in contact of bodies with each other.
+In between, joints and contact between bodies change velocities island by island.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -21,15 +21,16 @@ PRESSED = 4.0
 most of its change."""
 
 EXPLODING = 20.0
-"""Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
-taken to be exploding: others pass through it until it is frozen or calm."""
+"""Path of a particle within one substep, over the mean edge of its body's surface, above which the body
+counts as exploding. Others pass through it until it is frozen or slower."""
 
 
 @ti.func
 def _store_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
-    """Write what a kick made of `LANES` particles from `first` on, and clear what the next one begins with.
+    """Store new positions and velocities of `LANES` particles from `first` on, and clear their touches and
+    forces.
 
-    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
+    One loop per field: a loop of constant length over one field compiles to a few wide stores.
     """
     for lane in range(LANES):
         for i in ti.static(range(3)):
@@ -47,7 +48,7 @@ def _store_block(state: ti.template(), first, positions: ti.template(), velociti
 def _store_last_block(
     state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()
 ):
-    """The same of the last particles of a body, fewer than `LANES`."""
+    """Store the last particles of a body, fewer than `LANES`, in the same way."""
     lane = 0
     while lane < count:
         p = first + lane
@@ -61,15 +62,15 @@ def _store_last_block(
 
 @ti.func
 def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
-    """Write the speeds of up to `LANES` particles relative to the `common` velocity, for contacts.
+    """Store the speeds of up to `LANES` particles relative to the `common` velocity, for contact.
 
-    Called before new velocities are written. Returns: the squares of possible impact speeds.
+    Call it before new velocities are stored. Returns: the squares of possible impact speeds.
     """
     speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         v = ti.Vector([velocities[lane, i] for i in ti.static(range(3))])
         speeds[lane] = (v - common).norm()
-        # What presses against others gains speed only to lose it to them.
+        # A particle in contact loses the speed that it gains in the kick again.
         was_touched = state.contact.particle_touches[first + lane] == 1
         beside = ti.select(was_touched, state.particle_velocity[first + lane], v) - common
         striking2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
@@ -90,18 +91,18 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
     Forces are cleared. Rows beyond the last particle are computed too, and ignored.
 
-    Returns: of each the square of its speed, of that with which it may strike another, and of its
-    acceleration, which counts less where something held it.
+    Returns: for each the squares of its speed, of its possible impact speed, and of its acceleration, which
+    is reduced for touched particles.
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
     velocities = ti.Matrix.zero(state.real, LANES, 3)
     speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
+    # This loop stores to local arrays only: the compiler cannot know that fields do not overlap.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
-        # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
+        # All four components of a force (the last is 0), for wide loads without gaps.
         acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         x, v = program.integrator.advance(
@@ -127,8 +128,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
     """Compute velocities after `kick` [s] of the forces, and positions after the job's `drift_time`.
 
-    Returns: the highest speed [m/s]; the highest and the mean with which it may strike another, if it has
-    pairs; and whether forces changed no velocity by too much at once (1).
+    Returns: the highest speed [m/s]; the highest and the mean possible impact speed, if the body has pairs;
+    and 1 if forces changed no velocity by too much at once.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -147,9 +148,9 @@ def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick
 def _store_body_speeds(
     state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
 ):
-    """For the island, and for the search for contacts."""
-    # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
-    # is as it was is not written.
+    """Store the speeds of a body for its island and for the search for contacts."""
+    # Unchanged values are not written: neighbouring bodies share a cache line, which a write takes from
+    # other threads.
     state.contact.body_speed[body] = speed
     if state.contact.is_stable[body] != is_stable:
         state.contact.is_stable[body] = is_stable
@@ -163,7 +164,7 @@ def _store_body_speeds(
 
 @ti.real_func
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
-    """Compute new velocities of one body, on which forces act for `felt` [s], and write its speeds.
+    """Compute new velocities of one body, on which forces act for `felt` [s], and store its speeds.
 
     Returns: 1 if forces changed no velocity by too much at once.
     """

@@ -22,41 +22,41 @@ from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 PATIENCE = 15
-"""Fixed steps between two looks: a quarter of a second."""
+"""Fixed steps between two checks: a quarter of a second."""
 
 REPORTED_AFTER = 8 * PATIENCE
-"""Fixed steps after which a body with such tetrahedra is reported: two seconds."""
+"""Fixed steps after which a body with inverted tetrahedra is reported: two seconds."""
 
 FAILED_FRACTION = 0.1
-"""Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
+"""Fraction of inverted tetrahedra above which a body counts as failed, if the step was retried."""
 
 RESTORING_STEPS, CALMING = 20, 0.8
-"""Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
-about itself twice without being inside out anywhere would stay so otherwise."""
+"""Steps in which a failed body moves to its rest shape, and fraction of its vibration kept in each. It also
+restores bodies that are twisted by two turns without an inverted tetrahedron."""
 
 FADING = 20.0
-"""At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
-out would keep each other trembling otherwise, light ones for seconds."""
+"""Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Inverted slivers would
+otherwise make each other vibrate, light ones for seconds."""
 
 STEP_MARGIN = 0.9
-"""Square of the substep that is chosen for a deformed body over that of its own limit, as estimated here."""
+"""Square of the substep chosen for a deformed body over its estimated stability limit."""
 
 MAX_REFINEMENT = 4.0
-"""Substeps over those at rest, at most: shorter ones are left to attempts."""
+"""Number of substeps over that at rest, at most. Shorter substeps are left to retries."""
 
 RELAXING = 0.8
-"""Part of the additional substeps that remains at each look after the shape needs them no more."""
+"""Fraction of the additional substeps that remains at each check after the shape no longer needs them."""
 
 FLAT = 1e-5
-"""Volume over that at rest, from which down a tetrahedron counts as caught."""
+"""Volume over that at rest, below which a tetrahedron counts as inverted."""
 
 
 @ti.func
 def _is_inverted(state: ti.template(), positions: ti.template(), block, lane):
-    """Whether a tetrahedron is flat or inside out (1)."""
+    """1 if a tetrahedron is flat or inverted."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
-    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
+    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the padding of the last block
     return int(inverse != 0.0) & int(determinant(B) * inverse < FLAT)
 
 
@@ -72,11 +72,11 @@ def _count_inverted(state: ti.template(), positions: ti.template(), body):
 
 @ti.func
 def _stiffness_of(state: ti.template(), block, lane):
-    """The square of a tetrahedron's highest frequency from its resistance to a change of volume [1/s^2].
+    """Square of a tetrahedron's highest frequency due to its resistance to a change of volume [1/s^2].
 
     In stable neo-Hookean material that force is (lambda + 5/6 mu) (J - a) dV/dx, so its stiffness grows with
-    the square of dV/dx, a third of an area vector. A stretched face makes it stiffer at any volume.
-    Returns: it now, and at rest.
+    the square of dV/dx, a third of an area vector. A stretched face therefore makes it stiffer at any volume.
+    Returns: the present value, and that at rest.
     """
     ps = particles_of(state, block, lane)
     inverse = rest_inverse_of(state, block, lane)
@@ -104,7 +104,7 @@ def _stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def _refinement_of(state: ti.template(), body):
-    """Substeps that the present shape of a body asks for, over those at rest: 1 or more."""
+    """Number of substeps that the present shape of a body requires, over that at rest: 1 or more."""
     now, rest = ti.cast(0.0, state.real), ti.cast(1e-30, state.real)
     row, blocks = state.body_blocks[body][0] * LANES, state.body_blocks[body]
     while row < blocks[1] * LANES:
@@ -116,7 +116,9 @@ def _refinement_of(state: ti.template(), body):
 
 @ti.func
 def _needs_rest_shape(state: ti.template(), body):
-    """Whether much was caught before a step that had to be made again, or to which somebody put the body."""
+    """True if many tetrahedra were inverted before a step that was retried, or where the caller placed the
+    body.
+    """
     is_wrecked = False
     if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
         blocks = state.body_blocks[body]
@@ -127,7 +129,7 @@ def _needs_rest_shape(state: ti.template(), body):
 
 @ti.func
 def _best_fit(state: ti.template(), body):
-    """How the rest shape fits best to where a body is.
+    """Find the best fit of the rest shape to the present positions of a body.
 
     Returns: its centre at rest and now [m], and the rotation, as rows.
     """
@@ -155,11 +157,11 @@ def _best_fit(state: ti.template(), body):
 
 @ti.func
 def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all particles of a wreck a part of the way to where they fit best, in the last step all of it.
+    """Move all particles of a failed body part of the way to the best fit, and all of it in the last step.
 
-    Pinned particles stay, and the floor stops the others. Among colliders, which may be in the way, particles
-    get a velocity instead, with which they arrive in the coming step of so many seconds. That step begins by
-    taking its share of this velocity.
+    Pinned particles stay, and the floor stops the others. Among colliders, which can be in the way, particles
+    get a velocity with which they arrive in the coming step of `seconds`. It allows for the damping at the
+    beginning of that step.
     """
     rest, now, rows = _best_fit(state, body)
     particles = state.body_particles[body]
@@ -168,11 +170,11 @@ def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, step
         if state.particle_inv_mass[p] > 0.0:
             r = state.rest_position[p] - rest
             goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
-            way = (goal - state.particle_position[p]) / steps_left
+            displacement = (goal - state.particle_position[p]) / steps_left
             if ti.static(program.has_contact):
-                state.particle_velocity[p] = state.particle_velocity[p] + way / (CALMING * seconds)
+                state.particle_velocity[p] = state.particle_velocity[p] + displacement / (CALMING * seconds)
             else:
-                x = state.particle_position[p] + way
+                x = state.particle_position[p] + displacement
                 if ti.static(program.has_floor):
                     x.z = ti.max(x.z, ti.min(state.floor[None].x, state.particle_position[p].z))
                 state.particle_position[p] = x
@@ -181,7 +183,7 @@ def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, step
 
 @ti.func
 def _recovers(state: ti.template(), program: ti.template(), body):
-    """Whether the law of a body brings back what is inside out (1)."""
+    """1 if the law of a body restores inverted tetrahedra."""
     recovers = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
@@ -191,7 +193,7 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _stiffens(state: ti.template(), program: ti.template(), body):
-    """Whether a body has the law for which `_refinement_of` holds (1)."""
+    """1 if `_refinement_of` applies to the law of a body."""
     stiffens = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.has_energy and model.flips == Flips.RECOVER):
@@ -201,10 +203,10 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def kept_while_inverted(state: ti.template(), body, h, is_first):
-    """Part of its vibration that a body of which some is caught keeps in a substep of `h` [s].
+    """Fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h` [s].
 
-    In every substep: vibrations of twice the period of the steps never moved at their beginning, and went on
-    for ever when they were damped there only. A wreck is damped in the first substep of each step.
+    It is damped in every substep: at the beginning of steps only, vibrations of twice the step's period would
+    always be damped at their turning points. A failed body is damped in the first substep of each step.
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
@@ -216,15 +218,15 @@ def kept_while_inverted(state: ti.template(), body, h, is_first):
 
 @ti.real_func
 def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32) -> ti.i32:
-    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back.
+    """At the end of a step of `seconds`, check and restore a body, if its law restores inverted tetrahedra.
 
-    Returns: whether some has been caught for so long that the body is to be reported (1).
+    Returns: 1 if it has had inverted tetrahedra for so long that it must be reported.
     """
     is_reported = 0
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
         age = ti.max(before, -RESTORING_STEPS - 1) + 1
-        if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
+        if before >= 0 or before == PLACED:  # a restoration that has begun is completed
             if _needs_rest_shape(state, body):
                 age = -RESTORING_STEPS
             elif before == PLACED:
