@@ -15,7 +15,7 @@ from taichi_soft.contact.kernels.candidates import (
     record_lost,
 )
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import is_held
+from taichi_soft.contact.kernels.hull_points import is_held
 from taichi_soft.contact.kernels.parting import are_parting
 from taichi_soft.contact.kernels.vertex_grid import (
     MAX_QUERY_EDGES,

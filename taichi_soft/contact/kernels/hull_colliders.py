@@ -13,7 +13,7 @@ from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, first_touch
 from taichi_soft.contact.hull_fields import TOUCHES
 from taichi_soft.contact.kernels.collide import in_frame
-from taichi_soft.contact.kernels.hull import (
+from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_at,
     mark_touched,

@@ -4,7 +4,7 @@ A particle is a point that carries itself. Corners of one triangle can share car
 also moves the others, by `HullFields.slot_mobility`.
 """
 
-from taichi_soft.contact.kernels.hull import (
+from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_at,
     mark_touched,

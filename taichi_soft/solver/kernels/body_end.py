@@ -5,7 +5,7 @@ from taichi_soft.bodies.kernels.plasticity import flow_body
 from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
 from taichi_soft.contact.kernels.candidates import clear_candidates
 from taichi_soft.contact.kernels.collide import clear_contacts
-from taichi_soft.contact.kernels.hull import place_points
+from taichi_soft.contact.kernels.hull_points import place_points
 from taichi_soft.control.kernels.drives import apply_external_forces
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.math.rows import row_behind

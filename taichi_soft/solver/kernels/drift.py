@@ -2,8 +2,8 @@
 
 from taichi_soft.bodies.kernels.particles import highest_speed
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
-from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
+from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind

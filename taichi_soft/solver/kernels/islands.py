@@ -7,7 +7,7 @@ stays clear of all others is an island of its own.
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import motion_of
+from taichi_soft.contact.kernels.hull_points import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti

@@ -4,7 +4,7 @@ In between, joints and contact between bodies change velocities island by island
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.contact.kernels.hull import update_points
+from taichi_soft.contact.kernels.hull_points import update_points
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened

@@ -2,7 +2,7 @@
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.hull import has_hull, place_points
+from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
