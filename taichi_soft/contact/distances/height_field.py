@@ -5,7 +5,7 @@ away they are lower bounds, so that a ray can advance by them on ground of any s
 """
 
 from taichi_soft.contact.distances.direction import length_and_direction
-from taichi_soft.contact.distances.triangle import nearest_on_triangle
+from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 NEAREST = 1e-3

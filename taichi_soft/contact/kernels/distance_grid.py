@@ -1,6 +1,6 @@
 """Signed distance of a closed mesh on the nodes of a grid. Unit: cells; node (i, j, k) is at (i, j, k)."""
 
-from taichi_soft.contact.distances.triangle import nearest_on_triangle
+from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 STEPS = 4096
