@@ -3,9 +3,9 @@
 from taichi_soft.contact.distances.box import box_distance
 from taichi_soft.contact.distances.capsule import capsule_distance
 from taichi_soft.contact.distances.height_field import height_field_distance
-from taichi_soft.contact.distances.kinds import ShapeKind
 from taichi_soft.contact.distances.mesh import mesh_distance
 from taichi_soft.contact.distances.plane import plane_distance
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.distances.sphere import sphere_distance
 from taichi_soft.core.runtime import ti
 

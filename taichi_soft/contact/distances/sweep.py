@@ -5,7 +5,7 @@ is clear of the solid if it ends in front of it.
 """
 
 from taichi_soft.contact.distances.distance import signed_distance
-from taichi_soft.contact.distances.kinds import CONVEX
+from taichi_soft.contact.distances.shape_kind import CONVEX
 from taichi_soft.core.runtime import ti
 
 TOUCHING = 1e-5

@@ -1,7 +1,7 @@
 """Collide the particles of one body with the colliders, in one thread."""
 
 from taichi_soft.contact.distances.distance import signed_distance
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import SEAM, Shape, Triangles, about_origin, as_length, triangles_of
 from taichi_soft.core.checks import as_array
 from taichi_soft.core.serialisation import serialised

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.closed_mesh import ClosedMesh, closed_mesh
 from taichi_soft.contact.shapes.distance_grid import Grid, distance_grid, grid_around
 from taichi_soft.contact.shapes.grid_cache import grid_key, read_grid, write_grid

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length
 from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import OptionError

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.core.checks import as_number
 from taichi_soft.meshing.arrays import read_only
 
