@@ -2,9 +2,9 @@
 
 from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
 from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.integrators.lazy_leapfrog import LAZY_LEAPFROG
 from taichi_soft.solver.integrators.leapfrog import LEAPFROG
-from taichi_soft.solver.integrators.model import IntegratorModel
 
 __all__ = ["INTEGRATORS", "IntegratorModel"]
 

@@ -2,8 +2,8 @@
 
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import add_forces, any_shape, before_each, whole_substep
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.integrators.leapfrog import advance
-from taichi_soft.solver.integrators.model import IntegratorModel
 from taichi_soft.solver.kernels.kick import kick_by_forces
 
 LAZY_LEAPFROG = IntegratorModel(

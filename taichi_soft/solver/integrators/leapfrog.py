@@ -8,7 +8,7 @@ same time; and (h_old + h) / 2 when the substep changes.
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import add_forces, any_shape
-from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.kernels.kick import kick_by_forces
 
 
