@@ -7,7 +7,7 @@ import numpy as np
 from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.constants import LANES
-from taichi_soft.solver.kernels.failures import find_failed_element
+from taichi_soft.solver.kernels.failed_element import find_failed_element
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
