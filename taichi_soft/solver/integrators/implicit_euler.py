@@ -9,8 +9,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import before_each
 from taichi_soft.solver.integrators.integrator_model import IntegratorModel
-from taichi_soft.solver.kernels.implicit_euler import MAX_PIECES, keeps_shape, slow_down
 from taichi_soft.solver.kernels.implicit_kick import kick_implicitly
+from taichi_soft.solver.kernels.implicit_solve import MAX_PIECES, keeps_shape, slow_down
 
 
 @ti.func

@@ -8,7 +8,7 @@ from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.held_particles import constrain_particle, held_velocity
-from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, record_residual, solve_body
+from taichi_soft.solver.kernels.implicit_solve import add_pin_reactions, record_residual, solve_body
 
 
 @ti.func
