@@ -2,7 +2,7 @@
 
 from lab.peers.comparison import Entry, compare, missing_peers
 from lab.peers.drop import Drop
-from lab.peers.measures import measure
+from lab.peers.drop_measures import measure
 from lab.peers.registry import PEERS
 from lab.peers.trajectory import Trajectory
 

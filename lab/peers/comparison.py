@@ -10,7 +10,7 @@ import numpy as np
 from lab.extras import missing_packages
 from lab.peers import ours
 from lab.peers.drop import Drop
-from lab.peers.measures import Outcome, measure
+from lab.peers.drop_measures import Outcome, measure
 from lab.peers.reference import simulate_reference
 from lab.peers.registry import PEERS
 from lab.peers.trajectory import Progress, Trajectory
