@@ -21,7 +21,7 @@ from taichi_soft.profiling import (
     measure_moments,
     scaling,
 )
-from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.spread import Spread
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
