@@ -16,10 +16,10 @@ from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_linear
 from taichi_soft.render.floor_tiles import FloorTiles
+from taichi_soft.render.frame_arrays import SceneArrays
 from taichi_soft.render.look import Look
 from taichi_soft.render.occlusion import REACH, Occlusion
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
-from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
