@@ -153,7 +153,7 @@ def found_in(modules, rule):
 
 def test_there_is_something_to_check():
     assert {"taichi_soft.world.world", "taichi_soft.elements.laws", "engine_adapter.adapter"} <= set(FILES)
-    assert "taichi_soft.elements.laws.model" in IMPORTS["taichi_soft.elements.kernels.elastic"]
+    assert "taichi_soft.elements.laws.force_model" in IMPORTS["taichi_soft.elements.kernels.elastic"]
     assert "taichi_soft.bodies.law_program" in IMPORTS["taichi_soft.solver.program"]
 
 
