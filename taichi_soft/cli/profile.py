@@ -94,7 +94,7 @@ def profile(
         return
     where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
     say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
-    for title, table in report.tables(found):
+    for title, table in profile_tables.tables(found):
         say(f"\n[bold]{escape(title)}[/]")  # a table wraps its own title at the table's width
         console.print(table)
 
