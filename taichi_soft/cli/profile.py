@@ -57,6 +57,7 @@ def profile(
     """Measure the cost of a frame, and how many bodies fit a frame at 60 Hz and 120 Hz."""
     device = init(arch, threads, _cores_of(cores))
     from taichi_soft import profiling
+    from taichi_soft.profiling import profile_tables
 
     library = profiling.compile_baseline() if baseline else None
     with errors.status("measuring frames") as status:
