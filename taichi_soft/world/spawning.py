@@ -199,7 +199,7 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
-        else:  # a snapshot may have restored an earlier body here, cut or at another level
+        else:  # the slot can hold data of a restored body that was cut or had another level
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return make_handle(context, asset)
