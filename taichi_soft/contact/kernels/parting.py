@@ -27,7 +27,7 @@ OUTSET = 0.5
 penetration to correct."""
 
 PULL = 0.05
-"""Fraction by which the corners of a triangle are moved to its centre for the overlap test."""
+"""Fraction by which the corners of a triangle are moved towards its centre for the overlap test."""
 
 SAME_PLACE = 1e-3
 """Distance of two centres, over the largest side, below which the slots choose the direction."""

@@ -61,7 +61,7 @@ def _solve_symmetric(rows: ti.template(), b):
 
 @ti.func
 def _kicked_velocity(state: ti.template(), p, gravity, kick):
-    """Velocity of a particle after a kick of the forces [s], in m/s; a pinned one keeps its own."""
+    """Velocity of a particle after its forces have acted for `kick` [s], in m/s; a pinned one keeps its own."""
     inv_mass = state.particle_inv_mass[p]
     change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
     return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
@@ -69,12 +69,12 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 @ti.func
 def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
-    """Velocity of a particle after a kick [m/s], with the effect of contact in a substep of `h` [s] if
+    """Velocity of a particle after its forces have acted for `kick` [s], in m/s, and after contact if
     `is_held` is 1.
 
     A particle pressed against something loses the speed that it gains in the kick again. If that counted as
-    vibration, damping would push bodies at rest. The effect of the floor is known beforehand; of other
-    contacts, that of the last substep is assumed.
+    vibration, damping would push bodies at rest. The effect of the floor in a substep of `h` [s] is known
+    beforehand; of other contacts, that of the last substep is assumed.
     """
     velocity = _kicked_velocity(state, p, gravity, kick)
     if is_held == 1:
@@ -99,7 +99,7 @@ def _column_sums(rows: ti.template()):
 
 @ti.func
 def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
-    """Rigid motion of a body after a kick of its forces [s] with contact; `h` and `is_held` as in
+    """Rigid motion of a body after its forces have acted for `kick` [s]; `h` and `is_held` as in
     `felt_velocity`.
 
     Returns: its centre relative to x0 [m], velocity relative to v0 [m/s] and angular velocity [rad/s].
@@ -148,7 +148,10 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
 
 @ti.func
 def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
-    """Scale the vibration of a body after a kick of its forces [s] by `keep`, in a substep of `h` [s]."""
+    """Scale the vibration of a body after its forces have acted for `kick` [s] by `keep`.
+
+    `h` is the length of the substep [s].
+    """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, 1, x0, v0)
@@ -175,7 +178,8 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
 
 @ti.func
 def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
-    """Limit the speed of particles relative to the rigid motion to `farthest` [m/s] after a kick.
+    """Limit the speed of particles relative to the rigid motion to `farthest` [m/s], after forces have acted
+    for `kick` [s].
 
     Momentum and angular momentum are conserved.
     """
