@@ -289,7 +289,7 @@ class Colliders(Slice):
             rows += [rows_of(field)[is_held] for field in hull.held_impulses]
         for row in rows:
             if not np.abs(row).max(initial=0.0) <= MAX_IMPULSE:
-                raise ValueError("particles are out of reach, or not finite")
+                raise ValueError("impulses of contacts are out of range, or not finite")
 
     def restore(self, read: Any) -> None:
         """Replace all colliders by those that were `read`."""

@@ -261,7 +261,9 @@ class Simulation:
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
-                raise OptionError(f"{name} must lie within {limit:g} of zero")
+                raise OptionError(
+                    f"{name} must lie within {limit:g} of zero, got up to {np.abs(rows).max():.4g}"
+                )
         left = self.box_of(body)
         write_motion(self.state, body.index, x, v)
         self.on_placed(body)

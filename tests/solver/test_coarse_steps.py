@@ -1,4 +1,4 @@
-"""Steps that are too coarse: made again, finer, in every world; and how many substeps a world may take."""
+"""Steps that are too coarse are retried with smaller substeps in every world; the limit of substeps."""
 
 import warnings
 

@@ -23,7 +23,7 @@ OPTIONS = {
 
 
 def fallen(options):
-    """A heap, and a cube so torn that its steps fail and are made again."""
+    """A heap, and a cube so torn that its steps fail and are retried."""
     world = World(**options)
     for i in range(3):
         world.add_body(CUBE if i % 2 else BALL, MATERIAL, position=(0.1 * i, 0.05 * i, 0.5 + 0.6 * i))
