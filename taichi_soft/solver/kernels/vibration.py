@@ -61,7 +61,7 @@ def _solve_symmetric(rows: ti.template(), b):
 
 @ti.func
 def _kicked_velocity(state: ti.template(), p, gravity, kick):
-    """Velocity of a particle after its forces have acted for `kick` [s], in m/s; unchanged if it is pinned."""
+    """Velocity [m/s] of a particle after its forces have acted for `kick` [s]; a pinned one keeps its own."""
     inv_mass = state.particle_inv_mass[p]
     change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
     return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
