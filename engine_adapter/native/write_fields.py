@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from taichi_soft.bodies import status
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
 from taichi_soft.control.embedding import FARTHEST

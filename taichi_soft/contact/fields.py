@@ -43,7 +43,7 @@ MAX_PARTNERS = 32
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
-MOST_IMPULSE = 1e30
+MAX_IMPULSE = 1e30
 """Largest impulse of a contact that a snapshot may have [N s]."""
 
 
@@ -193,8 +193,8 @@ class SoftContactFields(FieldGroup):
     slot_levers = declare(OUTER, ti.f32, (3, 3), each=SLOTS)
     # The contact with the largest normal impulse on a particle at the end of the last step; 0 for none.
     kept_triangle = declare(PARTICLE, ti.i32, keep=PARTICLE)
-    kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MOST_IMPULSE)
-    kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MOST_IMPULSE)
+    kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MAX_IMPULSE)
+    kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MAX_IMPULSE)
     records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the rows below are filled
     # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
     pair_bodies = declare(BODY, ti.i32, 2, each=PAIR_ROWS, start=0)

@@ -76,7 +76,7 @@ class Frames(Slice):
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
         self.past, self.present = self.present, self.coming.copy()
 
-    def way(self, body: SoftBody) -> float:
+    def displacement(self, body: SoftBody) -> float:
         """Largest distance that frames moved a particle in the last, undone step [m]."""
         x, longest = body.positions().astype(np.float64), 0.0
         for each in self.holding(body):

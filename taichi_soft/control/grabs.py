@@ -104,7 +104,7 @@ class Grabs(Numbered[Grab]):
 
     name = "grabs"
     prevents_levels = False  # see `hold_at`
-    most, way_out = MOST_GRABS, "release"
+    most, advice_verb = MOST_GRABS, "release"
 
     def release_body(self, body: SoftBody) -> None:
         """Release all grabs of a body."""

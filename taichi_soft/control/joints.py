@@ -109,7 +109,7 @@ class Joints(Numbered[Joint]):
     """All joints of one world, by number."""
 
     name = "joints"
-    most, way_out = MOST_JOINTS, "release"
+    most, advice_verb = MOST_JOINTS, "release"
 
     @property
     def rows_in_use(self) -> int:

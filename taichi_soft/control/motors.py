@@ -157,7 +157,7 @@ class Motors(Numbered[Motor]):
     """All motors of one world, by number."""
 
     name = "motors"
-    most, way_out = MOST_MOTORS, "remove"
+    most, advice_verb = MOST_MOTORS, "remove"
 
     @property
     def rows_in_use(self) -> int:

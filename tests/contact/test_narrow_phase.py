@@ -5,7 +5,7 @@ import pytest
 
 from taichi_soft import Contact, Material, TetMesh, World, box
 from taichi_soft.contact.fields import SLOTS
-from taichi_soft.contact.kernels.narrow_phase import find_gaps
+from taichi_soft.contact.kernels.narrow_phase import find_contacts
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
@@ -18,7 +18,7 @@ BODY = 3  # whose vertex it is; the triangles belong to those before it
 def find(state: ti.template(), body: ti.i32):
     ti.loop_config(serialize=True)
     for _ in range(1):
-        find_gaps(state, body, 0.0, 1 / 600)
+        find_contacts(state, body, 0.0, 1 / 600)
 
 
 class Candidates:

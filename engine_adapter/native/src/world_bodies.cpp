@@ -14,7 +14,7 @@ constexpr ts_body kBody = uint64_t(3) << 56;  // prefix of body handles
 
 ts_body World::body_in(int32_t slot) const {
   if (slot < 0 || slot >= scene_->slot_count) {
-    fail(TS_ERROR_ARGUMENT, "slot is %d: there are %d, from 0", slot, scene_->slot_count);
+    fail(TS_ERROR_ARGUMENT, "slot %d does not exist (%d in all, numbered from 0)", slot, scene_->slot_count);
   }
   return fields_.body_status(slot) == kAbsent ? 0 : kBody | ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
 }
@@ -94,7 +94,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
 ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift,
                      const Vector& spin) {
   if (asset < 0 || size_t(asset) >= scene_->assets.size()) {
-    fail(TS_ERROR_ARGUMENT, "asset is %d: there are %zu, from 0", asset, scene_->assets.size());
+    fail(TS_ERROR_ARGUMENT, "asset %d does not exist (%zu in all, numbered from 0)", asset, scene_->assets.size());
   }
   int32_t slot = 0;
   while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || fields_.body_status(slot) != kAbsent)) ++slot;
@@ -202,7 +202,8 @@ std::vector<int32_t> World::checked(int32_t slot, Vertices which, bool may_be_al
   }
   found.assign(which.numbers, which.numbers + which.count);
   for (int32_t vertex : found) {
-    if (vertex < 0 || size_t(vertex) >= n) fail(TS_ERROR_ARGUMENT, "there is no vertex %d: there are %zu", vertex, n);
+    if (vertex < 0 || size_t(vertex) >= n)
+      fail(TS_ERROR_ARGUMENT, "vertex %d does not exist (%zu in all, numbered from 0)", vertex, n);
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());

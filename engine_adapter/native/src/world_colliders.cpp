@@ -5,7 +5,7 @@ namespace taichi_soft {
 
 Collider& World::collider(int32_t number) {
   if (number < 0 || size_t(number) >= colliders_.rows.size() || !colliders_.rows[size_t(number)].is_alive) {
-    fail(TS_ERROR_ARGUMENT, "there is no collider %d: there are %zu, from 0", number, colliders_.rows.size());
+    fail(TS_ERROR_ARGUMENT, "collider %d does not exist (%zu in all, numbered from 0)", number, colliders_.rows.size());
   }
   return colliders_.rows[size_t(number)];
 }

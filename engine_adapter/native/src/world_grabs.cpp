@@ -36,7 +36,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   const Asset& asset = asset_of(slot);
   if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to grab", slot);
   if (triangle < 0 || size_t(triangle) >= asset.surface.count / 3) {
-    fail(TS_ERROR_ARGUMENT, "triangle is %d: there are %zu, from 0", triangle, asset.surface.count / 3);
+    fail(TS_ERROR_ARGUMENT, "triangle %d does not exist (%zu in all, numbered from 0)", triangle, asset.surface.count / 3);
   }
   double sum = 0.0, weights[3];
   for (int i = 0; i < 3; ++i) sum = sum + given[i];

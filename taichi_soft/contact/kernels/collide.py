@@ -1,8 +1,8 @@
-"""Particles of one body against the colliders, in one thread."""
+"""Collide the particles of one body with the colliders, in one thread."""
 
 from taichi_soft.contact.distances.distance import signed_distance
-from taichi_soft.contact.distances.kinds import ShapeKind
-from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
+from taichi_soft.contact.distances.shape_kind import ShapeKind
+from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.contact.kernels.restitution import resolved_velocity
@@ -10,31 +10,32 @@ from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-MOST_TOUCHES = 4
-"""Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
+MAX_TOUCHES = 4
+"""Colliders that one particle can touch in turn within a substep; then it stops."""
 
 
 DEEP = 2.0
-"""Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
-inside of it are looked at as well: a blow drives them through those that have stopped."""
+"""Path of a body's fastest particle in the rest of the step, in mean edges, above which inner particles are
+checked too. Hard impacts drive them past outer particles that were stopped."""
 
 UNSEEN = 1e30
-"""Clearance of particles inside of a body, where it is slow [m]."""
+"""Clearance [m] of inner particles that need no check."""
 
 
 @ti.func
 def in_frame(contact: ti.template(), c, x, time):
-    """A point in the frame that a collider has `time` [s] after the start of the step."""
+    """A point in the frame of a collider `time` [s] after the start of the step."""
     position = contact.collider_position[c] + contact.collider_velocity[c] * time
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
 @ti.func
 def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
-    """Lower the clearance of particles to that from one collider, less what it may come nearer [m].
+    """Reduce the clearance of particles to that from one collider, minus the distance it can approach [m].
 
     Args:
-        first, end: rows of outer particles where `outer_only` is 1, otherwise particles.
+        first, end: rows of outer particles if `outer_only` is 1, otherwise particles.
+        since, left: time since the start of the step, and until its end [s].
     """
     contact = state.contact
     kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
@@ -42,7 +43,7 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
     position = contact.collider_position[c] + contact.collider_velocity[c] * since
     rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
     margin = contact.collider_surface[c].z + contact.collider_speed[c] * left
-    # Most bodies are near the floor, a plane: its distance takes a few instructions.
+    # Fast path for planes: most bodies are near the floor only.
     plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
     is_plane = kind == ShapeKind.PLANE
     for k in range(first, end):
@@ -59,9 +60,9 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
 
 @ti.func
 def _stays_clear(contact: ti.template(), c, lower, upper, since, left):
-    """True if a collider keeps away from a box until the end of the step.
+    """True if a collider stays clear of a box until the end of the step.
 
-    Also for planes, whose own boxes have no end. No distance function returns more than the distance.
+    This also works for planes, whose own boxes are infinite. Distance functions are lower bounds.
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
     distance = distance_from(contact, c, in_frame(contact, c, center, since))
@@ -70,7 +71,7 @@ def _stays_clear(contact: ti.template(), c, lower, upper, since, left):
 
 @ti.real_func
 def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
-    """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
+    """List the colliders within `reach` [m] of a body's particles, and each particle's clearance from them.
 
     Args:
         since, left: time since the start of the step, and until its end [s].
@@ -112,12 +113,12 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
     """Store the clearance of each particle from the first `count` near colliders, 1 or more.
 
-    Planes stop all particles: inner ones of a body that folds would otherwise go below the floor.
+    Planes stop all particles: otherwise inner particles of a body that folds could go below the floor.
     """
     contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
         contact.particle_clearance[p] = UNSEEN
-    touches_by_points = False  # of its hull, and by no particle
+    touches_by_points = False  # of its hull, not by particles
     if ti.static(state.capacity.contact.hull):
         touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
     if is_deep and not touches_by_points:
@@ -125,7 +126,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
             if contact.collider_kind[contact.near[row + i]] != ShapeKind.PLANE:
                 _measure_clearance(state, contact.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
-            if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
+            if contact.particle_clearance[p] < 0.0:  # it entered unchecked: do not eject it at once
                 contact.particle_clearance[p] = UNSEEN
     for k in range(outer[0], outer[1]):
         contact.particle_clearance[state.touching.outer_particle[k]] = reach
@@ -138,8 +139,8 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
 
 
 @ti.real_func
-def forget_contacts(state: ti.template(), body: ti.i32):
-    """Start a step: no impulses yet, and where there is any collider, nobody knows which are near."""
+def clear_contacts(state: ti.template(), body: ti.i32):
+    """Clear the impulses of the last step and the list of near colliders."""
     row = body * state.contact.capacity.colliders
     while row < (body + 1) * state.contact.capacity.colliders:
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
@@ -154,28 +155,29 @@ def forget_contacts(state: ti.template(), body: ti.i32):
 
 @ti.func
 def collide_particle(state: ti.template(), body, p, h, since):
-    """Collide a particle on the way that its velocity has moved it in a substep.
+    """Collide a particle on the path that its velocity has just moved it along.
 
-    A particle that touches nothing is not written: the result does not depend on which colliders are listed.
+    A particle that touches nothing is not written, so the result does not depend on which colliders are
+    listed.
     Args:
         h: substep [s].
         since: time from the start of the fixed step to that of the substep [s].
     """
     v = state.particle_velocity[p]
-    way = h * v
-    x = state.particle_position[p] - way
+    path = h * v
+    x = state.particle_position[p] - path
     row = body * state.contact.capacity.colliders
-    left = ti.cast(1.0, ti.f32)  # part of the substep still to go
+    left = ti.cast(1.0, ti.f32)  # fraction of the substep that remains
     touches, is_open = 0, 1
     while is_open == 1:
-        earliest, which = ti.cast(NEVER, ti.f32), -1
+        earliest, which = ti.cast(NO_TOUCH, ti.f32), -1
         distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
-        # After a touch the path lies in the surface to rounding, which is no second touch.
+        # After a touch, the path lies in the surface up to rounding: that is no second touch.
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.contact.near_count[body]):
             c = state.contact.near[row + k]
             a = in_frame(state.contact, c, x, since + (1.0 - left) * h)
-            b = in_frame(state.contact, c, x + way, since + h)
+            b = in_frame(state.contact, c, x + path, since + h)
             part, near, far, n = first_touch(state.contact, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
@@ -187,30 +189,32 @@ def collide_particle(state: ti.template(), body, p, h, since):
             centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
             spin = state.contact.collider_spin[c]
             n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
-            place = x + way - beyond * n
+            place = x + path - beyond * n
             surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
             surface = state.contact.collider_surface[c]
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
-            push = v_out - v
+            change = v_out - v
             left = left * (1.0 - earliest)
             rest = ti.select(rests_at(distance), distance, 0.5 * TOUCHING)
             lift = ti.max(rest - distance, 0.0)
-            before = x + way
-            x += earliest * way + lift * n
-            # What contact takes from the velocity it takes from the way left.
-            way = (1.0 - earliest) * way + (rest - beyond - lift) * n + left * h * (push - n * push.dot(n))
+            before = x + path
+            x += earliest * path + lift * n
+            # Contact shortens the remaining path as it reduces the velocity.
+            path = (
+                (1.0 - earliest) * path + (rest - beyond - lift) * n + left * h * (change - n * change.dot(n))
+            )
             touches += 1
-            if touches == MOST_TOUCHES:
-                way = ti.Vector.zero(ti.f32, 3)
+            if touches == MAX_TOUCHES:
+                path = ti.Vector.zero(ti.f32, 3)
                 is_open = 0
-            end = x + way
+            end = x + path
             mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
-            impulse = -mass * push
+            impulse = -mass * change
             if surface.y >= 0.0:
                 add_normal_impulse(
                     state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
                 )
-            # With what the shift of the path, which v takes no part in, does to the angular momentum.
+            # The path also shifts without a change of v; that changes the angular momentum.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
             state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
             state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
@@ -220,5 +224,5 @@ def collide_particle(state: ti.template(), body, p, h, since):
                     state.particle_contact[p] = c + 1
             v = v_out
     if touches > 0:
-        state.particle_position[p] = x + way
+        state.particle_position[p] = x + path
         state.particle_velocity[p] = v

@@ -1,10 +1,10 @@
-"""What the caller says of colliders, into their fields."""
+"""Write the callers' colliders to their fields, and read impulses."""
 
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 20
-"""Position, quaternion, velocity, spin, both corners of the box round the way, highest speed."""
+"""Position, quaternion, velocity, angular velocity, both corners of the swept box, highest speed."""
 
 
 @ti.func
@@ -14,7 +14,7 @@ def _vector(rows: ti.template(), c, at):
 
 @ti.kernel
 def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Where all colliders are and how they move, rows (n, `MOTION_WIDTH`)."""
+    """Write poses and motion of all colliders from rows (n, `MOTION_WIDTH`)."""
     c = 0
     while c < rows.shape[0]:
         contact.collider_position[c] = _vector(rows, c, 0)
@@ -29,7 +29,7 @@ def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=t
 
 @ti.kernel
 def write_samples(contact: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """The grid of one solid, from row `begin` on."""
+    """Write the grid of one solid from row `begin` on."""
     for i in range(samples.shape[0]):
         contact.samples[begin + i] = samples[i]
 
@@ -38,7 +38,7 @@ def write_samples(contact: ti.template(), begin: ti.i32, samples: ti.types.ndarr
 def sum_collider_impulses(
     contact: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Impulse and angular impulse of the last step on each collider by all bodies, (n, 6) [N s, N m s]."""
+    """Sum the impulses of all bodies on each collider in the last step, (n, 6) [N s, N m s]."""
     ti.loop_config(serialize=True)
     for c in range(out.shape[0]):
         linear, angular = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
@@ -55,7 +55,7 @@ def sum_collider_impulses(
 
 @ti.kernel
 def forget_collider(contact: ti.template(), body_count: ti.i32, c: ti.i32):
-    """Clear what bodies gave a collider and how fast they may leave it: its row is another collider's now."""
+    """Clear the impulses and rebound speeds of a row before another collider uses it."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
         row = body * contact.capacity.colliders + c

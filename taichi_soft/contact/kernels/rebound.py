@@ -1,9 +1,9 @@
-"""Restitution of a whole body: how fast its centre of mass leaves a collider, at most.
+"""Restitution of a whole body: limit the speed at which its centre of mass leaves a collider.
 
-An elastic body stores the energy of an impact and gives it back, whatever becomes of the vertices that touch.
-So Newton's law holds for the centre of mass: from a collider that it came near with a speed v, it goes away
-with e v. What contact would give beyond that is taken off again, the same change of velocity for all of the
-body, and never more than contact gave: a collider does not pull.
+An elastic body stores the energy of an impact and returns it, independently of the contact law of the
+vertices. So Newton's law of restitution is applied to the centre of mass: a body that approaches a collider
+with speed v leaves it with e v. Any excess is removed by the same change of velocity for all particles, but
+never by more than contact has added: a collider does not pull.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
@@ -12,12 +12,12 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 LEAST_REBOUND = 0.1
-"""Speed [m/s] that is always left to the centre of mass: a body that was pressed flat rises again."""
+"""Speed [m/s] that the centre of mass always keeps, so that a flattened body rises again."""
 
 
 @ti.func
 def begin_rebounds(state: ti.template(), body):
-    """Before the impulses of the last step are cleared: contacts that ended in it are over."""
+    """Reset the rebound speeds of contacts that ended, before the impulses of the last step are cleared."""
     row = body * state.contact.capacity.colliders
     while row < (body + 1) * state.contact.capacity.colliders:
         lasts = ti.abs(state.contact.impulse[row]).max() > 0.0
@@ -28,8 +28,8 @@ def begin_rebounds(state: ti.template(), body):
 
 
 @ti.func
-def take_back_rebounds(state: ti.template(), body):
-    """The step is made again."""
+def restore_rebounds(state: ti.template(), body):
+    """Restore the rebound speeds before a step is retried."""
     row = body * state.contact.capacity.colliders
     while row < (body + 1) * state.contact.capacity.colliders:
         state.contact.rebound[row] = state.contact.prev_rebound[row]
@@ -38,11 +38,12 @@ def take_back_rebounds(state: ti.template(), body):
 
 @ti.func
 def add_normal_impulse(contact: ti.template(), row, normal_impulse, normal, before, surface):
-    """Note how a collider pressed a particle.
+    """Accumulate the normal impulse of a collider on a particle, for the restitution of the body.
 
     Args:
         normal_impulse: impulse along the normal [N s].
-        before, surface: velocities along the normal, of the particle until then and of the surface [m/s].
+        before, surface: velocities along the normal, of the particle before the impulse and of the surface
+            [m/s].
     """
     contact.normal_impulse[row] = contact.normal_impulse[row] + normal_impulse * normal
     rates = ti.Vector([normal_impulse, normal_impulse * surface, normal_impulse * (surface - before)])
@@ -51,7 +52,7 @@ def add_normal_impulse(contact: ti.template(), row, normal_impulse, normal, befo
 
 @ti.func
 def _momentum_along(state: ti.template(), first, end, n):
-    """Mass [kg] of particles that move, and their momentum along `n` [kg m/s]."""
+    """Mass [kg] of the free particles, and their momentum along `n` [kg m/s]."""
     masses, momenta = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
     for block in range((end - first + LANES - 1) // LANES):
         row = (first + block * LANES) & ROW_BITS
@@ -65,10 +66,10 @@ def _momentum_along(state: ti.template(), first, end, n):
 
 @ti.func
 def limit_rebounds(state: ti.template(), body, time):
-    """Take from a body what the presses of a substep give its centre of mass beyond the restitution.
+    """Remove the velocity of the centre of mass beyond the restitution, after the collisions of a substep.
 
     Args:
-        time: since the start of the fixed step [s].
+        time: time since the start of the fixed step [s].
     """
     particles = state.body_particles[body]
     first = body * state.contact.capacity.colliders
@@ -84,7 +85,7 @@ def limit_rebounds(state: ti.template(), body, time):
             approach = normal_impulse / mass - speed
             leave = state.contact.rebound[row]
             if leave == 0.0:
-                # Where a body strikes because it turns, its centre may leave though it did not come near.
+                # If a rotating body strikes, its centre can move away without having approached.
                 leave = ti.max(LEAST_REBOUND, rates.z / rates.x - approach)
             if approach > RESTITUTION_SPEED:
                 leave = ti.max(leave, state.contact.collider_surface[c].y * approach)

@@ -1,30 +1,31 @@
-"""Islands: bodies that may touch each other in a step or are joined, directly or through others.
+"""Islands: bodies that can touch each other in a step or are joined, directly or through others.
 
-One thread owns an island, so that what passes between its bodies has one order (see `jobs.py`). A body
-that stays clear of all others is an island of its own.
+One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
+stays clear of all others is an island of its own.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import motion_of
+from taichi_soft.contact.kernels.hull_points import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-SPARE = 0.25
-"""Mean edges by which bodies may come nearer than their velocities say, and still be in one island."""
+ISLAND_MARGIN = 0.25
+"""Distance, in mean edges, by which bodies can come closer than their velocities predict and still be in one
+island."""
 
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Box round each body's surface and its way through a step of `dt` [s]; of absent ones far away."""
+    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Absent bodies get a far one."""
     for body in range(body_count):
         if state.body_status[body] == ABSENT:
             state.contact.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
         if state.body_status[body] == ASLEEP:
-            continue  # in the box that it fell asleep in
+            continue  # it keeps its box
         outer = state.touching.body_outer[body]
         p = state.touching.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
@@ -42,9 +43,9 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
         surface = state.soft.body_surface[body]
-        # What its parts do beside each other, they may do otherwise before the step is over.
+        # Relative motion of its parts can change direction within the step.
         fall = gravity_on(state, body).norm() * dt * dt
-        reach = 0.5 * (fast - slow) * dt + fall + surface.y + SPARE * surface.z
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.contact.body_lower[body] = lower - reach
         state.contact.body_upper[body] = upper + reach
 
@@ -106,18 +107,18 @@ def _join_held(state: ti.template()):
 
 @ti.func
 def _is_listed(state: ti.template(), body, end):
-    """Whether a body, whose parent is the root, and its root have a status before `end`."""
+    """1 if a body, whose parent is the root, and its root have a status below `end`."""
     root = state.contact.parent[body]
     return int(state.body_status[body] < end) & int(state.body_status[root] < end)
 
 
 @ti.func
 def _list_islands(state: ti.template(), body_count, end):
-    """Bodies of a status before `end`, island by island, both in ascending order: a counting sort."""
+    """List the bodies with a status below `end` by island, both in ascending order: a counting sort."""
     contact = state.contact
     islands = 0
     for body in range(body_count):
-        # No parent has a larger number than its child: the parent's parent is the root already.
+        # A parent's number never exceeds its child's, so its parent is already the root.
         root = contact.parent[contact.parent[body]]
         contact.parent[body] = root
         if _is_listed(state, body, end):
@@ -146,7 +147,7 @@ def _list_islands(state: ti.template(), body_count, end):
 
 @ti.real_func
 def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
-    """Find which bodies may touch within a step of `dt` [s], and list them."""
+    """Find and list the islands of a step of `dt` [s]."""
     body = 0
     while body < body_count:
         state.contact.parent[body] = body
@@ -161,7 +162,7 @@ def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 
 @ti.kernel
 def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """In which island each body was in the last step."""
+    """Read the island of each body in the last step."""
     ti.loop_config(serialize=True)
     for body in range(islands.shape[0]):
         islands[body] = state.contact.body_island[body]
@@ -169,10 +170,10 @@ def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, n
 
 @ti.kernel
 def list_joined_islands(state: ti.template(), body_count: ti.i32):
-    """The islands where bodies do not touch each other: what joints make of them, until those change."""
+    """List the islands of joints in a world whose bodies do not touch each other, until the joints change."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         for body in range(body_count):
             state.contact.parent[body] = body
         _join_held(state)
-        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, where bodies may come any time
+        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, which can be filled at any time
