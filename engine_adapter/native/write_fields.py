@@ -71,7 +71,7 @@ ENUMS = {
     "GridShapes": {"HEIGHT_FIELD": ShapeKind.HEIGHT_FIELD, "MESH_SHAPE": ShapeKind.MESH},
 }
 
-COUNTS = {WORLD: "1", BODY: "bodies", PARTICLE: "particles", COLLIDER: "colliders"}
+COUNTS = {WORLD: "1", BODY: "bodies", PARTICLE: "particles", COLLIDER: "collider_room"}
 """Numbers of rows, by what a field has rows for."""
 
 CONDITIONS = {
@@ -141,7 +141,7 @@ struct Fields {{
 {"".join(_members())}
   Fields() = default;
   // Fails if a field is missing, or too short.
-  Fields(char* root, const Scene& scene, size_t colliders) {{
+  Fields(char* root, const Scene& scene, size_t collider_room) {{
     const size_t bodies = size_t(scene.slot_count), particles = size_t(scene.particle_count);
 {"".join(_bindings())}  }}
 }};

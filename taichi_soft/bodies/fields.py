@@ -78,6 +78,10 @@ class BodyFields(FieldGroup):
     particle_reaction = declare(PARTICLE, REAL, 3, unit="N s", keep=PARTICLE, native=True)
     prev_reaction = declare(PARTICLE, REAL, 3, unit="N s")
 
+    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if held in the last substep
+    # Relative to the velocity that its island shares, before contact.
+    particle_speed = declare(PARTICLE, REAL, unit="m/s")
+
     tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
     tet_rest_inverse = declare(  # column by column; it changes only if a body can flow
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
@@ -177,6 +181,10 @@ class BodyFields(FieldGroup):
     # Bounding box at the last query that used it.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
+    # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
+    body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
+    body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
+    body_calm_time = declare(BODY, REAL, unit="s", keep=BODY)  # since it was faster than `sleep_speed`
     body_drives = declare(BODY, ti.i32, start=0, keep=BODY, native=True)  # bits, see `bodies.status`
     body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, most=FINITE, native=True)
     # Rate of damping of velocities relative to the world.
@@ -196,6 +204,7 @@ class BodyFields(FieldGroup):
     retries = declare(WORLD, ti.i32)
     block_model = declare(BLOCK, ti.i32, start=LOADED)
 
+    sleep_speed = declare(WORLD, REAL, unit="m/s", start=LOADED)  # below which bodies fall asleep; 0: never
     gravity = declare(WORLD, REAL, 3, unit="m/s^2", native=True)
     wind = declare(  # velocity [m/s], density times drag coefficient [kg/m^3]
         WORLD, REAL, 4, start=0, keep=WORLD, most=FINITE, native=True

@@ -14,7 +14,7 @@ from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
-from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ContactCapacity, ContactFields
+from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields, ContactCapacity
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
     forget_collider,
@@ -40,7 +40,7 @@ def ignore(lower: Floats, upper: Floats) -> None:
 
 
 class Colliders(Slice):
-    """All colliders of one world: the Python side of `ContactFields`."""
+    """All colliders of one world: the Python side of `ColliderFields`."""
 
     name = "colliders"
 
@@ -51,7 +51,7 @@ class Colliders(Slice):
         self.shapes: dict[str, Shape] = {}  # all shapes ever added, by their digests
         self._handles: list[Collider] = []
         self.floor: Collider | None = None  # of a world with colliders, from `World.build` on
-        self._contact: ContactFields | None = None
+        self._contact: ColliderFields | None = None
         self._body_count = 0
         self._impulses: Floats | None = None  # of the last step, once asked for
         # Called with the box (two corners [m]) in which a collider appears, vanishes, leaves or arrives.
@@ -155,11 +155,11 @@ class Colliders(Slice):
             soft,
         )
 
-    def load(self, contact: ContactFields, body_count: int) -> None:
+    def load(self, colliders: ColliderFields, body_count: int) -> None:
         """Fill the fields with the colliders that were added before `build`."""
-        self._contact, self._body_count, self._impulses = contact, body_count, None
-        if contact.capacity.samples:
-            write_samples(contact, 0, np.zeros(1, dtype=np.float32))  # compiles
+        self._contact, self._body_count, self._impulses = colliders, body_count, None
+        if colliders.capacity.samples:
+            write_samples(colliders, 0, np.zeros(1, dtype=np.float32))  # compiles
         begin = 0
         for row in self._rows:
             row.offset = begin
@@ -195,17 +195,17 @@ class Colliders(Slice):
             write_samples(self._contact, row.offset, np.ascontiguousarray(row.shape.samples))
 
     def _write_constants(self) -> None:
-        contact, rows = self._contact, self._rows
-        assert contact is not None
-        contact.collider_count[None] = len(rows)
-        fill = contact.loader.fill
-        fill(contact.collider_kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
-        fill(contact.collider_parameters, np.array([r.shape.parameters for r in rows]))
-        fill(contact.collider_resolution, np.array([r.shape.resolution for r in rows]))
-        fill(contact.collider_offset, np.array([r.offset for r in rows]))
-        fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
-        fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
-        contact.loader.write()
+        colliders, rows = self._contact, self._rows
+        assert colliders is not None
+        colliders.count[None] = len(rows)
+        fill = colliders.loader.fill
+        fill(colliders.kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
+        fill(colliders.parameters, np.array([r.shape.parameters for r in rows]))
+        fill(colliders.resolution, np.array([r.shape.resolution for r in rows]))
+        fill(colliders.offset, np.array([r.offset for r in rows]))
+        fill(colliders.surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
+        fill(colliders.filter, np.array([(r.group, r.mask) for r in rows]))
+        colliders.loader.write()
 
     def moved(self, row: ColliderRow) -> None:
         """Record that the pose or the motion of a collider changed."""

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.field_table import (
@@ -57,30 +55,30 @@ class ContactCapacity:
     hull: bool = False  # whether any of them does so by a hull
 
 
-class ContactFields(FieldGroup):
+class ColliderFields(FieldGroup):
     """Colliders as rows of fields, and for each pair of a body and a collider a row of what passes between.
 
     The row of body b and collider c is b * colliders + c. A collider moves through a fixed step with the
     velocity and the spin it has here, from the pose it has here.
     """
 
-    when = "has_contact"
-    collider_count = declare(WORLD, ti.i32, native=True)  # rows in use, removed ones among them
-    collider_kind = declare(COLLIDER, ti.i32, native=True)  # a `ShapeKind`, or NO_COLLIDER
-    collider_parameters = declare(COLLIDER, ti.f32, 8, native=True)
-    collider_resolution = declare(COLLIDER, ti.i32, 3)
-    collider_offset = declare(COLLIDER, ti.i32)  # of its first sample
+    owner, when = "contact", "has_contact"
+    count = declare(WORLD, ti.i32, native=True)  # rows in use, removed ones among them
+    kind = declare(COLLIDER, ti.i32, native=True)  # a `ShapeKind`, or NO_COLLIDER
+    parameters = declare(COLLIDER, ti.f32, 8, native=True)
+    resolution = declare(COLLIDER, ti.i32, 3)
+    offset = declare(COLLIDER, ti.i32)  # of its first sample
     # At the start of the step.
-    collider_position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
-    collider_rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
-    collider_velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
-    collider_spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
-    collider_surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
-    collider_filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
+    position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
+    velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
+    spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
+    surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
+    filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
     # Box around its path in the step.
-    collider_lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
-    collider_upper = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
-    collider_speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # of its fastest point, at most
+    lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    upper = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # of its fastest point, at most
     samples = declare(SAMPLE, ti.f32)
 
     near = declare(CONTACT, ti.i32)  # colliders within reach of a body, packed to the front
@@ -98,42 +96,15 @@ class ContactFields(FieldGroup):
     # Speed at which the body may leave, 0 if apart; and before the step.
     rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
     prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
-    # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
-    body_lower = declare(BODY, ti.f32, 3, unit="m", keep=BODY)
-    body_upper = declare(BODY, ti.f32, 3, unit="m", keep=BODY)
-    sleep_speed = declare(WORLD, ti.f32, unit="m/s", start=LOADED)  # below which bodies fall asleep; 0: never
-    calm = declare(BODY, ti.f32, unit="s", keep=BODY)  # time since a body was faster
-    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING of `vibration`
-    is_exploding = declare(BODY, ti.i32)  # 1 if it must not take others with it
     body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
-    is_stable = declare(BODY, ti.i32)  # 0 if forces changed a velocity by too much
-    has_failed = declare(BODY, ti.i32)  # 1 if it broke or was not solved well in this step
-    body_speed = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle in this substep
-    # Relative to the velocity that its island shares; with leapfrog of what was touched before the push.
-    body_speed_beside = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle
-    body_mean_beside = declare(BODY, ti.f32, unit="m/s")  # root mean square over particles
     # From all that is near, when that was searched. Inside a body nothing is near.
     particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)
-    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if held in the last substep
-
-    island_count = declare(WORLD, ti.i32, start=LOADED, native=True)
-    island_first = declare(BODY, ti.i32, beyond=1, start=LOADED)  # row of its first body
-    island_body = declare(BODY, ti.i32, start=LOADED)  # bodies that may touch or are joined, by island
-    body_island = declare(BODY, ti.i32, start=LOADED, keep=BODY)
-    parent = declare(BODY, ti.i32)  # in the forest of islands
 
     def __init__(self, capacity: Any, real: Any) -> None:
         """Allocate; contents are zero."""
         super().__init__(capacity, real)
         self.capacity: ContactCapacity = capacity.contact
         self.loader = Loader()  # of what does not change when a collider moves
-
-    def load(self, loader: Loader, bodies: int) -> None:
-        """Give each body an island of its own."""
-        loader.fill(self.island_count, np.array([bodies]))
-        loader.fill(self.island_first, np.arange(bodies + 1))
-        loader.fill(self.island_body, np.arange(bodies))
-        loader.fill(self.body_island, np.arange(bodies))
 
 
 class SoftContactFields(FieldGroup):
@@ -142,10 +113,9 @@ class SoftContactFields(FieldGroup):
     Each body has a part of them, which it uses for one other body after the next.
     """
 
-    when = "has_soft_contact"
+    owner, when = "contact", "has_soft_contact"
     body_surface = declare(BODY, ti.f32, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
-    sweep_order = declare(BODY, ti.i32, start=LOADED)  # bodies by their lower x
     cell_first = declare(GRID_CELL, ti.i32)
     item = declare(OUTER, ti.i32)  # rows of `outer_particle` that may be near the other body
     # The same, cell by cell, and their positions.
@@ -156,12 +126,11 @@ class SoftContactFields(FieldGroup):
     triangle_upper = declare(TRIANGLE, ti.f32, 3, unit="m")
     searched_position = declare(PARTICLE, ti.f32, 3, unit="m")
     # Relative to what the bodies of an island share: distances for which a search holds, and how far each
-    # body and each vertex is from where it was then; speeds before contact.
+    # body and each vertex is from where it was then.
     body_reach = declare(BODY, ti.f32, unit="m")
     body_lost = declare(BODY, ti.f32, unit="m")  # distance for which the vertices of a pair had room enough
     body_gone = declare(BODY, ti.f32, unit="m")
     particle_gone = declare(PARTICLE, ti.f32, unit="m")
-    particle_speed = declare(PARTICLE, ti.f32, unit="m/s")
     found_count = declare(OUTER, ti.i32)
     found_triangle = declare(OUTER, ti.i32, each=FOUND)
     found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # at the search
@@ -211,7 +180,3 @@ class SoftContactFields(FieldGroup):
     mobility = declare(BODY, ti.f32, unit="1/kg")  # inverse mass; 0 if pinned or not moving
     parting_shift = declare(BODY, ti.f32, 3, unit="m")  # displacement that all partners ask for
     parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # change of velocity
-
-    def load(self, loader: Loader, bodies: int) -> None:
-        """List the bodies in any order."""
-        loader.fill(self.sweep_order, np.arange(bodies))

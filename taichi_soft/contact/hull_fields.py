@@ -25,7 +25,7 @@ TOUCHES = 4
 class HullFields(FieldGroup):
     """Touching surfaces, and carriers of each particle that touches: itself, or four for a hull's point."""
 
-    when = "has_hulls"
+    owner, when = "contact", "has_hulls"
     # As those of the same names in `BodyFields`.
     body_outer = declare(BODY, ti.i32, 2, start=LOADED)
     body_triangles = declare(BODY, ti.i32, 2, start=LOADED)

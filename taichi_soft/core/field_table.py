@@ -160,6 +160,8 @@ def declare(
 class FieldGroup:
     """Fields with one owner. Subclasses list them; kernels take a group, or what holds it, as a template."""
 
+    owner: ClassVar[str] = ""
+    """Folder of the kernels that write it; "" if all may."""
     when: ClassVar[str] = ""
     """Attribute of a capacity that says whether it has the group; "" if all have it."""
 

@@ -81,7 +81,7 @@ class Readout:
         """True for vertices that touched something in the last substep, (n,)."""
         if self._program.has_contact:
             begin = self._scene.ranges[body.index].particles[0]
-            touches = self._state.contact.particle_touches.to_numpy()[begin : begin + body.vertex_count]
+            touches = self._state.particle_touches.to_numpy()[begin : begin + body.vertex_count]
             return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
         floor = self.settings.floor
         if floor is None:

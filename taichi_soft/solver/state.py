@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
-from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
+from taichi_soft.contact.fields import ColliderFields, ContactCapacity, SoftContactFields
 from taichi_soft.contact.hull_fields import HullFields
 from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
@@ -27,7 +27,7 @@ from taichi_soft.core.field_table import (
 )
 from taichi_soft.core.settings import Settings
 from taichi_soft.solver.kernels.surroundings import write_surroundings
-from taichi_soft.solver.step_fields import JobFields, Progress
+from taichi_soft.solver.step_fields import IslandFields, JobFields, Progress
 
 _NO_CONTACT = ContactCapacity()
 
@@ -71,7 +71,8 @@ class State(BodyFields):
     capacity: Capacity
     grabs: GrabFields
     motors: MotorFields
-    contact: ContactFields
+    islands: IslandFields
+    colliders: ColliderFields
     joints: JointFields
     soft: SoftContactFields
     hull: HullFields
@@ -82,7 +83,8 @@ class State(BodyFields):
     GROUPS: ClassVar[dict[str, type[FieldGroup]]] = {
         "grabs": GrabFields,
         "motors": MotorFields,
-        "contact": ContactFields,
+        "islands": IslandFields,
+        "colliders": ColliderFields,
         "joints": JointFields,
         "soft": SoftContactFields,
         "hull": HullFields,
@@ -133,11 +135,8 @@ class State(BodyFields):
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """As `BodyFields.load`."""
-        count = len(scene.bodies)
         if self.capacity.has_contact:
-            self.contact.load(self.loader, count)
-        if self.capacity.has_soft_contact:
-            self.soft.load(self.loader, count)
+            self.islands.load(self.loader, len(scene.bodies))
         if self.capacity.has_hulls:
             self.hull.load(self.loader, scene)
         for group in self.groups.values():

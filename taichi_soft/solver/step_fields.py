@@ -1,6 +1,9 @@
 """Fields of the step: how far each island has come in it, and what threads have to know of each other."""
 
-from taichi_soft.core.field_table import BODY, WORLD, FieldGroup, declare
+import numpy as np
+
+from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.field_table import BODY, LOADED, WORLD, FieldGroup, declare
 from taichi_soft.core.runtime import ti
 
 MOST_PARTS = 16
@@ -53,10 +56,37 @@ class Job:
     shift: ti.math.vec3
 
 
+class IslandFields(FieldGroup):
+    """Islands, and what their bodies tell each other in a substep."""
+
+    owner, when = "solver", "has_contact"
+    count = declare(WORLD, ti.i32, start=LOADED, native=True)
+    first = declare(BODY, ti.i32, beyond=1, start=LOADED)  # row of its first body
+    body = declare(BODY, ti.i32, start=LOADED)  # bodies that may touch or are joined, by island
+    of_body = declare(BODY, ti.i32, start=LOADED, keep=BODY)
+    parent = declare(BODY, ti.i32)  # in the forest of islands
+    sweep_order = declare(BODY, ti.i32, start=LOADED)  # bodies by their lower x
+    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING of `vibration`
+    is_exploding = declare(BODY, ti.i32)  # 1 if it must not take others with it
+    is_stable = declare(BODY, ti.i32)  # 0 if forces changed a velocity by too much
+    has_failed = declare(BODY, ti.i32)  # 1 if it broke or was not solved well in this step
+    body_speed = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle in this substep
+    # Relative to the velocity that its island shares; with leapfrog of what was touched before the push.
+    body_speed_beside = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle
+    body_mean_beside = declare(BODY, ti.f32, unit="m/s")  # root mean square over particles
+
+    def load(self, loader: Loader, bodies: int) -> None:
+        """Give each body an island of its own."""
+        loader.fill(self.count, np.array([bodies]))
+        loader.fill(self.first, np.arange(bodies + 1))
+        for rows in (self.body, self.of_body, self.sweep_order):
+            loader.fill(rows, np.arange(bodies))
+
+
 class JobFields(FieldGroup):
     """What threads share islands by: see `kernels/jobs.py`."""
 
-    when = "has_contact"
+    owner, when = "solver", "has_contact"
     job = declare(BODY, Job, below={})  # of each island, what is called for
     unfinished_islands = declare(WORLD, ti.i32)  # of several bodies
     useful_helpers = declare(WORLD, ti.i32)  # threads beside their owners that could find a body there

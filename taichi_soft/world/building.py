@@ -89,7 +89,7 @@ def build(context: WorldContext) -> Simulation:
         tears,
     )
     if has_contact:
-        colliders.load(state.contact, len(pools.slots))
+        colliders.load(state.colliders, len(pools.slots))
         woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would be a cycle
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
     _log.info(
@@ -191,8 +191,8 @@ def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
-        fill(state.contact.sleep_speed, np.array([context.contact.sleep_speed]))
-        fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
+        fill(state.sleep_speed, np.array([context.contact.sleep_speed]))
+        fill(state.colliders.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))

@@ -32,8 +32,8 @@ class Candidates:
         world.build()
         self.world, self.state = world, world._built.state
         assert isinstance(self.state, State)
-        contact, soft = self.state.contact, self.state.soft
-        for field in (contact.is_exploding, soft.particle_gone, soft.particle_speed):
+        state = self.state
+        for field in (state.islands.is_exploding, state.soft.particle_gone, state.particle_speed):
             field.fill(0)  # a step writes them first; here they may be of the last world of this size
         outer = self.state.body_outer.to_numpy()[BODY][0]
         self.first, self.vertex = outer * SLOTS, self.state.outer_particle[outer]

@@ -82,20 +82,22 @@ struct Fields {
     Field<float> impulse;
   } motors;
   struct {
-    Field<int32_t> collider_count;
-    Field<int32_t> collider_kind;
-    Field<float> collider_parameters;
-    Field<float> collider_position;
-    Field<float> collider_rotation;
-    Field<float> collider_velocity;
-    Field<float> collider_spin;
-    Field<float> collider_surface;
-    Field<int32_t> collider_filter;
-    Field<float> collider_lower;
-    Field<float> collider_upper;
-    Field<float> collider_speed;
-    Field<int32_t> island_count;
-  } contact;
+    Field<int32_t> count;
+  } islands;
+  struct {
+    Field<int32_t> count;
+    Field<int32_t> kind;
+    Field<float> parameters;
+    Field<float> position;
+    Field<float> rotation;
+    Field<float> velocity;
+    Field<float> spin;
+    Field<float> surface;
+    Field<int32_t> filter;
+    Field<float> lower;
+    Field<float> upper;
+    Field<float> speed;
+  } colliders;
   struct {
     Field<int32_t> bodies;
     Field<int32_t> rows;
@@ -108,7 +110,7 @@ struct Fields {
 
   Fields() = default;
   // Fails if a field is missing, or too short.
-  Fields(char* root, const Scene& scene, size_t colliders) {
+  Fields(char* root, const Scene& scene, size_t collider_room) {
     const size_t bodies = size_t(scene.slot_count), particles = size_t(scene.particle_count);
     particle_position = {root, scene.place("particle_position", particles, 3)};
     particle_velocity = {root, scene.place("particle_velocity", particles, 3)};
@@ -159,19 +161,19 @@ struct Fields {
     motors.particle = {root, scene.place("motors.particle", 16384, 1)};
     motors.is_driven = {root, scene.place("motors.is_driven", bodies, 1)};
     motors.impulse = {root, scene.place("motors.impulse", 64, 1)};
-    contact.collider_count = {root, scene.place("contact.collider_count", 1, 1)};
-    contact.collider_kind = {root, scene.place("contact.collider_kind", colliders, 1)};
-    contact.collider_parameters = {root, scene.place("contact.collider_parameters", colliders, 8)};
-    contact.collider_position = {root, scene.place("contact.collider_position", colliders, 3)};
-    contact.collider_rotation = {root, scene.place("contact.collider_rotation", colliders, 4)};
-    contact.collider_velocity = {root, scene.place("contact.collider_velocity", colliders, 3)};
-    contact.collider_spin = {root, scene.place("contact.collider_spin", colliders, 3)};
-    contact.collider_surface = {root, scene.place("contact.collider_surface", colliders, 3)};
-    contact.collider_filter = {root, scene.place("contact.collider_filter", colliders, 2)};
-    contact.collider_lower = {root, scene.place("contact.collider_lower", colliders, 3)};
-    contact.collider_upper = {root, scene.place("contact.collider_upper", colliders, 3)};
-    contact.collider_speed = {root, scene.place("contact.collider_speed", colliders, 1)};
-    contact.island_count = {root, scene.place("contact.island_count", 1, 1)};
+    islands.count = {root, scene.place("islands.count", 1, 1)};
+    colliders.count = {root, scene.place("colliders.count", 1, 1)};
+    colliders.kind = {root, scene.place("colliders.kind", collider_room, 1)};
+    colliders.parameters = {root, scene.place("colliders.parameters", collider_room, 8)};
+    colliders.position = {root, scene.place("colliders.position", collider_room, 3)};
+    colliders.rotation = {root, scene.place("colliders.rotation", collider_room, 4)};
+    colliders.velocity = {root, scene.place("colliders.velocity", collider_room, 3)};
+    colliders.spin = {root, scene.place("colliders.spin", collider_room, 3)};
+    colliders.surface = {root, scene.place("colliders.surface", collider_room, 3)};
+    colliders.filter = {root, scene.place("colliders.filter", collider_room, 2)};
+    colliders.lower = {root, scene.place("colliders.lower", collider_room, 3)};
+    colliders.upper = {root, scene.place("colliders.upper", collider_room, 3)};
+    colliders.speed = {root, scene.place("colliders.speed", collider_room, 1)};
     joints.bodies = {root, scene.place("joints.bodies", 64, 2)};
     joints.rows = {root, scene.place("joints.rows", 64, 2)};
     joints.impulse = {root, scene.place("joints.impulse", 64, 3)};

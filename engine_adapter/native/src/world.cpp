@@ -53,7 +53,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
 }
 
 void World::bind() {
-  collider_room_ = scene_->place("contact.collider_kind", colliders_.rows.size()).count;
+  collider_room_ = scene_->place("colliders.kind", colliders_.rows.size()).count;
   fields_ = Fields(machine_->root(), *scene_, collider_room_);
   if (scene_->patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
   // The kernel that reads contacts does not check the number of rows.
@@ -114,14 +114,14 @@ bool World::prepare_colliders(double dt) {
   for (size_t c = 0; c < motion_.size(); ++c) {
     const ColliderMotion& m = motion_[c];
     for (int k = 0; k < 3; ++k) {
-      fields_.contact.collider_position(c, k) = m.position[k];
-      fields_.contact.collider_velocity(c, k) = m.velocity[k];
-      fields_.contact.collider_spin(c, k) = m.spin[k];
-      fields_.contact.collider_lower(c, k) = m.lower[k];
-      fields_.contact.collider_upper(c, k) = m.upper[k];
+      fields_.colliders.position(c, k) = m.position[k];
+      fields_.colliders.velocity(c, k) = m.velocity[k];
+      fields_.colliders.spin(c, k) = m.spin[k];
+      fields_.colliders.lower(c, k) = m.lower[k];
+      fields_.colliders.upper(c, k) = m.upper[k];
     }
-    for (int k = 0; k < 4; ++k) fields_.contact.collider_rotation(c, k) = m.rotation[k];
-    fields_.contact.collider_speed(c) = m.speed;
+    for (int k = 0; k < 4; ++k) fields_.colliders.rotation(c, k) = m.rotation[k];
+    fields_.colliders.speed(c) = m.speed;
   }
   return true;
 }
@@ -166,7 +166,7 @@ void World::launch_step(int32_t substeps, double h) {
   machine_->launch("step", {Machine::whole(bodies), Machine::whole(helpers), Machine::whole(substeps), Machine::real(h),
                             Machine::whole(kAll), Machine::whole(0)});
   int32_t busy = 0;
-  for (int32_t island = 0; island < fields_.contact.island_count(0); ++island) busy += fields_.progress.failed(island) + fields_.progress.is_awake(island);
+  for (int32_t island = 0; island < fields_.islands.count(0); ++island) busy += fields_.progress.failed(island) + fields_.progress.is_awake(island);
   is_still_ = busy == 0;
 }
 

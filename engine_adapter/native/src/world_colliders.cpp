@@ -38,16 +38,16 @@ void World::remove_collider(int32_t number) {
 }
 
 void World::write_colliders() {
-  fields_.contact.collider_count(0) = int32_t(colliders_.rows.size());
+  fields_.colliders.count(0) = int32_t(colliders_.rows.size());
   for (size_t c = 0; c < colliders_.rows.size(); ++c) {
     const Collider& row = colliders_.rows[c];
-    fields_.contact.collider_kind(c) = row.is_alive ? row.kind : -1;
-    for (int k = 0; k < 8; ++k) fields_.contact.collider_parameters(c, k) = row.parameters[k];
-    fields_.contact.collider_surface(c, 0) = as_float(row.friction);
-    fields_.contact.collider_surface(c, 1) = as_float(row.restitution);
-    fields_.contact.collider_surface(c, 2) = as_float(row.skin);
-    fields_.contact.collider_filter(c, 0) = row.group;
-    fields_.contact.collider_filter(c, 1) = row.mask;
+    fields_.colliders.kind(c) = row.is_alive ? row.kind : -1;
+    for (int k = 0; k < 8; ++k) fields_.colliders.parameters(c, k) = row.parameters[k];
+    fields_.colliders.surface(c, 0) = as_float(row.friction);
+    fields_.colliders.surface(c, 1) = as_float(row.restitution);
+    fields_.colliders.surface(c, 2) = as_float(row.skin);
+    fields_.colliders.filter(c, 0) = row.group;
+    fields_.colliders.filter(c, 1) = row.mask;
   }
 }
 

@@ -2,6 +2,8 @@
 
 A convex solid lies behind the tangent plane at its nearest point. So the path can advance to that plane, and
 is clear of the solid if it ends in front of it.
+
+Groups of fields: reads colliders.
 """
 
 from taichi_soft.contact.distances.distance import signed_distance
@@ -30,16 +32,16 @@ def rests_at(distance):
 
 
 @ti.func
-def distance_from(contact: ti.template(), c, x):
+def distance_from(colliders: ti.template(), c, x):
     """Lower bound of the distance of a point in a collider's frame from its skin [m], negative inside."""
-    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
-    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
-    distance, _ = signed_distance(contact.samples, kind, parameters, resolution, offset, x)
-    return distance - contact.collider_surface[c].z
+    kind, parameters = colliders.kind[c], colliders.parameters[c]
+    resolution, offset = colliders.resolution[c], colliders.offset[c]
+    distance, _ = signed_distance(colliders.samples, kind, parameters, resolution, offset, x)
+    return distance - colliders.surface[c].z
 
 
 @ti.func
-def first_touch(contact: ti.template(), c, start, end, slack):
+def first_touch(colliders: ti.template(), c, start, end, slack):
     """Find how a path meets a collider. All lengths and directions are in the collider's frame [m].
 
     Args:
@@ -52,9 +54,9 @@ def first_touch(contact: ti.template(), c, start, end, slack):
     """
     path = end - start
     length = ti.max(path.norm(), 1e-30)
-    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
-    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
-    thickness = contact.collider_surface[c].z
+    kind, parameters = colliders.kind[c], colliders.parameters[c]
+    resolution, offset = colliders.resolution[c], colliders.offset[c]
+    thickness = colliders.surface[c].z
     is_convex = 0
     for each in ti.static(sorted(CONVEX)):
         is_convex = is_convex | int(kind == each)
@@ -62,7 +64,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
     is_open = 1
     while is_open == 1:
         to_shape, normal = signed_distance(
-            contact.samples, kind, parameters, resolution, offset, start + part * path
+            colliders.samples, kind, parameters, resolution, offset, start + part * path
         )
         distance = to_shape - thickness
         climb = path.dot(normal)

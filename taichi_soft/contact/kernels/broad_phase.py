@@ -3,6 +3,8 @@
 If the boxes of two bodies overlap, the vertices of one that can be near the other are sorted into a grid, and
 each triangle of the other queries it. Each body has a margin: its candidates stay valid until one of its
 vertices has travelled farther than that.
+
+Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT
@@ -141,16 +143,16 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
 @ti.real_func
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
     """Find the candidates of a body's vertices, after `begin_search` of all bodies of its island."""
-    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
+    lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     thickest = ti.cast(0.0, ti.f32)
-    for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        other = state.contact.island_body[j]
+    for j in range(state.islands.first[island], state.islands.first[island + 1]):
+        other = state.islands.body[j]
         thickness = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
         thickest = ti.max(thickest, thickness)
         margin = thickness + state.soft.body_reach[body] + state.soft.body_reach[other]
         wanted = state.soft.body_touches_itself[body] == 1
         if other != body:
-            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
+            their_lower, their_upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
             wanted = may_touch(state, body, other) and boxes_overlap(
                 lower - margin, upper + margin, their_lower, their_upper
             )
@@ -164,8 +166,8 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
 @ti.func
 def has_contact_pairs(state: ti.template(), island):
     """1 if a body of an island can touch another, or itself."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    return int(last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1)
+    first, last = state.islands.first[island], state.islands.first[island + 1]
+    return int(last - first > 1 or state.soft.body_touches_itself[state.islands.body[first]] == 1)
 
 
 @ti.func
@@ -178,10 +180,10 @@ def is_outdated(state: ti.template(), island, impact_speed, h):
         h: substep [s].
     """
     outdated, farthest, nearest_lost = 0, ti.cast(0.0, ti.f32), ti.cast(NO_CONTACT, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
-        if state.contact.is_exploding[body] == 0:
-            speed = ti.max(impact_speed, state.contact.body_speed_beside[body])
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
+        if state.islands.is_exploding[body] == 0:
+            speed = ti.max(impact_speed, state.islands.body_speed_beside[body])
             travelled = state.soft.body_gone[body] + h * speed
             farthest = ti.max(farthest, travelled)
             nearest_lost = ti.min(nearest_lost, state.soft.body_lost[body] - travelled)
@@ -204,8 +206,8 @@ def begin_search(
     if forgets == 1:
         clear_candidates(state, body)
     update_boxes(state, body)
-    speed, edge = state.contact.body_speed_beside[body], state.soft.body_surface[body].z
-    speed *= 1.0 - state.contact.is_exploding[body]
+    speed, edge = state.islands.body_speed_beside[body], state.soft.body_surface[body].z
+    speed *= 1.0 - state.islands.is_exploding[body]
     reach = ti.min(ti.max(SEARCH_MARGIN * left * speed, SHORTEST * edge), LONGEST * edge)
     state.soft.body_reach[body] = ti.max(reach, h * speed) + h * impact_speed
     state.soft.body_gone[body] = 0.0

@@ -1,4 +1,7 @@
-"""Candidates: the triangles near each vertex, which stay valid until bodies have moved too far."""
+"""Candidates: the triangles near each vertex, which stay valid until bodies have moved too far.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.contact.fields import FOUND, NO_CONTACT, SLOTS
 from taichi_soft.core.math.rows import row_behind

@@ -3,6 +3,8 @@
 Each pair loses the part of its approach that would close the gap within the substep, and of its sliding what
 friction takes: projected Gauss-Seidel over velocities, warm-started with the impulses of the last substep.
 Impulses are equal and opposite. Penetration is corrected by positions, without changing velocities.
+
+Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
@@ -156,9 +158,9 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
         _solve_contact(state, state.soft, slot, p, corners, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0))
         == 1
     ):
-        state.contact.particle_touches[p] = 1
+        state.particle_touches[p] = 1
         for i in ti.static(range(3)):
-            state.contact.particle_touches[corners[i]] = 1
+            state.particle_touches[corners[i]] = 1
     depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
     if sweep == SWEEPS and depth > 0.0:
         if ti.static(state.capacity.contact.hull):
@@ -170,10 +172,10 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
 @ti.real_func
 def solve_island(state: ti.template(), island: ti.i32, h: ti.f32):
     """Solve the contacts of an island for a substep of `h` [s]."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     for sweep in range(SWEEPS + 1):
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             row = state.touching.body_outer[body][0] * SLOTS
             for k in range(row, row + state.soft.contact_count[body]):
                 _solve_slot(state, state.soft.contact_slot[k], h, sweep)

@@ -7,6 +7,8 @@ not its increments: it never pulls, and friction stays within Coulomb's cone. So
 impulse that another contact made unnecessary, and points at rest stay at rest.
 
 Remaining penetration is corrected by positions, without changing velocities.
+
+Groups of fields: writes colliders, hull.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
@@ -46,8 +48,9 @@ def clear_warm_start_if_free(state: ti.template(), body):
     Call it before the impulses of the last step are cleared.
     """
     felt = ti.cast(0.0, ti.f32)
-    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
-        felt = ti.max(felt, ti.abs(state.contact.impulse[row]).max())
+    room = state.colliders.capacity.colliders
+    for row in range(body * room, (body + 1) * room):
+        felt = ti.max(felt, ti.abs(state.colliders.impulse[row]).max())
     if felt == 0.0:
         clear_warm_start(state, body)
 
@@ -55,17 +58,17 @@ def clear_warm_start_if_free(state: ti.template(), body):
 @ti.func
 def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
     """Store the contact of a point with the near collider at index `k`. Returns: 1 if they meet."""
-    c = state.contact.near[body * state.contact.capacity.colliders + k]
-    a = in_frame(state.contact, c, x, since)
-    b = in_frame(state.contact, c, x + h * v, since + h)
+    c = state.colliders.near[body * state.colliders.capacity.colliders + k]
+    a = in_frame(state.colliders, c, x, since)
+    b = in_frame(state.colliders, c, x + h * v, since + h)
     # Include paths that end just in front of the surface: impulses at neighbours can move the point on.
-    part, distance, beyond, normal = first_touch(state.contact, c, a, b, -TOUCHING)
+    part, distance, beyond, normal = first_touch(state.colliders, c, a, b, -TOUCHING)
     if part < NO_TOUCH:
         after = since + h
-        spin, surface = state.contact.collider_spin[c], state.contact.collider_surface[c]
-        n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
-        centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
-        surface_velocity = state.contact.collider_velocity[c] + spin.cross(x + h * v - beyond * n - centre)
+        spin, surface = state.colliders.spin[c], state.colliders.surface[c]
+        n = turned(spun(state.colliders.rotation[c], spin * after), normal)
+        centre = state.colliders.position[c] + state.colliders.velocity[c] * after
+        surface_velocity = state.colliders.velocity[c] + spin.cross(x + h * v - beyond * n - centre)
         approach = n.dot(surface_velocity - v)
         # Allow the approach up to the surface. A resting point stays where it is.
         allowed = ti.select(distance <= TOUCHING, 0.0, ti.min((0.5 * TOUCHING - beyond) / h - approach, 0.0))
@@ -95,11 +98,11 @@ def _list_touches(state: ti.template(), body, h, since, travelled):
     count = 0
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
         before = count
-        if not (state.contact.particle_clearance[p] > travelled):
+        if not (state.colliders.particle_clearance[p] > travelled):
             inv_mass = inv_mass_at(state, p)
             if inv_mass > 0.0:
                 x, v = motion_of(state, p)
-                for k in range(state.contact.near_count[body]):
+                for k in range(state.colliders.near_count[body]):
                     if count - before < TOUCHES:
                         count += _record_contact(state, body, first + count, p, k, x, v, h, since)
                 for row in range(first + before, first + count):
@@ -116,7 +119,7 @@ def _solve_touch(state: ti.template(), row):
     p, n = state.hull.touch_point[row], state.hull.touch_normal[row]
     m, friction = (
         state.hull.touch_inv_mass[row],
-        state.contact.collider_surface[state.hull.touch_collider[row]].x,
+        state.colliders.surface[state.hull.touch_collider[row]].x,
     )
     _, v = motion_of(state, p)
     relative = v - state.hull.touch_surface[row]
@@ -159,22 +162,22 @@ def _store_impulse(state: ti.template(), body, row, turn, time):
         time: time of the impulse since the start of the step [s].
     """
     p, c, n = state.hull.touch_point[row], state.hull.touch_collider[row], state.hull.touch_normal[row]
-    pair = body * state.contact.capacity.colliders + c
+    pair = body * state.colliders.capacity.colliders + c
     normal_impulse, friction_impulse = (
         state.hull.touch_normal_impulse[row],
         state.hull.touch_friction_impulse[row],
     )
-    state.contact.angular_impulse[pair] = state.contact.angular_impulse[pair] - turn
+    state.colliders.angular_impulse[pair] = state.colliders.angular_impulse[pair] - turn
     if normal_impulse > 0.0:
         impulse = -normal_impulse * n - friction_impulse
-        centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * time
+        centre = state.colliders.position[c] + state.colliders.velocity[c] * time
         angular_impulse = (state.hull.touch_start[row] - centre).cross(impulse)
-        state.contact.impulse[pair] = state.contact.impulse[pair] + impulse
-        state.contact.angular_impulse[pair] = state.contact.angular_impulse[pair] + angular_impulse
-        if state.contact.collider_surface[c].y >= 0.0:
+        state.colliders.impulse[pair] = state.colliders.impulse[pair] + impulse
+        state.colliders.angular_impulse[pair] = state.colliders.angular_impulse[pair] + angular_impulse
+        if state.colliders.surface[c].y >= 0.0:
             before = n.dot(state.hull.touch_start_velocity[row])
             surface = n.dot(state.hull.touch_surface[row])
-            add_normal_impulse(state.contact, pair, normal_impulse, n, before, surface)
+            add_normal_impulse(state.colliders, pair, normal_impulse, n, before, surface)
         mark_touched(state, p)
         held_by = state.hull.held_by[p]
         if held_by[0] == 0:

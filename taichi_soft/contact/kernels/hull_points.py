@@ -1,6 +1,8 @@
 """Hull points: position, velocity, and impulses distributed to the particles that carry them.
 
 In a world without hulls, a particle carries itself.
+
+Groups of fields: reads hull, joints.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
@@ -73,9 +75,9 @@ def mark_touched(state: ti.template(), p):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
         for k in range(4):
             if weights[k] != 0.0:
-                state.contact.particle_touches[who[k]] = 1
+                state.particle_touches[who[k]] = 1
     else:
-        state.contact.particle_touches[p] = 1
+        state.particle_touches[p] = 1
 
 
 @ti.func
@@ -121,6 +123,6 @@ def update_points(state: ti.template(), body, common):
             own = (v - common).norm()
             state.particle_position[p] = x
             if ti.static(state.capacity.contact.soft):
-                state.soft.particle_speed[p] = own
+                state.particle_speed[p] = own
             speed, beside = ti.max(speed, v.norm()), ti.max(beside, own)
     return speed, beside

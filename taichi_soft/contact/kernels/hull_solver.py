@@ -2,6 +2,8 @@
 
 A particle is a point that carries itself. Corners of one triangle can share carriers: an impulse at one then
 also moves the others, by `HullFields.slot_mobility`.
+
+Groups of fields: writes hull, soft.
 """
 
 from taichi_soft.contact.kernels.hull_points import (

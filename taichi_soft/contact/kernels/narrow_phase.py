@@ -2,6 +2,8 @@
 
 Candidates within range are listed first, `LANES` at a time, and their gaps are computed in SIMD lanes, as in
 `elastic`. Contacts are then selected vertex by vertex.
+
+Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT, SLOTS
@@ -45,9 +47,9 @@ def _list_near_candidates(state: ti.template(), body, impact_speed, h):
             travelled, speed = ti.cast(0.0, ti.f32), ti.cast(impact_speed, ti.f32)
             for i in ti.static(range(1, 4)):
                 travelled = ti.max(travelled, state.soft.particle_gone[who[i]])
-                speed = ti.max(speed, state.soft.particle_speed[who[i]])
+                speed = ti.max(speed, state.particle_speed[who[i]])
             travelled += state.soft.particle_gone[who[0]]
-            approach = h * (speed + ti.max(impact_speed, state.soft.particle_speed[who[0]]))
+            approach = h * (speed + ti.max(impact_speed, state.particle_speed[who[0]]))
             is_near[lane] = ti.cast(state.soft.slot_spare[first + lane] < travelled + approach, ti.i32)
         for lane in range(ti.min(LANES, slots - block * LANES)):
             # Branch-free: the branch mispredicts too often.
@@ -94,9 +96,9 @@ def _contact_range(state: ti.template(), slot, impact_speed, h):
     thickness = 0.5 * (state.soft.body_surface[mine].y + state.soft.body_surface[other].y)
     speed = ti.cast(impact_speed, ti.f32)
     for i in ti.static(range(1, 4)):
-        speed = ti.max(speed, state.soft.particle_speed[who[i]])
-    approach = h * (speed + ti.max(impact_speed, state.soft.particle_speed[who[0]]))
-    is_exploding = state.contact.is_exploding[mine] + state.contact.is_exploding[other]
+        speed = ti.max(speed, state.particle_speed[who[i]])
+    approach = h * (speed + ti.max(impact_speed, state.particle_speed[who[0]]))
+    is_exploding = state.islands.is_exploding[mine] + state.islands.is_exploding[other]
     return thickness, ti.select(is_exploding > 0, -NO_CONTACT, approach)
 
 

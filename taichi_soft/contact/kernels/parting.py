@@ -4,6 +4,8 @@ Contact keeps a vertex on its side of a surface, so bodies placed inside each ot
 Each step therefore first checks which bodies the newly placed ones overlap. Overlapping bodies do not touch.
 The end of the step moves them apart as rigid bodies, at a limited speed. Their velocities change only by the
 relative velocity of approach. As soon as they are clear of each other, they can touch again.
+
+Groups of fields: reads colliders, hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
@@ -98,7 +100,7 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
     """
     found = 0
     blocks, triangles = state.body_blocks[body], state.touching.body_triangles[body]
-    lower, upper = state.contact.body_lower[other], state.contact.body_upper[other]
+    lower, upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
     if state.body_blocks[other][0] < state.body_blocks[other][1]:
         if blocks[0] < blocks[1]:
             t = triangles[0]
@@ -151,12 +153,12 @@ def _add_partner(soft: ti.template(), body, other):
 def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
     """Find the bodies that overlap a body that was just placed or is being moved apart."""
     mobility = _mobility(state, body)
-    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        other = state.contact.island_body[i]
+    lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        other = state.islands.body[i]
         is_new = other > body or (other < body and state.soft.overlap[other] == CLEAR)
         if is_new and _is_joined_or_filtered(state, body, other) == 0:
-            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
+            their_lower, their_upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
             if boxes_overlap(lower, upper, their_lower, their_upper):
                 if mobility + _mobility(state, other) > 0.0 and _overlap(state, body, other) == 1:
                     _add_partner(state.soft, body, other)
@@ -166,22 +168,22 @@ def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
 @ti.real_func
 def find_overlaps(state: ti.template(), island: ti.i32):
     """Find the overlapping bodies of an island, before its step."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     placed, row = 0, first
     while row < last:
-        body = state.contact.island_body[row]
+        body = state.islands.body[row]
         placed += int(state.soft.overlap[body] != CLEAR)
         if state.soft.partner_count[body] != 0:
             state.soft.partner_count[body] = 0
         row = row_behind(row)
     if placed > 0:
         for i in range(first, last):
-            place_points(state, state.contact.island_body[i])
+            place_points(state, state.islands.body[i])
         for i in range(first, last):
-            if state.soft.overlap[state.contact.island_body[i]] != CLEAR:
-                _find_partners(state, island, state.contact.island_body[i])
+            if state.soft.overlap[state.islands.body[i]] != CLEAR:
+                _find_partners(state, island, state.islands.body[i])
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             if state.soft.overlap[body] != CLEAR:
                 overlaps = state.soft.partner_count[body] > 0
                 state.soft.overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
@@ -222,7 +224,7 @@ def _measure(state: ti.template(), body):
     state.soft.mobility[body] = _mobility(state, body)
     state.soft.parting_shift[body] = ti.Vector.zero(ti.f32, 3)
     state.soft.parting_kick[body] = ti.Vector.zero(ti.f32, 3)
-    state.contact.calm[body] = 0.0
+    state.body_calm_time[body] = 0.0
 
 
 @ti.func
@@ -272,11 +274,11 @@ def _shift_beside_colliders(
 ) -> ti.math.vec3:
     """Reduce a displacement [m] so that it moves no particle of a body deeper into a collider."""
     s = shift
-    for c in range(state.contact.collider_count[None]):
-        mine, theirs = state.contact.body_filter[body], state.contact.collider_filter[c]
+    for c in range(state.colliders.count[None]):
+        mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
         touches = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
-        if touches and state.contact.collider_kind[c] != NO_COLLIDER:
-            rotation = spun(state.contact.collider_rotation[c], state.contact.collider_spin[c] * dt)
+        if touches and state.colliders.kind[c] != NO_COLLIDER:
+            rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * dt)
             for k in range(state.touching.body_outer[body][0], state.touching.body_outer[body][1]):
                 x, _ = motion_of(state, state.touching.outer_particle[k])
                 before, _ = _distance(state, c, x, dt)
@@ -289,14 +291,14 @@ def _shift_beside_colliders(
 def _distance(state: ti.template(), c, x, time):
     """Distance of a point from a collider's skin [m], and the normal in the collider's frame."""
     distance, normal = signed_distance(
-        state.contact.samples,
-        state.contact.collider_kind[c],
-        state.contact.collider_parameters[c],
-        state.contact.collider_resolution[c],
-        state.contact.collider_offset[c],
-        in_frame(state.contact, c, x, time),
+        state.colliders.samples,
+        state.colliders.kind[c],
+        state.colliders.parameters[c],
+        state.colliders.resolution[c],
+        state.colliders.offset[c],
+        in_frame(state.colliders, c, x, time),
     )
-    return distance - state.contact.collider_surface[c].z, normal
+    return distance - state.colliders.surface[c].z, normal
 
 
 @ti.real_func
@@ -314,28 +316,34 @@ def _move_body(state: ti.template(), body: ti.i32, dt: ti.f32):
 @ti.real_func
 def part_bodies(state: ti.template(), island: ti.i32, dt: ti.f32):
     """Move the overlapping bodies of an island apart, after its step of `dt` [s]."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     overlapping, row = 0, first
     while row < last:
-        overlapping += state.soft.partner_count[state.contact.island_body[row]]
+        overlapping += state.soft.partner_count[state.islands.body[row]]
         row = row_behind(row)
     if overlapping > 0:
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             if state.soft.partner_count[body] > 0:
                 _measure(state, body)
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             for k in range(ti.min(state.soft.partner_count[body], MAX_PARTNERS)):
                 other = state.soft.partner[body * MAX_PARTNERS + k]
                 if body < other:
                     _part_pair(state.soft, body, other, state.gravity[None], dt)
         for i in range(first, last):
-            _move_body(state, state.contact.island_body[i], dt)
+            _move_body(state, state.islands.body[i], dt)
+
+
+@ti.func
+def check_overlaps(state: ti.template(), body):
+    """Make the next step check which bodies a body overlaps, if bodies touch each other."""
+    if ti.static(state.capacity.contact.soft):
+        state.soft.overlap[body] = JUST_PLACED
 
 
 @ti.kernel
 def mark_placed(state: ti.template(), body: ti.i32):
-    """Make the next step check which bodies a body overlaps, if bodies touch each other."""
-    if ti.static(state.capacity.contact.soft):
-        state.soft.overlap[body] = JUST_PLACED
+    """Make the next step check which bodies a body overlaps."""
+    check_overlaps(state, body)

@@ -2,6 +2,8 @@
 
 Each island has its own part of the table of pairs, so that threads share nothing. Pairs are found in it by
 hashing. Reading a row clears it; other rows stay empty.
+
+Groups of fields: reads colliders, hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
@@ -34,9 +36,9 @@ def _find_pair(soft: ti.template(), first, count, a, b):
 @ti.func
 def add_touches(state: ti.template(), island):
     """Add the impulses of a substep between the bodies of an island to the rows of their pairs."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     for i in range(first, last):
-        body = state.contact.island_body[i]
+        body = state.islands.body[i]
         first_slot = state.touching.body_outer[body][0] * SLOTS
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
@@ -58,7 +60,7 @@ def add_touches(state: ti.template(), island):
 @ti.func
 def clear_touches(state: ti.template(), island):
     """Clear the rows of an island before its step is retried."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     row = first * PAIR_ROWS
     while row < last * PAIR_ROWS:
         state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
@@ -98,8 +100,8 @@ def read_touches(
             status[body] = now
             if ti.static(state.capacity.contact.colliders > 0):
                 if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # those of others are outdated
-                    for c in range(state.contact.collider_count[None]):
-                        impulse = state.contact.impulse[body * state.contact.capacity.colliders + c]
+                    for c in range(state.colliders.count[None]):
+                        impulse = state.colliders.impulse[body * state.colliders.capacity.colliders + c]
                         if ti.abs(impulse).max() > 0.0 and is_finite(impulse):
                             _write_touch(who, impulses, count, body, OF_COLLIDER, c, impulse)
                             count += 1

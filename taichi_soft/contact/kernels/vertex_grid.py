@@ -1,4 +1,7 @@
-"""A grid of the vertices of one body that can be near another."""
+"""A grid of the vertices of one body that can be near another.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -48,8 +51,8 @@ def update_boxes(state: ti.template(), body):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             state.soft.searched_position[p] = state.particle_position[p]
             state.soft.particle_gone[p] = 0.0
-    state.contact.body_lower[body] = lower
-    state.contact.body_upper[body] = upper
+    state.body_bounds_lower[body] = lower
+    state.body_bounds_upper[body] = upper
     triangles = state.touching.body_triangles[body]
     t = triangles[0]
     while t < triangles[1]:
@@ -89,7 +92,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
 
     Returns: their number; the box around them; cells along each axis, and their edge [m].
     """
-    lower, upper = state.contact.body_lower[other] - margin, state.contact.body_upper[other] + margin
+    lower, upper = state.body_bounds_lower[other] - margin, state.body_bounds_upper[other] + margin
     lowest, highest = upper, lower
     outer = state.touching.body_outer[body]
     count = 0

@@ -4,6 +4,8 @@ Each is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper
 pull, so that the grab does not overshoot for any stiffness. Each particle of the patch has a share of the
 force; the shares have the sum 1. A force above the strength of the patch acts on the whole body in
 proportion to mass, which causes no deformation.
+
+Groups of fields: writes grabs.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -31,6 +33,7 @@ ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
 class GrabFields(FieldGroup):
     """All grabs of a world, each with the rows of its patch."""
 
+    owner = "control"
     body = declare(  # index plus 1, 0 if unused
         MOST_GRABS, ti.i32, start=0, keep=ALL_GRABS, below=Below(BODY, 1), native=True
     )

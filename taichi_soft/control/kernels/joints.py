@@ -11,6 +11,8 @@ Remaining gaps are closed no faster than the bodies can follow.
 
 The impulse on the point is distributed so that it acts at the particle's position. So momentum and angular
 momentum are conserved even with a gap.
+
+Groups of fields: reads islands; writes joints.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
@@ -52,7 +54,7 @@ class JointFields(FieldGroup):
     End k of row r has the index r ENDS + k.
     """
 
-    when = "has_contact"
+    owner, when = "control", "has_contact"
     bodies = declare(  # indices plus 1, 0 if unused
         MOST_JOINTS, ti.i32, 2, start=0, keep=ALL_JOINTS, below=Below(BODY, 1), native=True
     )
@@ -139,23 +141,23 @@ def solve_joints(
         common: mean velocity of the bodies of the island [m/s].
     Returns: the highest speed of a particle of a joint [m/s], absolute and relative to `common`.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     is_joined, member = 0, first
     while member < last:
-        is_joined = is_joined | (state.body_drives[state.contact.island_body[member]] & JOINED)
+        is_joined = is_joined | (state.body_drives[state.islands.body[member]] & JOINED)
         member = row_behind(member)
     highest, highest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     sweeps = ti.select(is_joined != 0, SWEEPS + 2, 0)
     for sweep in range(sweeps):
         back = sweep % 2
         for i in range(first, last):
-            body = state.contact.island_body[_turned(i, first, last, back)]
+            body = state.islands.body[_turned(i, first, last, back)]
             for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
                 # Ignore joints to a body that failed, so that it cannot damage others.
                 is_exploding = (
-                    state.contact.is_exploding[body] + state.contact.is_exploding[ti.max(ends[1] - 1, 0)]
+                    state.islands.is_exploding[body] + state.islands.is_exploding[ti.max(ends[1] - 1, 0)]
                 )
                 if ends[0] == body + 1 and is_exploding == 0:
                     if sweep == 0 and is_first == 1:

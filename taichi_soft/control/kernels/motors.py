@@ -10,6 +10,8 @@ and d = a for a push along the axis. With velocities v after the forces of a sub
 The pattern is a rigid motion, so a motor deforms only the region between its particles and the rest of the
 body. The particles have the target speed after the substep's forces, unless that exceeds the limit. An axis
 that rotates with the particles keeps its position in the rest shape.
+
+Groups of fields: writes motors.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -48,6 +50,7 @@ class MotorRow:
 class MotorFields(FieldGroup):
     """All motors of a world."""
 
+    owner = "control"
     motor = declare(
         MOST_MOTORS,
         MotorRow,
@@ -152,8 +155,8 @@ def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_f
                 motor = state.motors.motor[number]
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
-                if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
-                    state.contact.calm[body] = 0.0  # keeps a slow start from counting as rest
+                if motor.speed != 0.0 and motor.limit > 0.0 and state.body_calm_time[body] != 0.0:
+                    state.body_calm_time[body] = 0.0  # keeps a slow start from counting as rest
 
 
 @ti.kernel

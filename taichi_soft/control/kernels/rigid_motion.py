@@ -1,6 +1,7 @@
 """Move a whole body, or set its velocity, as a rigid body between two steps."""
 
-from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
+from taichi_soft.bodies.status import TO_TARGET
+from taichi_soft.contact.kernels.parting import check_overlaps
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -108,5 +109,4 @@ def jump(
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
-            if ti.static(state.capacity.contact.soft):
-                state.soft.overlap[body] = JUST_PLACED
+            check_overlaps(state, body)

@@ -1,4 +1,7 @@
-"""Kernels that read and write a body with the state of its motion."""
+"""Kernels that read and write a body with the state of its motion.
+
+Groups of fields: writes colliders, hull, soft.
+"""
 
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.core.constants import LANES
@@ -36,7 +39,7 @@ def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=
         if ti.static(state.capacity.implicit):
             out[i, 13] = state.particle_contact[p]
         if ti.static(state.capacity.has_contact):
-            out[i, 14] = state.contact.particle_touches[p]
+            out[i, 14] = state.particle_touches[p]
 
 
 @ti.kernel
@@ -90,8 +93,8 @@ def write_body(
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = int(motion[i, 13])
             if ti.static(state.capacity.has_contact):
-                state.contact.particle_touches[p] = int(motion[i, 14])
-                state.contact.particle_clearance[p] = NO_CONTACT
+                state.particle_touches[p] = int(motion[i, 14])
+                state.colliders.particle_clearance[p] = NO_CONTACT
             state.rest_position[p0 + i] = _three(rest, i, 0)
         for i in range(tet_vertices.shape[0]):
             state.tet_vertices[b0 * 4 * LANES + i] = p0 + tet_vertices[i]
@@ -128,7 +131,7 @@ def write_body(
         state.body_fading[body] = state.body_fading[model_of]
         state.body_fading_interval[body] = state.body_fading_interval[model_of]
         if ti.static(state.capacity.has_contact):
-            state.contact.calm[body] = 0.0
+            state.body_calm_time[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = state.body_residual[model_of]
         state.body_status[body] = status

@@ -5,6 +5,8 @@ impact faster than sound flattens tetrahedra, which makes them stiffer. An attem
 velocity by more than `MAX_VELOCITY_CHANGE` at once, or if its result is not finite. The island is then
 restored and retries the step with twice as many substeps, and so on. The last attempt damps vibrations
 strongly; momentum and angular momentum are conserved.
+
+Groups of fields: reads hull; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
@@ -43,10 +45,10 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
     least = ti.cast(substeps, ti.f32)
     if ti.static(program.integrator.has_stable_step):
         if state.retries[None] > 0:
-            first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+            first, end = state.islands.first[island], state.islands.first[island + 1]
             row = first
             while row < end:
-                body = state.contact.island_body[row]
+                body = state.islands.body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
                     # Limited: a forged snapshot can contain any number.
@@ -81,16 +83,16 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
     if ti.static(state.capacity.contact.hull):
         clear_warm_start_if_free(state, body)
     clear_contacts(state, body)
-    state.contact.is_exploding[body] = 0
+    state.islands.is_exploding[body] = 0
     if ti.static(program.has_soft_contact):
         if state.body_status[body] != ACTIVE:
-            state.contact.body_speed_beside[body] = 0.0
+            state.islands.body_speed_beside[body] = 0.0
             for p in range(particles[0], particles[1]):
-                state.soft.particle_speed[p] = 0.0
+                state.particle_speed[p] = 0.0
             if ti.static(state.capacity.contact.hull):
                 place_points(state, body)
                 for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                    state.soft.particle_speed[p] = 0.0
+                    state.particle_speed[p] = 0.0
 
 
 @ti.func
@@ -118,9 +120,9 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
 @ti.real_func
 def restore_island(state: ti.template(), program: ti.template(), island: ti.i32):
     """Restore the state of an island before the step."""
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):
-        _restore_body(state, program, state.contact.island_body[row])
+        _restore_body(state, program, state.islands.body[row])
     if ti.static(program.has_soft_contact):
         clear_touches(state, island)
 
@@ -128,10 +130,10 @@ def restore_island(state: ti.template(), program: ti.template(), island: ti.i32)
 @ti.func
 def brake_island(state: ti.template(), island, is_braked):
     """Damp the vibrations of all bodies of an island strongly (1), or no longer (0)."""
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     row = first
     while row < end:
-        state.body_is_braked[state.contact.island_body[row]] = is_braked
+        state.body_is_braked[state.islands.body[row]] = is_braked
         row = row_behind(row)
 
 
@@ -151,9 +153,9 @@ def body_is_valid(state: ti.template(), body):
 def island_is_valid(state: ti.template(), island):
     """1 if all active bodies of an island are valid."""
     sound = 1
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):
-        body = state.contact.island_body[row]
+        body = state.islands.body[row]
         if state.body_status[body] == ACTIVE:
             sound = sound & body_is_valid(state, body)
     return sound

@@ -7,6 +7,8 @@ momentum and angular momentum.
 
 A body whose overall speed is below `sleep_speed` also loses its slow vibrations, in `vibration`: one swinging
 limb would keep it awake.
+
+Groups of fields: writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -24,7 +26,7 @@ SLOW_FACTOR = 10.0
 @ti.func
 def update_rest_state(state: ti.template(), body):
     """Write to `rest_state` whether a damped body is moving, slow or resting, if bodies can fall asleep."""
-    rest_state, sleep_speed = MOVING, state.contact.sleep_speed[None]
+    rest_state, sleep_speed = MOVING, state.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
         masses, motions = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
@@ -36,8 +38,8 @@ def update_rest_state(state: ti.template(), body):
                 motions[lane] += mass * state.particle_velocity[first + lane].norm_sqr()
         most, motion = masses.sum() * sleep_speed * sleep_speed, motions.sum()
         rest_state = int(motion <= SLOW_FACTOR * SLOW_FACTOR * most) + int(motion <= most)
-    if state.contact.rest_state[body] != rest_state:
-        state.contact.rest_state[body] = rest_state
+    if state.islands.rest_state[body] != rest_state:
+        state.islands.rest_state[body] = rest_state
 
 
 @ti.func
@@ -48,7 +50,7 @@ def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     particle at different times: otherwise a vibration with the period of the step would always be damped at
     its turning point.
     """
-    if state.contact.rest_state[body] != MOVING:
+    if state.islands.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)
 
 
@@ -67,7 +69,7 @@ def _calm_edges(
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
         # Skip touched particles: between contact impulses, a weight on them would creep.
-        if state.contact.particle_touches[p] + state.contact.particle_touches[q] == 0:
+        if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)
             apart -= felt_velocity(state, program, p, gravity, kick, h, 1)

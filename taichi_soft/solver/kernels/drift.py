@@ -1,7 +1,10 @@
-"""Drift among colliders: positions from velocities, and collisions on the path."""
+"""Drift among colliders: positions from velocities, and collisions on the path.
+
+Groups of fields: reads colliders.
+"""
 
 from taichi_soft.bodies.kernels.particles import highest_speed
-from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
+from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
@@ -25,9 +28,9 @@ def can_drift_at_once(state: ti.template(), body, path):
 
     The colliders near it must be known. Hull points near a collider change velocities before the move.
     """
-    is_known = int(state.contact.gone[body] + path <= state.contact.reach[body])
+    is_known = int(state.colliders.gone[body] + path <= state.colliders.reach[body])
     if ti.static(state.capacity.contact.hull):
-        is_known = is_known & int(state.contact.near_count[body] == 0 or not has_hull(state, body))
+        is_known = is_known & int(state.colliders.near_count[body] == 0 or not has_hull(state, body))
     return is_known
 
 
@@ -63,11 +66,14 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
         first = (particles[0] + block * LANES) & ROW_BITS
         is_clear = ti.Vector.zero(ti.i32, LANES)
         for lane in range(LANES):
-            is_clear[lane] = int(state.contact.particle_clearance[first + lane] > travelled)
+            is_clear[lane] = int(state.colliders.particle_clearance[first + lane] > travelled)
         if is_clear.min() == 0:
             p, end = first, ti.min(first + LANES, particles[1])
             while p < end:
-                if not (state.contact.particle_clearance[p] > travelled) and state.particle_inv_mass[p] > 0.0:
+                if (
+                    not (state.colliders.particle_clearance[p] > travelled)
+                    and state.particle_inv_mass[p] > 0.0
+                ):
                     collide_particle(state, body, p, h, since)
                 p = row_behind(p)
     limit_rebounds(state, body, since + h)
@@ -80,11 +86,11 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
     Args:
         travelled: distance travelled since near colliders were listed, including this path [m].
     """
-    state.contact.gone[body] = travelled
-    if state.contact.near_count[body] > 0:
+    set_travelled(state, body, travelled)
+    if state.colliders.near_count[body] > 0:
         _collide_body(state, body, h, since, travelled)
     place_points(state, body)
-    updates_timer = int(state.contact.calm[body] != 0.0)
+    updates_timer = int(state.body_calm_time[body] != 0.0)
     if ti.static(state.capacity.contact.hull):
         updates_timer = updates_timer & int(not has_hull(state, body))  # see `reset_rest_timer_of_hull`
     if updates_timer == 1:
@@ -94,13 +100,13 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
 @ti.real_func
 def drift_body(state: ti.template(), body: ti.i32, job: Job):
     """Move one body by its velocities, and collide it on the way."""
-    travelled = state.contact.gone[body] + job.fastest * job.h
-    is_new = int(not (state.contact.reach[body] >= travelled))
+    travelled = state.colliders.gone[body] + job.fastest * job.h
+    is_new = int(not (state.colliders.reach[body] >= travelled))
     if is_new == 1:
         list_near_colliders(state, body, job.fastest, job.since, job.left)
         travelled = job.fastest * job.h
     if ti.static(state.capacity.contact.hull):
-        if state.contact.near_count[body] > 0:
+        if state.colliders.near_count[body] > 0:
             collide_points(state, body, job.h, job.since, travelled)
         elif is_new == 1:
             clear_warm_start(state, body)
@@ -119,7 +125,7 @@ def has_drifted(state: ti.template(), body, speed, h, since):
     """
     is_known = can_drift_at_once(state, body, speed * h)
     if is_known == 1:
-        end_drift(state, body, h, since, state.contact.gone[body] + speed * h)
+        end_drift(state, body, h, since, state.colliders.gone[body] + speed * h)
     else:
         particles = state.body_particles[body]
         p = particles[0]

@@ -7,6 +7,8 @@ the velocity of the surface. A sticking particle gets that velocity in all direc
 impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting from the last
 solution: particles that would be pulled are released, particles that stick beyond the friction limit slide,
 and particles that friction would turn back stick.
+
+Groups of fields: reads colliders.
 """
 
 from taichi_soft.core.runtime import ti
@@ -30,7 +32,7 @@ body from coming to rest."""
 @ti.func
 def _friction_on(state: ti.template(), p):
     """Friction coefficient of the collider under a particle."""
-    return state.contact.collider_surface[state.particle_contact[p] - 1].x
+    return state.colliders.surface[state.particle_contact[p] - 1].x
 
 
 @ti.func

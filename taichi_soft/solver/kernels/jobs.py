@@ -18,6 +18,8 @@ between its bodies, and starts *jobs*: phases that each body runs separately. *H
 no island, or have finished theirs. Owner and helpers take bodies that no thread has taken yet. The owner then
 waits for the bodies that others took. It never waits for a thread that has not started: without free threads
 it takes all bodies itself. The result for a body does not depend on the thread.
+
+Groups of fields: reads islands; writes jobs.
 """
 
 from taichi_soft.core.math.rows import row_behind
@@ -43,7 +45,7 @@ def _now(counter: ti.template()):
 @ti.func
 def _size_of(state: ti.template(), island):
     """Number of bodies of an island."""
-    return state.contact.island_first[island + 1] - state.contact.island_first[island]
+    return state.islands.first[island + 1] - state.islands.first[island]
 
 
 @ti.func
@@ -75,10 +77,10 @@ def run_job(
         do_phase: a function (state, program, island, body, job).
         worker: OWNER, or a helper's number; only the owner can start a phase other than HELP.
     """
-    first, count = state.contact.island_first[island], _size_of(state, island)
+    first, count = state.islands.first[island], _size_of(state, island)
     called = job
     is_shared = int(count > 1)
-    parts, rows = 1, state.contact.island_body.shape[0]
+    parts, rows = 1, state.islands.body.shape[0]
     if is_shared == 1:
         parts = state.jobs.parts[None]
         if job.phase != HELP:
@@ -98,7 +100,7 @@ def run_job(
         while place > 0:
             if job.phase == HELP:
                 called = state.jobs.job[island]
-            do_phase(state, program, island, state.contact.island_body[before + place], called)
+            do_phase(state, program, island, state.islands.body[before + place], called)
             done += 1
             place = 0
             if is_shared == 1:
@@ -114,7 +116,7 @@ def run_job(
 def open_shared_islands(state: ti.template(), helpers):
     """Before the islands are stepped, count the work that can be shared."""
     islands, members, island = 0, 0, 0
-    while island < state.contact.island_count[None]:
+    while island < state.islands.count[None]:
         if is_shared_island(state, island):
             islands += 1
             members += _size_of(state, island)
@@ -137,6 +139,6 @@ def help_others(state: ti.template(), program: ti.template(), do_phase: ti.templ
     down.
     """
     while helper < state.jobs.useful_helpers[None] and _now(state.jobs.unfinished_islands[None]) > 0:
-        for island in range(state.contact.island_count[None]):
+        for island in range(state.islands.count[None]):
             if is_shared_island(state, island):
                 run_job(state, program, do_phase, island, helper + 1, Job(phase=HELP))

@@ -1,6 +1,8 @@
 """Kick among colliders: new velocities from forces. The drift then moves positions.
 
 In between, joints and contact between bodies change velocities island by island.
+
+Groups of fields: writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -39,7 +41,7 @@ def _store_block(state: ti.template(), first, positions: ti.template(), velociti
         for i in ti.static(range(3)):
             state.particle_velocity[first + lane][i] = velocities[lane, i]
     for lane in range(LANES):
-        state.contact.particle_touches[first + lane] = 0
+        state.particle_touches[first + lane] = 0
     for lane in range(LANES):
         state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
 
@@ -55,7 +57,7 @@ def _store_last_block(
         for i in ti.static(range(3)):
             state.particle_position[p][i] = positions[lane, i]
             state.particle_velocity[p][i] = velocities[lane, i]
-        state.contact.particle_touches[p] = 0
+        state.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         lane = row_behind(lane)
 
@@ -71,16 +73,16 @@ def _store_speeds(state: ti.template(), first, count, common, velocities: ti.tem
         v = ti.Vector([velocities[lane, i] for i in ti.static(range(3))])
         speeds[lane] = (v - common).norm()
         # A particle in contact loses the speed that it gains in the kick again.
-        was_touched = state.contact.particle_touches[first + lane] == 1
+        was_touched = state.particle_touches[first + lane] == 1
         beside = ti.select(was_touched, state.particle_velocity[first + lane], v) - common
         striking2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
     if count >= LANES:
         for lane in range(LANES):
-            state.soft.particle_speed[first + lane] = speeds[lane]
+            state.particle_speed[first + lane] = speeds[lane]
     else:
         lane = 0
         while lane < count:
-            state.soft.particle_speed[first + lane] = speeds[lane]
+            state.particle_speed[first + lane] = speeds[lane]
             lane = row_behind(lane)
     return striking2
 
@@ -112,7 +114,7 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        counts = ti.select(state.contact.particle_touches[p] == 1, 1.0 / PRESSED**2, 1.0)
+        counts = ti.select(state.particle_touches[p] == 1, 1.0 / PRESSED**2, 1.0)
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if ti.static(program.has_soft_contact):
         if job.has_pairs == 1:
@@ -151,15 +153,15 @@ def _store_body_speeds(
     """Store the speeds of a body for its island and for the search for contacts."""
     # Unchanged values are not written: neighbouring bodies share a cache line, which a write takes from
     # other threads.
-    state.contact.body_speed[body] = speed
-    if state.contact.is_stable[body] != is_stable:
-        state.contact.is_stable[body] = is_stable
+    state.islands.body_speed[body] = speed
+    if state.islands.is_stable[body] != is_stable:
+        state.islands.is_stable[body] = is_stable
     if ti.static(program.has_soft_contact):
-        state.contact.body_speed_beside[body] = beside
-        state.contact.body_mean_beside[body] = mean_beside
+        state.islands.body_speed_beside[body] = beside
+        state.islands.body_mean_beside[body] = mean_beside
         is_exploding = int(not (speed * h <= EXPLODING * state.body_edge[body]))
-        if state.contact.is_exploding[body] != is_exploding:
-            state.contact.is_exploding[body] = is_exploding
+        if state.islands.is_exploding[body] != is_exploding:
+            state.islands.is_exploding[body] = is_exploding
 
 
 @ti.real_func

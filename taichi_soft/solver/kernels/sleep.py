@@ -1,4 +1,7 @@
-"""Sleep: islands at rest are skipped until something comes near."""
+"""Sleep: islands at rest are skipped until something comes near.
+
+Groups of fields: reads colliders, hull, islands.
+"""
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
@@ -20,8 +23,8 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
     woken = 0
     for body in range(body_count):
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
-            above = (lower - state.contact.body_upper[body]).max()
-            if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= WAKE_MARGIN:
+            above = (lower - state.body_bounds_upper[body]).max()
+            if ti.max(above, (state.body_bounds_lower[body] - upper).max()) <= WAKE_MARGIN:
                 state.body_status[body] = ACTIVE
                 woken += 1
     return woken
@@ -30,23 +33,23 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
 @ti.func
 def wake_by_colliders(state: ti.template(), body_count):
     """Wake sleeping bodies that a moving collider comes near in this step."""
-    for c in range(state.contact.collider_count[None]):
-        if state.contact.collider_kind[c] != NO_COLLIDER and state.contact.collider_speed[c] > 0.0:
-            _wake_in_box(state, body_count, state.contact.collider_lower[c], state.contact.collider_upper[c])
+    for c in range(state.colliders.count[None]):
+        if state.colliders.kind[c] != NO_COLLIDER and state.colliders.speed[c] > 0.0:
+            _wake_in_box(state, body_count, state.colliders.lower[c], state.colliders.upper[c])
 
 
 @ti.real_func
 def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
     """Wake all bodies of an island if one of them is awake. Returns: 1 if so."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     is_awake = 0
     i = first
     while i < last:
-        is_awake = is_awake | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
+        is_awake = is_awake | int(state.body_status[state.islands.body[i]] == ACTIVE)
         i = row_behind(i)
     i = ti.select(is_awake == 1, first, last)
     while i < last:
-        body = state.contact.island_body[i]
+        body = state.islands.body[i]
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
             state.body_status[body] = ACTIVE
         i = row_behind(i)
@@ -56,8 +59,8 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 @ti.func
 def reset_rest_timer(state: ti.template(), body, speed):
     """Reset the rest timer of a body if it is fast."""
-    if not (speed <= state.contact.sleep_speed[None]) and state.contact.calm[body] != 0.0:
-        state.contact.calm[body] = 0.0
+    if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
+        state.body_calm_time[body] = 0.0
 
 
 @ti.func
@@ -90,7 +93,7 @@ def store_box(state: ti.template(), body):
         for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x = state.particle_position[point]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-    state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+    state.body_bounds_lower[body], state.body_bounds_upper[body] = lower, upper
 
 
 @ti.real_func
@@ -113,7 +116,7 @@ def _put_to_sleep(state: ti.template(), body):
         p = row_behind(p)
     store_box(state, body)
     state.body_velocity_lag[body] = 0.0
-    state.contact.calm[body] = 0.0
+    state.body_calm_time[body] = 0.0
     state.body_status[body] = ASLEEP
 
 
@@ -124,19 +127,19 @@ def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
 
     Returns: 1 if it is still awake.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     calm = ti.cast(1e30, ti.f32)
     row = first
     while row < last:
-        body = state.contact.island_body[row]
+        body = state.islands.body[row]
         if state.body_status[body] == ACTIVE:
-            state.contact.calm[body] = state.contact.calm[body] + dt
-            calm = ti.min(calm, state.contact.calm[body])
+            state.body_calm_time[body] = state.body_calm_time[body] + dt
+            calm = ti.min(calm, state.body_calm_time[body])
         row = row_behind(row)
-    is_awake = int(not (calm > CALM_TIME and state.contact.sleep_speed[None] > 0.0))
+    is_awake = int(not (calm > CALM_TIME and state.sleep_speed[None] > 0.0))
     if is_awake == 0:
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             if state.body_status[body] == ACTIVE:
                 _put_to_sleep(state, body)
     return is_awake
@@ -148,7 +151,7 @@ def wake_body(state: ti.template(), body: ti.i32):
     ti.loop_config(serialize=True)
     for b in range(state.capacity.bodies):
         if body == b or body == -1:
-            state.contact.calm[b] = 0.0
+            state.body_calm_time[b] = 0.0
             if state.body_status[b] == ASLEEP:
                 state.body_status[b] = ACTIVE
 

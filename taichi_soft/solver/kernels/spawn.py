@@ -1,4 +1,7 @@
-"""Spawn and despawn bodies: one slot is written, and the rest of the world does not change."""
+"""Spawn and despawn bodies: one slot is written, and the rest of the world does not change.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.status import ABSENT, ACTIVE, JUST_PLACED
@@ -48,11 +51,11 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
         if ti.static(state.capacity.contact.colliders > 0):
-            state.contact.calm[body] = 0.0
+            state.body_calm_time[body] = 0.0
             particles = state.body_particles[body]
             p = particles[0]
             while p < particles[1]:
-                state.contact.particle_touches[p] = 0
+                state.particle_touches[p] = 0
                 p = row_behind(p)
             if ti.static(state.capacity.contact.hull):
                 clear_warm_start(state, body)

@@ -6,6 +6,8 @@ help with islands of several bodies (`jobs.py`). The result does not depend on t
 
 Long steps are split over several kernel calls, so that Ctrl-C works in between: each island continues where
 it stopped.
+
+Groups of fields: reads islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on, highest_speed
@@ -96,7 +98,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
 @ti.func
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
-        body = state.contact.island_body[state.contact.island_first[island]]
+        body = state.islands.body[state.islands.first[island]]
         # Includes the speed gained by gravity, so that near colliders are listed once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
@@ -122,8 +124,8 @@ def _mean_velocity(state: ti.template(), island):
     It is zero if a body of the island does not move.
     """
     total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
             particles = state.body_particles[body]
             p = particles[0]
@@ -152,9 +154,9 @@ def _end(state: ti.template(), program: ti.template(), island, run: ti.template(
     """End the step of each body, and freeze invalid bodies."""
     failed = 0
     each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
-    row = state.contact.island_first[island]
-    while row < state.contact.island_first[island + 1]:
-        failed += state.contact.has_failed[state.contact.island_body[row]]
+    row = state.islands.first[island]
+    while row < state.islands.first[island + 1]:
+        failed += state.islands.has_failed[state.islands.body[row]]
         row = row_behind(row)
     if ti.static(program.has_soft_contact):
         part_bodies(state, island, substeps * h)
@@ -189,14 +191,14 @@ def step_islands(
                 find_islands(state, body_count, substeps * h)
         open_shared_islands(state, helpers)
     ti.loop_config(block_dim=1)
-    for i in range(state.contact.island_count[None] + helpers):
-        if i < state.contact.island_count[None]:
+    for i in range(state.islands.count[None] + helpers):
+        if i < state.islands.count[None]:
             failed_here, is_awake = fixed_step(state, program, i, substeps, h, most, goes_on)
             failed += ti.max(failed_here, 0)
             awake += is_awake
             unfinished += int(failed_here == UNFINISHED)
             close_shared_island(state, i)
         else:
-            help_others(state, program, do_phase, i - state.contact.island_count[None])
+            help_others(state, program, do_phase, i - state.islands.count[None])
     found = ti.select(failed + awake == 0, ALL_SLEEP, failed)
     return ti.select(unfinished > 0, UNFINISHED, found)

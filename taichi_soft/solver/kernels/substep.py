@@ -10,6 +10,8 @@
 
 Contact changes velocities before they move anything. Joints correct its effect on them in the next substep. A
 single body drifts in the same pass as its kick, and collides afterwards.
+
+Groups of fields: reads colliders, soft; writes islands.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -87,7 +89,7 @@ def substep_alone(state: ti.template(), program: ti.template(), body, now):
     """Run one substep of one body among colliders, without other bodies, to find the cause of a failure."""
     job = Job(s=now.s, substeps=now.substeps, h=now.h, since=now.since, left=now.left)
     _advance_body(state, program, body, job)
-    job.fastest = state.contact.body_speed[body]
+    job.fastest = state.islands.body_speed[body]
     drift_body(state, body, job)
 
 
@@ -119,7 +121,7 @@ def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32
     if job.phase == BEGIN:
         begin_body(state, program, body)
     if job.phase == END:
-        state.contact.has_failed[body] = end_body(state, program, body, job.substeps, job.h)
+        state.islands.has_failed[body] = end_body(state, program, body, job.substeps, job.h)
     if job.phase == DRIFT and state.body_status[body] == ACTIVE:
         drift_body(state, body, job)
     if ti.static(program.has_soft_contact):
@@ -140,10 +142,10 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
     """Kick the bodies of an island. Returns: the time for which they have drifted with their new velocities
     [s].
     """
-    body = state.contact.island_body[state.contact.island_first[island]]
+    body = state.islands.body[state.islands.first[island]]
     is_free = is_alone(state, program, island)
     if is_free == 1:
-        if not (state.contact.gone[body] + run.fastest * now.h <= state.contact.reach[body]):
+        if not (state.colliders.gone[body] + run.fastest * now.h <= state.colliders.reach[body]):
             list_near_colliders(state, body, run.fastest, now.since, now.left)
         is_free = can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
@@ -171,8 +173,8 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
     """1 if an island is one body that only colliders can touch, and its kick can move it."""
-    body = state.contact.island_body[state.contact.island_first[island]]
-    bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
+    body = state.islands.body[state.islands.first[island]]
+    bodies = state.islands.first[island + 1] - state.islands.first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
     alone = drifts_at_once & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
     if ti.static(program.has_soft_contact):
@@ -189,13 +191,13 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
     """
     highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     least_edge = ti.cast(NO_CONTACT, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
-            highest = ti.max(highest, state.contact.body_speed[body])
-            if state.contact.is_exploding[body] == 0:
-                striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
-            run.is_stable = run.is_stable & state.contact.is_stable[body]
+            highest = ti.max(highest, state.islands.body_speed[body])
+            if state.islands.is_exploding[body] == 0:
+                striking = ti.max(striking, 2.0 * state.islands.body_mean_beside[body])
+            run.is_stable = run.is_stable & state.islands.is_stable[body]
         least_edge = ti.min(least_edge, state.body_edge[body])
     run.fastest = highest
     return highest, ti.select(striking * now.h > MAX_IMPULSE_STEP * least_edge, striking, 0.0)
@@ -205,7 +207,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
     """1 if the bodies of an island are at their new positions: a single body that its kick has moved."""
     has_moved = 0
-    body = state.contact.island_body[state.contact.island_first[island]]
+    body = state.islands.body[state.islands.first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
         has_moved = has_drifted(state, body, run.fastest, now.h, now.since)
     return has_moved
@@ -249,7 +251,7 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 @ti.func
 def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
     """Mark the attempt as unstable if the integrator rejects the new shape of a body."""
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
             run.is_stable = run.is_stable & program.integrator.check(state, body, now.h, now.is_last)

@@ -10,6 +10,8 @@ conserves, for each mode of frequency w,
 A smaller v reduces this, for every stable step and any interval of damping. For velocities half a step later,
 the conserved quantity also contains h w^2 x v: damping these every third substep, for example, would excite
 modes with a period of three substeps.
+
+Groups of fields: reads islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -79,7 +81,7 @@ def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick
     velocity = _kicked_velocity(state, p, gravity, kick)
     if is_held == 1:
         if ti.static(program.has_contact):
-            if state.contact.particle_touches[p] == 1:
+            if state.particle_touches[p] == 1:
                 velocity = state.particle_velocity[p]
         if ti.static(program.has_floor):
             if state.particle_inv_mass[p] > 0.0:
@@ -225,7 +227,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
         keep = SHARP_BRAKE
     elif rate > 0.0:
         if ti.static(state.capacity.has_contact):
-            if state.contact.rest_state[body] == RESTING:
+            if state.islands.rest_state[body] == RESTING:
                 rate = ti.max(rate, RESTING_RATE)
         whole = substeps * h
         wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MAX_FADING))

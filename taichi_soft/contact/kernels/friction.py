@@ -1,4 +1,7 @@
-"""Change the friction between bodies between two steps."""
+"""Change the friction between bodies between two steps.
+
+Groups of fields: writes soft.
+"""
 
 from taichi_soft.core.runtime import ti
 
