@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
-from taichi_soft.bodies.status import ABSENT, WITH_FRAME
+from taichi_soft.bodies.status import ABSENT, CLEAR, WITH_FRAME
 from taichi_soft.core.constants import LANES, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.field_table import (
@@ -181,6 +181,9 @@ class BodyFields(FieldGroup):
     # Bounding box at the last query that used it.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
+    body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
+    # With others, in a world in which bodies touch each other: CLEAR, JUST_PLACED or OVERLAPPING.
+    body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
     # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
     body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
     body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)

@@ -114,7 +114,6 @@ class SoftContactFields(FieldGroup):
     """
 
     owner, when = "contact", "has_soft_contact"
-    body_surface = declare(BODY, ti.f32, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
     cell_first = declare(GRID_CELL, ti.i32)
     item = declare(OUTER, ti.i32)  # rows of `outer_particle` that may be near the other body
@@ -170,7 +169,6 @@ class SoftContactFields(FieldGroup):
     pair_impulse = declare(BODY, ti.f32, 3, unit="N s", each=PAIR_ROWS, start=0)  # on the second in a step
     pairs_lost = declare(WORLD, ti.i32, start=0)  # 1 if some had no row
     # Bodies placed inside each other: see `kernels/parting.py`.
-    overlap = declare(BODY, ti.i32, start=0, keep=BODY)  # CLEAR, JUST_PLACED or OVERLAPPING
     partner_count = declare(BODY, ti.i32, start=0)  # bodies that each overlaps in this step
     partner = declare(BODY, ti.i32, each=MAX_PARTNERS)
     center = declare(BODY, ti.f32, 3, unit="m")  # of mass, after the step

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of, record_of
-from taichi_soft.contact.kernels.friction import write_friction
 from taichi_soft.control.change import change
+from taichi_soft.control.kernels.friction import write_friction
 from taichi_soft.core.checks import as_friction
 from taichi_soft.core.errors import StateError
 

@@ -194,8 +194,8 @@ def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
         fill(state.sleep_speed, np.array([context.contact.sleep_speed]))
         fill(state.colliders.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
-        fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
+    fill(state.body_surface, np.array([a.surface_row for a in assets]))
     models = [program.models.index(asset.description.model) for asset in assets]
     kinds = [asset.kind_row(is_implicit=state.capacity.implicit) for asset in assets]
     state.load(context.layout, models, np.array(kinds))

@@ -35,6 +35,7 @@ struct Fields {
   Field<int32_t> body_blocks;
   Field<int32_t> body_status;
   Field<float> body_velocity_lag;
+  Field<float> body_surface;
   Field<int32_t> body_drives;
   Field<float> body_gravity_scale;
   Field<float> body_damping;
@@ -104,7 +105,6 @@ struct Fields {
     Field<float> impulse;
   } joints;
   struct {
-    Field<float> body_surface;
     Field<int32_t> records_touches;
   } soft;
 
@@ -123,6 +123,7 @@ struct Fields {
     body_blocks = {root, scene.place("body_blocks", bodies, 2)};
     body_status = {root, scene.place("body_status", bodies, 1)};
     body_velocity_lag = {root, scene.place("body_velocity_lag", bodies, 1)};
+    body_surface = {root, scene.place("body_surface", bodies, 3)};
     body_drives = {root, scene.place("body_drives", bodies, 1)};
     body_gravity_scale = {root, scene.place("body_gravity_scale", bodies, 1)};
     body_damping = {root, scene.place("body_damping", bodies, 1)};
@@ -177,7 +178,6 @@ struct Fields {
     joints.bodies = {root, scene.place("joints.bodies", 64, 2)};
     joints.rows = {root, scene.place("joints.rows", 64, 2)};
     joints.impulse = {root, scene.place("joints.impulse", 64, 3)};
-    if (scene.has_soft_contact) soft.body_surface = {root, scene.place("soft.body_surface", bodies, 3)};
     if (scene.has_soft_contact) soft.records_touches = {root, scene.place("soft.records_touches", 1, 1)};
   }
 };

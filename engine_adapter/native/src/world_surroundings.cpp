@@ -74,7 +74,7 @@ void World::set_body_friction(int32_t slot, double friction) {
 
 void World::give_friction(int32_t slot, double friction) {
   friction_[size_t(slot)] = friction;
-  if (scene_->has_soft_contact) fields_.soft.body_surface(size_t(slot)) = as_float(friction);
+  if (scene_->has_soft_contact) fields_.body_surface(size_t(slot)) = as_float(friction);
 }
 
 void World::write_surroundings() {

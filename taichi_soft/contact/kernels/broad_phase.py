@@ -73,7 +73,7 @@ def _search_triangle(
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
-    if (upper - lower).max() <= MAX_QUERY_EDGES * ti.max(state.soft.body_surface[other].z, 1e-6):
+    if (upper - lower).max() <= MAX_QUERY_EDGES * ti.max(state.body_surface[other].z, 1e-6):
         corners = state.touching.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
@@ -94,7 +94,7 @@ def _search_triangle(
                     if wanted and is_joined == 1:
                         wanted = is_joint_there | is_held(state, p) == 0
                     if wanted and other == body:
-                        edge = state.soft.body_surface[other].z
+                        edge = state.body_surface[other].z
                         wanted = not _is_self_neighbour(state, p, corners, edge)
                     if wanted:
                         weights = closest_point_on_triangle(x, a, b, c)
@@ -147,7 +147,7 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
     thickest = ti.cast(0.0, ti.f32)
     for j in range(state.islands.first[island], state.islands.first[island + 1]):
         other = state.islands.body[j]
-        thickness = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+        thickness = 0.5 * (state.body_surface[body].y + state.body_surface[other].y)
         thickest = ti.max(thickest, thickness)
         margin = thickness + state.soft.body_reach[body] + state.soft.body_reach[other]
         wanted = state.soft.body_touches_itself[body] == 1
@@ -206,7 +206,7 @@ def begin_search(
     if forgets == 1:
         clear_candidates(state, body)
     update_boxes(state, body)
-    speed, edge = state.islands.body_speed_beside[body], state.soft.body_surface[body].z
+    speed, edge = state.islands.body_speed_beside[body], state.body_surface[body].z
     speed *= 1.0 - state.islands.is_exploding[body]
     reach = ti.min(ti.max(SEARCH_MARGIN * left * speed, SHORTEST * edge), LONGEST * edge)
     state.soft.body_reach[body] = ti.max(reach, h * speed) + h * impact_speed

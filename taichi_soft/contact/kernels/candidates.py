@@ -71,7 +71,7 @@ def record_lost(state: ti.template(), body, distance, thickness):
 
     Bodies touch at `thickness` [m]. A new search is not needed before the rest of the distance is used up.
     """
-    allowance = ti.max(distance - thickness, 2.0 * SHORTEST * state.soft.body_surface[body].z)
+    allowance = ti.max(distance - thickness, 2.0 * SHORTEST * state.body_surface[body].z)
     state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], allowance)
 
 
@@ -104,7 +104,7 @@ def list_candidates(state: ti.template(), body, thickness):
             triangle = state.soft.found_triangle[row]
             corners = state.touching.triangle_vertices[triangle]
             other = state.particle_body[corners[0]]
-            mutual = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+            mutual = 0.5 * (state.body_surface[body].y + state.body_surface[other].y)
             state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])
             state.soft.slot_triangle[slot] = triangle
             state.soft.slot_spare[slot] = state.soft.found_distance[row] - mutual

@@ -148,8 +148,8 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 def _solve_slot(state: ti.template(), slot, h, sweep):
     """Solve one contact in one sweep. The last sweep also corrects penetration."""
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
-    mine = state.soft.body_surface[state.particle_body[p]]
-    theirs = state.soft.body_surface[state.particle_body[corners[0]]]
+    mine = state.body_surface[state.particle_body[p]]
+    theirs = state.body_surface[state.particle_body[corners[0]]]
     if ti.static(state.capacity.contact.hull):
         friction = ti.sqrt(mine.x * theirs.x)
         if solve_points(state, state.soft, slot, p, corners, friction, h, int(sweep == 0)) == 1:

@@ -93,7 +93,7 @@ def _contact_range(state: ti.template(), slot, impact_speed, h):
     """
     who = state.soft.slot_vertices[slot]
     mine, other = state.particle_body[who[0]], state.particle_body[who[1]]
-    thickness = 0.5 * (state.soft.body_surface[mine].y + state.soft.body_surface[other].y)
+    thickness = 0.5 * (state.body_surface[mine].y + state.body_surface[other].y)
     speed = ti.cast(impact_speed, ti.f32)
     for i in ti.static(range(1, 4)):
         speed = ti.max(speed, state.particle_speed[who[i]])

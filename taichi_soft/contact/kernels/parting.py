@@ -132,9 +132,9 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
 @ti.func
 def _overlap(state: ti.template(), a, b):
     """1 if two bodies overlap by more than `INSET`, or at all while they are being moved apart."""
-    depth = INSET * ti.min(state.soft.body_surface[a].z, state.soft.body_surface[b].z)
-    if state.soft.overlap[a] == OVERLAPPING or state.soft.overlap[b] == OVERLAPPING:
-        depth = -OUTSET * 0.5 * (state.soft.body_surface[a].y + state.soft.body_surface[b].y)
+    depth = INSET * ti.min(state.body_surface[a].z, state.body_surface[b].z)
+    if state.body_overlap[a] == OVERLAPPING or state.body_overlap[b] == OVERLAPPING:
+        depth = -OUTSET * 0.5 * (state.body_surface[a].y + state.body_surface[b].y)
     found = _reaches_into(state, a, b, depth)
     if found == 0:
         found = _reaches_into(state, b, a, depth)
@@ -156,7 +156,7 @@ def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
     lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     for i in range(state.islands.first[island], state.islands.first[island + 1]):
         other = state.islands.body[i]
-        is_new = other > body or (other < body and state.soft.overlap[other] == CLEAR)
+        is_new = other > body or (other < body and state.body_overlap[other] == CLEAR)
         if is_new and _is_joined_or_filtered(state, body, other) == 0:
             their_lower, their_upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
             if boxes_overlap(lower, upper, their_lower, their_upper):
@@ -172,7 +172,7 @@ def find_overlaps(state: ti.template(), island: ti.i32):
     placed, row = 0, first
     while row < last:
         body = state.islands.body[row]
-        placed += int(state.soft.overlap[body] != CLEAR)
+        placed += int(state.body_overlap[body] != CLEAR)
         if state.soft.partner_count[body] != 0:
             state.soft.partner_count[body] = 0
         row = row_behind(row)
@@ -180,13 +180,13 @@ def find_overlaps(state: ti.template(), island: ti.i32):
         for i in range(first, last):
             place_points(state, state.islands.body[i])
         for i in range(first, last):
-            if state.soft.overlap[state.islands.body[i]] != CLEAR:
+            if state.body_overlap[state.islands.body[i]] != CLEAR:
                 _find_partners(state, island, state.islands.body[i])
         for i in range(first, last):
             body = state.islands.body[i]
-            if state.soft.overlap[body] != CLEAR:
+            if state.body_overlap[body] != CLEAR:
                 overlaps = state.soft.partner_count[body] > 0
-                state.soft.overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
+                state.body_overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
 
 
 @ti.func
@@ -336,14 +336,7 @@ def part_bodies(state: ti.template(), island: ti.i32, dt: ti.f32):
             _move_body(state, state.islands.body[i], dt)
 
 
-@ti.func
-def check_overlaps(state: ti.template(), body):
-    """Make the next step check which bodies a body overlaps, if bodies touch each other."""
-    if ti.static(state.capacity.contact.soft):
-        state.soft.overlap[body] = JUST_PLACED
-
-
 @ti.kernel
 def mark_placed(state: ti.template(), body: ti.i32):
     """Make the next step check which bodies a body overlaps."""
-    check_overlaps(state, body)
+    state.body_overlap[body] = JUST_PLACED

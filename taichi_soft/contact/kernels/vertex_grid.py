@@ -102,7 +102,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
             state.soft.item[table[1] + count] = k
             count += 1
             lowest, highest = ti.min(lowest, x), ti.max(highest, x)
-    cells, cell = ti.Vector.one(ti.i32, 3), ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
+    cells, cell = ti.Vector.one(ti.i32, 3), ti.max(CELL * state.body_surface[other].z, 1e-6)
     if count > 0:
         cells, cell = _choose_cells(highest - lowest, count, cell)
         last = table[0] + cells.x * cells.y * cells.z

@@ -1,7 +1,6 @@
 """Move a whole body, or set its velocity, as a rigid body between two steps."""
 
-from taichi_soft.bodies.status import TO_TARGET
-from taichi_soft.contact.kernels.parting import check_overlaps
+from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -109,4 +108,4 @@ def jump(
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
-            check_overlaps(state, body)
+            state.body_overlap[body] = JUST_PLACED

@@ -3,7 +3,7 @@
 One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
 stays clear of all others is an island of its own.
 
-Groups of fields: reads hull, joints, soft; writes islands.
+Groups of fields: reads hull, joints; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -44,7 +44,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
-        surface = state.soft.body_surface[body]
+        surface = state.body_surface[body]
         # Relative motion of its parts can change direction within the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z

@@ -50,20 +50,18 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             state.body_residual[body] = 0.0
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
-        if ti.static(state.capacity.contact.colliders > 0):
-            state.body_calm_time[body] = 0.0
-            particles = state.body_particles[body]
-            p = particles[0]
-            while p < particles[1]:
-                state.particle_touches[p] = 0
-                p = row_behind(p)
-            if ti.static(state.capacity.contact.hull):
-                clear_warm_start(state, body)
-            if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
-                for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                    state.soft.kept_normal_impulse[point] = 0.0
-        if ti.static(state.capacity.contact.soft):
-            state.soft.overlap[body] = JUST_PLACED
+        state.body_calm_time[body] = 0.0
+        state.body_overlap[body] = JUST_PLACED
+        particles = state.body_particles[body]
+        p = particles[0]
+        while p < particles[1]:
+            state.particle_touches[p] = 0
+            p = row_behind(p)
+        if ti.static(state.capacity.contact.hull):
+            clear_warm_start(state, body)
+        if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
+            for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                state.soft.kept_normal_impulse[point] = 0.0
         state.body_status[body] = ACTIVE
 
 
