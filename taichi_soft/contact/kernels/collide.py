@@ -17,11 +17,11 @@ MAX_TOUCHES = 4
 """Colliders that one particle can touch in turn within a substep; then it stops."""
 
 
-DEEP = 2.0
+INNER_CHECK_PATH = 2.0
 """Path of a body's fastest particle in the rest of the step, in mean edges, above which inner particles are
 checked too. Hard impacts drive them past outer particles that were stopped."""
 
-UNSEEN = 1e30
+UNCHECKED = 1e30
 """Clearance [m] of inner particles that need no check."""
 
 
@@ -103,7 +103,7 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.touching.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
-    is_deep = reach > DEEP * state.body_edge[body]
+    is_deep = reach > INNER_CHECK_PATH * state.body_edge[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
             x = state.particle_position[p]
@@ -138,7 +138,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
     """
     colliders, outer, particles = state.colliders, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        colliders.particle_clearance[p] = UNSEEN
+        colliders.particle_clearance[p] = UNCHECKED
     touches_by_points = False  # of its hull, not by particles
     if ti.static(state.capacity.contact.hull):
         touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
@@ -148,7 +148,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
                 _measure_clearance(state, colliders.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
             if colliders.particle_clearance[p] < 0.0:  # it entered unchecked: do not eject it at once
-                colliders.particle_clearance[p] = UNSEEN
+                colliders.particle_clearance[p] = UNCHECKED
     for k in range(outer[0], outer[1]):
         colliders.particle_clearance[state.touching.outer_particle[k]] = reach
     for i in range(count):

@@ -28,10 +28,10 @@ OUTSET = 0.5
 """Clearance, in thicknesses, at which overlapping bodies can touch again. Contact then has hardly any
 penetration to correct."""
 
-PULL = 0.05
+INWARD_SHIFT = 0.05
 """Fraction by which the corners of a triangle are moved towards its centre for the overlap test."""
 
-SAME_PLACE = 1e-3
+MIN_CENTER_DISTANCE = 1e-3
 """Distance of two centres, over the largest side, below which the slots choose the direction."""
 
 
@@ -114,7 +114,7 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
                 for i in range(4):
                     x = middle
                     if i < 3:
-                        x += (1.0 - PULL) * (state.particle_position[corners[i]] - (a + b + c) / 3.0)
+                        x += (1.0 - INWARD_SHIFT) * (state.particle_position[corners[i]] - (a + b + c) / 3.0)
                     if found == 0 and boxes_overlap(x, x, lower, upper):
                         found = _encloses(state, other, x)
                 t = row_behind(t)
@@ -228,7 +228,7 @@ def _measure(state: ti.template(), body):
 
 
 @ti.func
-def _place_of_slot(body):
+def _point_of_slot(body):
     """Point of a unit square, different for each slot: Roberts' sequence R2."""
     u, v = 0.7548777 * body, 0.5698403 * body
     return ti.Vector([u - ti.floor(u), v - ti.floor(v), 0.0])
@@ -240,8 +240,8 @@ def _parting_direction(soft: ti.template(), a, b):
     direction chosen by the slots.
     """
     away = soft.center[a] - soft.center[b]
-    if away.norm() < SAME_PLACE * ti.min(soft.size[a], soft.size[b]):
-        away = _place_of_slot(a) - _place_of_slot(b)
+    if away.norm() < MIN_CENTER_DISTANCE * ti.min(soft.size[a], soft.size[b]):
+        away = _point_of_slot(a) - _point_of_slot(b)
     return away / ti.max(away.norm(), 1e-30)
 
 

@@ -13,7 +13,7 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-LEAST_REBOUND = 0.1
+MIN_REBOUND = 0.1
 """Speed [m/s] that the centre of mass always keeps, so that a flattened body rises again."""
 
 
@@ -88,7 +88,7 @@ def limit_rebounds(state: ti.template(), body, time):
             leave = state.colliders.rebound[row]
             if leave == 0.0:
                 # If a rotating body strikes, its centre can move away without having approached.
-                leave = ti.max(LEAST_REBOUND, rates.z / rates.x - approach)
+                leave = ti.max(MIN_REBOUND, rates.z / rates.x - approach)
             if approach > RESTITUTION_SPEED:
                 leave = ti.max(leave, state.colliders.surface[c].y * approach)
             state.colliders.rebound[row] = leave

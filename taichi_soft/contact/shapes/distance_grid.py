@@ -18,7 +18,7 @@ from taichi_soft.core.errors import MeshError
 from taichi_soft.core.runtime import init
 from taichi_soft.meshing.advice import with_install_hint
 
-USUAL_CELLS = 64
+DEFAULT_CELL_COUNT = 64
 """Default number of cells along the longest side of the mesh."""
 
 MAX_NODES = 2_000_000
@@ -56,7 +56,7 @@ def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
     """
     low, high = mesh.bounds
     longest = float((high - low).max())
-    size = longest / USUAL_CELLS if cell is None else as_length(cell, "cell")
+    size = longest / DEFAULT_CELL_COUNT if cell is None else as_length(cell, "cell")
     counts = _node_counts(high - low, size)
     if counts.prod() > MAX_NODES:
         larger = size

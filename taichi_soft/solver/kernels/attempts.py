@@ -128,7 +128,7 @@ def restore_island(state: ti.template(), program: ti.template(), island: ti.i32)
 
 
 @ti.func
-def brake_island(state: ti.template(), island, is_braked):
+def set_strong_damping(state: ti.template(), island, is_braked):
     """Damp the vibrations of all bodies of an island strongly (1), or no longer (0)."""
     first, end = state.islands.first[island], state.islands.first[island + 1]
     row = first

@@ -25,7 +25,7 @@ from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rota
 FARTHEST = 0.5
 """Change of an edge in a substep, over its length, above which the substep is halved."""
 
-LEAST_LENGTH = 0.1
+MIN_LENGTH = 0.1
 """Edges shorter than this fraction of the mean length count as that long."""
 
 MAX_PIECES = 32
@@ -109,7 +109,7 @@ def _largest_change(state: ti.template(), body):
     for e in range(edges[0], edges[1]):
         r = state.direction[state.edge_vertices[e][1]] - state.direction[state.edge_vertices[e][0]]
         mean += r.dot(r)
-    least = LEAST_LENGTH * LEAST_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
+    least = MIN_LENGTH * MIN_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
     worst = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]

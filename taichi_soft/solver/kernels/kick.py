@@ -18,7 +18,7 @@ MAX_VELOCITY_CHANGE = 1.0
 Stable vibrations stay below it, even of slivers: a stable substep is about the time in which sound crosses
 the smallest tetrahedron."""
 
-PRESSED = 4.0
+TOUCHED_FACTOR = 4.0
 """Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep: contact removes
 most of its change."""
 
@@ -114,7 +114,7 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        counts = ti.select(state.particle_touches[p] == 1, 1.0 / PRESSED**2, 1.0)
+        counts = ti.select(state.particle_touches[p] == 1, 1.0 / TOUCHED_FACTOR**2, 1.0)
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if ti.static(program.has_soft_contact):
         if job.has_pairs == 1:

@@ -17,10 +17,10 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
     attempts_of,
-    brake_island,
     island_is_valid,
     refined_substeps,
     restore_island,
+    set_strong_damping,
 )
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
@@ -70,12 +70,12 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         _make_substeps(state, program, island, end, count, longest / finer, is_last, run)
         left -= run.s - first
         if is_last == 0 and run.is_stable == 0:
-            _put_back(state, program, island, run, halvings)
+            _restore(state, program, island, run, halvings)
         elif run.s == count:
             if (is_last | island_is_valid(state, island)) == 1:
                 is_good = 1
             else:
-                _put_back(state, program, island, run, halvings)
+                _restore(state, program, island, run, halvings)
     if is_good == 1:
         _end(state, program, island, run, finer * least, longest / finer)
         run.is_awake = update_sleep(state, island, substeps * h)  # puts resting islands to sleep
@@ -139,14 +139,14 @@ def _mean_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _put_back(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
+def _restore(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
     """Restore an island for the next attempt."""
     restore_island(state, program, island)
     run.attempt += 1
     run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
     run.fastest, run.shift = 0.0, ti.Vector.zero(ti.f32, 3)
     if run.attempt > halvings:
-        brake_island(state, island, 1)
+        set_strong_damping(state, island, 1)
 
 
 @ti.func
@@ -160,7 +160,7 @@ def _end(state: ti.template(), program: ti.template(), island, run: ti.template(
         row = row_behind(row)
     if ti.static(program.has_soft_contact):
         part_bodies(state, island, substeps * h)
-    brake_island(state, island, 0)
+    set_strong_damping(state, island, 0)
     run.attempt, run.failed = DONE, failed
 
 

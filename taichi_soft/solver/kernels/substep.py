@@ -36,7 +36,7 @@ from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
 from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, list_near_colliders
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_body
-from taichi_soft.solver.kernels.vibration import damp_body, to_positions
+from taichi_soft.solver.kernels.vibration import damp_body, time_to_positions
 from taichi_soft.solver.step_fields import Job
 
 BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
@@ -80,7 +80,7 @@ def _advance_body(state: ti.template(), program: ti.template(), body, job):
     if job.s == 0:
         update_rest_state(state, body)
     damp_body(state, program, body, felt, job.h, job.s, job.substeps)
-    calm_body(state, program, body, to_positions(program, felt, job.h), job.h, job.s, job.substeps)
+    calm_body(state, program, body, time_to_positions(program, felt, job.h), job.h, job.s, job.substeps)
     kick_body(state, program, body, job, felt)
 
 

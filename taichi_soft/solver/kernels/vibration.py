@@ -35,7 +35,7 @@ MOVING, SLOW, RESTING = range(3)
 RESTING_RATE = 2.0
 """Smallest rate at which the vibrations of a resting body are damped [1/s]."""
 
-SHARP_BRAKE = 0.5
+STRONG_DAMPING = 0.5
 """Fraction of the vibration kept in each substep of the last attempt at a step."""
 
 FARTHEST = 0.1
@@ -224,7 +224,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
     """
     keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
     if state.body_is_braked[body] == 1:
-        keep = SHARP_BRAKE
+        keep = STRONG_DAMPING
     elif rate > 0.0:
         if ti.static(state.capacity.has_contact):
             if state.islands.rest_state[body] == RESTING:
@@ -240,7 +240,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
 
 
 @ti.func
-def to_positions(program: ti.template(), kick, h):
+def time_to_positions(program: ti.template(), kick, h):
     """Part of a kick [s] that advances velocities to the time of the positions, in a substep of `h` [s]."""
     return kick - program.integrator.lag * h
 
@@ -254,7 +254,7 @@ def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        fade_vibration(state, program, body, to_positions(program, kick, h), h, keep)
+        fade_vibration(state, program, body, time_to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
 
@@ -281,6 +281,6 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     keep = kept_vibration(state, body, h, s, substeps)
     keep *= kept_while_inverted(state, body, h, s == 0)
     if keep < 1.0:
-        _fade_body(state, program, body, to_positions(program, kick, h), h, keep)
+        _fade_body(state, program, body, time_to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
