@@ -13,7 +13,7 @@ from hypothesis import settings
 from xdist.workermanage import NodeManager
 
 from lab.extras import EXTRAS as LAB_EXTRAS
-from taichi_soft import Material, World, box, init, load_mesh
+from taichi_soft import Material, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import EXTRAS, missing_among
 from taichi_soft.core.runtime import DEBUG
@@ -22,6 +22,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
 
 from shares import Shares, place_of  # noqa: E402
+from worlds import bare_world  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
@@ -233,7 +234,7 @@ def solo():
 
     def build(mesh, material, world_options=None, **body_options):
         usual = {} if "position" in body_options else {"floor": None}
-        world = World(**{**usual, **(world_options or {})})
+        world = bare_world(**{**usual, **(world_options or {})})
         body = world.add_body(mesh, material, **{"law": "virial", **body_options})
         world.build()
         return world, body

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from difficult_surfaces import BODIES, REFUSED, SCALED
+from worlds import bare_world
 
-from taichi_soft import Material, MeshError, SoftBodyAsset, World
+from taichi_soft import Material, MeshError, SoftBodyAsset
 
 pytestmark = pytest.mark.soak
 
@@ -17,7 +18,7 @@ class Fall:
     """Bodies dropped onto the floor side by side, when they have rested for a while."""
 
     def __init__(self, assets, scale=1.0, seconds=6.0):
-        world = self.world = World()
+        world = self.world = bare_world()
         self.scale, self.dt = scale, np.sqrt(scale) / 60
         self.bodies = {}
         for i, (name, asset) in enumerate(assets.items()):

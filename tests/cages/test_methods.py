@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from surfaces import ball, joined, lens_volume, turned, with_some_turned, without
+from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -21,7 +22,6 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     TetMesh,
-    World,
     load_mesh,
     save_mesh,
 )
@@ -184,7 +184,7 @@ def test_a_body_of_it_falls_and_rests_and_is_drawn_as_the_artist_made_it(method,
     save_mesh(asset.mesh, tmp_path / "block.npz")
     again = SoftBodyAsset(load_mesh(tmp_path / "block.npz"), JELLY, skin=surface)
     above = 0.05 - surface.bounds[0][2]
-    world = World()
+    world = bare_world()
     bodies = [world.add_body(each, position=(2 * i, 0, above)) for i, each in enumerate((asset, again))]
     world.build()
     for i, body in enumerate(bodies):

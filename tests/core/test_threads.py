@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
 import taichi_soft
 from engine_adapter import EngineAdapter, FixedStep
@@ -17,7 +18,6 @@ from taichi_soft import (
     Material,
     MeshShape,
     StateError,
-    World,
     box,
     force_gradient,
     init,
@@ -31,7 +31,7 @@ DT = 1 / 60
 
 
 def made(**options):
-    world = World(**options)
+    world = bare_world(**options)
     world.add_body(CUBE, JELLY, position=(0, 0, 0.52), velocity=(0, 0, -3))
     world.build()
     return world

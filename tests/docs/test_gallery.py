@@ -16,7 +16,6 @@ from taichi_soft import (
     BoxShape,
     Material,
     MissingExtraError,
-    World,
     box,
 )
 from taichi_soft.core.package_data import DEMOS
@@ -29,6 +28,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import gallery_hooks  # noqa: E402
 import make_gallery  # noqa: E402
+from worlds import bare_world  # noqa: E402
 
 DT = 1 / 50
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
@@ -36,7 +36,7 @@ RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
 
 def falling_stage():
     """A red box falls beside a blue slab that moves and turns; below is a slab that does neither."""
-    world = World(floor=-0.5)
+    world = bare_world(floor=-0.5)
     body = world.add_body(box((0.6, 0.5, 0.4), (2, 2, 2)), Material(1e5, 0.2, 1000.0), position=(0, 0, 2.5))
     mover = world.add_collider(BoxShape((0.3, 0.4, 0.5)), position=(1.2, 0.0, 0.5))
     world.add_collider(BoxShape((4.0, 2.0, 0.2)), position=(0.3, 0.0, -0.4))

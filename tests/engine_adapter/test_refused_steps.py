@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -12,7 +13,6 @@ from taichi_soft import (
     Released,
     SoftBodyAsset,
     SphereShape,
-    World,
     box,
 )
 
@@ -58,7 +58,7 @@ FIELDS = {
 @pytest.fixture(scope="module", params=["leapfrog", "implicit_euler"])
 def game(request):
     """Four crates with levels of detail, two of which fall onto a sphere and a third."""
-    world = World(soft_contact=True, sleep_speed=0.05, integrator=request.param, record=8)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, integrator=request.param, record=8)
     world.add_collider(SphereShape(0.3))
     world.reserve(CRATE, COUNT)
     world.build()

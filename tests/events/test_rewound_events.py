@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -15,7 +16,6 @@ from taichi_soft import (
     StressExceeded,
     TearCandidates,
     Woke,
-    World,
     box,
 )
 from taichi_soft.core.container import seal, unseal
@@ -30,7 +30,7 @@ class Game:
     """Bodies that bounce on each other and on the floor, come to rest, are woken, come and go."""
 
     def __init__(self):
-        world = self.world = World(soft_contact=True, collider_room=1, sleep_speed=0.05)
+        world = self.world = bare_world(soft_contact=True, collider_room=1, sleep_speed=0.05)
         world.reserve(BOUNCY, 3)
         world.reserve(DULL, 1)
         world.build()

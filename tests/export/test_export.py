@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
-from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
 
@@ -12,13 +13,13 @@ BALL = SoftBodyAsset(sphere(radius=0.3, resolution=2), JELLY)
 
 
 def cut():
-    world = World()
+    world = bare_world()
     world.add_body(box((1, 1, 1), (2, 2, 2)), JELLY, spare_vertices=20, position=(0, 0, 1))
     return world
 
 
 def plain():
-    world = World()
+    world = bare_world()
     world.add_body(BALL, position=(0, 0, 1))
     return world
 
@@ -59,7 +60,7 @@ def skipping():
 
 
 def flat():
-    world = World(schedule="flat")
+    world = bare_world(schedule="flat")
     world.add_body(BALL, position=(0, 0, 1))
     return world
 

@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses
+from worlds import bare_world
 
 from taichi_soft import (
     Material,
     OptionError,
     SoftBodyAsset,
     TetMesh,
-    World,
     box,
     material_from_feel,
     rope,
@@ -53,7 +53,7 @@ def targets(count, seed):
 
 
 def world_of(mesh, feel):
-    world = World(floor=0.0)
+    world = bare_world(floor=0.0)
     low = np.array([0.0, 0.0, -mesh.vertices[:, 2].min()])
     body = world.add_body(mesh, feel.material, position=low)
     world.build()

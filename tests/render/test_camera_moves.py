@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
-from taichi_soft import Material, OptionError, World, box
+from taichi_soft import Material, OptionError, box
 from taichi_soft.render import Camera
 from taichi_soft.render.camera_moves import Follow, Orbit
 
@@ -15,7 +16,7 @@ SIZE = (320, 180)
 
 @pytest.fixture(scope="module")
 def body():
-    world = World()
+    world = bare_world()
     return world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.2, 1000), position=(0, 0, 2))
 
 

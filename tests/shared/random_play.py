@@ -18,6 +18,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 # ruff: noqa: E402, E501
+from worlds import bare_world
+
 from taichi_soft import (
     Contact,
     HeightFieldShape,
@@ -27,7 +29,6 @@ from taichi_soft import (
     SoftBodyAsset,
     SphereShape,
     StateError,
-    World,
     box,
     init,
 )
@@ -47,7 +48,7 @@ def make_world(**options):
         plasticity=Plasticity(yield_strain=0.3, maximum=0.2),
         spare_vertices=12,
     )
-    world = World(soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000, **options)
+    world = bare_world(soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000, **options)
     world.add_collider(SphereShape(0.3), position=(0, 0, 0.1))
     world.add_collider(WAVES)
     world.reserve(cube, 4)

@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
-from taichi_soft import Material, SoftBodyAsset, World, box
+from taichi_soft import Material, SoftBodyAsset, box
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.islands import find_islands
 
@@ -25,7 +26,7 @@ def find(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 def crowd(**options):
     """A world of cubes far from each other, some slots empty between them."""
     cube = SoftBodyAsset(CUBE, JELLY)
-    world = World(floor=None, gravity=(0, 0, 0), **options)
+    world = bare_world(floor=None, gravity=(0, 0, 0), **options)
     world.reserve(cube, COUNT + EMPTY)
     world.build()
     for place in range(COUNT + EMPTY):

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from worlds import bare_world
 
-from taichi_soft import BoxShape, Material, PlaneShape, World, box
+from taichi_soft import BoxShape, Material, PlaneShape, box
 from taichi_soft.core.math.rotations import matrix_of
 
 DT, SPEED = 1 / 60, 47.0
@@ -13,7 +14,7 @@ POSES = np.random.default_rng(3).normal(size=(6, 4))
 
 def thrown():
     """Six cubes, each on its way to a floor and a wall of its own."""
-    world = World(floor=None, gravity=(0, 0, 0), collider_room=2)
+    world = bare_world(floor=None, gravity=(0, 0, 0), collider_room=2)
     world.add_collider(PlaneShape())
     world.add_collider(BoxShape((0.2, 40, 40)), position=(1.0, 0, 0))
     for number, pose in enumerate(POSES):

@@ -7,6 +7,7 @@ from contextlib import nullcontext, suppress
 import numpy as np
 import pytest
 from public_face import CALLS, DT, READERS, SUBSTEPS, Game
+from worlds import bare_world
 
 from taichi_soft import (
     Event,
@@ -70,7 +71,7 @@ def test_nothing_is_compiled_where_what_yields_tears(compiled):
         tearing=Tearing(3e4),
         spare_vertices=40,
     )
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     world.reserve(bar, 3)
     world.build()
     world.warm_up()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -13,7 +14,6 @@ from taichi_soft import (
     ParticleMesh,
     Stiffness,
     TetMesh,
-    World,
     box,
     frames_along,
     internal_forces,
@@ -153,7 +153,7 @@ def test_constants_for_another_mesh_are_refused(material, message):
 
 @pytest.mark.parametrize("law", ["neo_hookean", "springs", "volume_springs", "cmpm2"])
 def test_laws_that_know_no_direction_refuse_it_and_name_those_that_do(law):
-    world = World()
+    world = bare_world()
     message = f"does not support law '{law}', .*'virial', 'face' or 'st_venant_kirchhoff'"
     with pytest.raises(MaterialError, match=message):
         world.add_body(CUBE, AnisotropicMaterial(WOOD, 500.0), law=law)
