@@ -17,12 +17,12 @@ from taichi_soft import Material, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import EXTRAS, missing_among
 from taichi_soft.core.runtime import DEBUG
+from taichi_soft.world.bare import bare_world
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
 
 from shares import Shares, place_of  # noqa: E402
-from worlds import bare_world  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so

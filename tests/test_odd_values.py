@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 import taichi_soft as ts
 from engine_adapter import EngineAdapter, FixedStep
@@ -22,6 +21,7 @@ from taichi_soft.render import (
 from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.film import Actor, Stage, film
 from taichi_soft.render.framing import framed
+from taichi_soft.world.bare import bare_world
 
 ODD = (
     *(None, True, 0, -0.0, -1, 1.5, np.nan, np.inf, 10**400, 1j, np.float32(2), np.int64(3)),

@@ -15,7 +15,6 @@ from glb import Glb, z_up
 from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, box, sphere
@@ -23,6 +22,7 @@ from taichi_soft.bake import bake
 from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core import extras
 from taichi_soft.core.errors import BakeError, MissingExtraError
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(5e4, 0.4, 1000.0)
 FPS, SECONDS, FRAMES = 30.0, 0.5, 16

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -13,6 +12,7 @@ from taichi_soft import (
     box,
 )
 from taichi_soft.bodies.layout import arrange
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH = box(cells=(2, 2, 2))

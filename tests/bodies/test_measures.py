@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from worlds import bare_world
 
 from taichi_soft import MeshError, box, cloth, rope, sphere
 from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.elements.materials import SpringMaterial
+from taichi_soft.world.bare import bare_world
 
 RANDOM = np.random.default_rng(2)
 TURNS = [np.eye(3), *Rotation.random(4, random_state=3).as_matrix()]

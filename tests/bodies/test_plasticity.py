@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -20,6 +19,7 @@ from taichi_soft import (
 )
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.soft_body import rest_inverses_of
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

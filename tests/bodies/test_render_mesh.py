@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -19,6 +18,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.bodies import render_mesh
+from taichi_soft.world.bare import bare_world
 
 CUBE, BALL, BLOCK = box((1, 1, 1), (1, 1, 1)), sphere(0.5, 5), box((1, 1, 1), (3, 3, 3))
 _TURN = np.linspace(0.0, 2 * np.pi, 13)[:-1]

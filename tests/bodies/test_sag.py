@@ -5,9 +5,9 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, TooSoftWarning, box
+from taichi_soft.world.bare import bare_world
 
 BLOCK = box((1, 1, 1), (2, 2, 2))
 SLAB = box((1, 1, 0.1), (2, 2, 1))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 from surfaces import ball, joined
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -22,6 +21,7 @@ from taichi_soft import (
 from taichi_soft.bodies import skin_mesh
 from taichi_soft.doctor.surface import facts_of
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.3, 1000.0)
 BAR = trimesh.creation.box((3.0, 0.6, 0.6)).subdivide().subdivide().subdivide()

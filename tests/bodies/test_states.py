@@ -3,12 +3,12 @@
 import gc
 
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, box
 from taichi_soft.bodies import fields
 from taichi_soft.contact.fields import ContactCapacity
 from taichi_soft.solver.state import Capacity
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -16,6 +15,7 @@ from taichi_soft import (
     box,
     internal_forces,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -5,7 +5,6 @@ import pytest
 import random_play
 import trimesh
 from reading import burst, leave, not_finite
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -26,6 +25,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from difficult_surfaces import BODIES, REFUSED, SCALED
-from worlds import bare_world
 
 from taichi_soft import Material, MeshError, SoftBodyAsset
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import trimesh
 from surfaces import ball, joined, lens_volume, turned, with_some_turned, without
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -29,6 +28,7 @@ from taichi_soft.cages import mesher_process, tetrahedra_of
 from taichi_soft.cages.mesher import winding_number
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.meshing.surfaces import read_surfaces
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 from surfaces import ball, joined, with_triangles
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, SoftBodyAsset, element_model, stable_step
 from taichi_soft.cages import build_cage, tetrahedra_of
 from taichi_soft.cages.marking import part_count
 from taichi_soft.meshing.surfaces import read_surfaces
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0)
 TOP = (2.0, 1.2, 0.25)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import trimesh
 from experiments import alone, turn
-from worlds import bare_world
 
 from taichi_soft import (
     BoxShape,
@@ -24,6 +23,7 @@ from taichi_soft import (
     box,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 G = 9.81
 DT = 1 / 60

@@ -10,7 +10,6 @@ import sys
 import numpy as np
 import pytest
 from experiments import alone, turn
-from worlds import bare_world
 
 from taichi_soft import (
     BoxShape,
@@ -24,6 +23,7 @@ from taichi_soft import (
     cloth,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Contact, Material, TetMesh, box
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.contact.kernels.narrow_phase import find_gaps
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 THICKNESS = 0.02

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Contact,
@@ -14,6 +13,7 @@ from taichi_soft import (
     cloth,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 SOFT = Material(young=1e5, poisson=0.4, density=800.0)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import BoxShape, Material, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, EDGE, COUNT = 1 / 60, 0.5, 5
 DENSITY, GRAVITY = 1000.0, 9.81

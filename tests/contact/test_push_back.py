@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, SphereShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 GRAVITY = np.array([0.0, 0.0, -9.81])

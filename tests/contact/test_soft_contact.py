@@ -5,9 +5,9 @@ Without gravity and floor, two bodies and what passes between them are all there
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Contact, Material, beam, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, box
 from taichi_soft.bodies.kernels.readout import read_velocities
 from taichi_soft.control.frames import Frames
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import context_of_world
 
 SIDE = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 0] < -0.4)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -13,6 +12,7 @@ from taichi_soft import (
     Stiffness,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

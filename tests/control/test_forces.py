@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, box
+from taichi_soft.world.bare import bare_world
 
 NAN = float("nan")
 KINDS = ("leapfrog", "lazy_leapfrog", "implicit_euler")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -15,6 +14,7 @@ from taichi_soft import (
     cloth,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 MESH = box(cells=(4, 4, 4))
 MIDDLE = int(np.argmin(np.linalg.norm(MESH.vertices - [0, 0, 0.5], axis=1)))  # of the top face

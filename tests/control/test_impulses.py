@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, StateError, box, sphere
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 SCHEDULES = ("per_body", "flat", "implicit")

@@ -5,10 +5,10 @@ In a file of their own: their world is gone before those of `test_joints`, which
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, box
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 BIG = box(cells=(2, 2, 2))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Contact,
@@ -14,6 +13,7 @@ from taichi_soft import (
     rope,
 )
 from taichi_soft.control.kernels.joints import JOINT_ROWS, MOST_JOINTS
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 BIG, SMALL = box(cells=(2, 2, 2)), box((0.7, 0.6, 0.5), (3, 3, 2))  # whose vertices lie nowhere alike

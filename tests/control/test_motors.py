@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, box, cylinder
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 WHEEL = cylinder(0.5, 0.4, rings=3, layers=3)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, StateError, box
+from taichi_soft.world.bare import bare_world
 
 TOP = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 2] > 0.4)
 NAN = float("nan")

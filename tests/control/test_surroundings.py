@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     BoxShape,
@@ -14,6 +13,7 @@ from taichi_soft import (
     box,
 )
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0, damping_ratio=0.0)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, SpringMaterial, box, cloth, sphere
+from taichi_soft.world.bare import bare_world
 
 AIR = 1.2
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 import taichi_soft
 from engine_adapter import EngineAdapter, FixedStep
@@ -24,6 +23,7 @@ from taichi_soft import (
     internal_forces,
 )
 from taichi_soft.core.handles import Handle
+from taichi_soft.world.bare import bare_world
 
 ROOT = Path(__file__).parents[2]
 CUBE, JELLY = box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0)

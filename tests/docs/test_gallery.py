@@ -22,13 +22,13 @@ from taichi_soft.core.package_data import DEMOS
 from taichi_soft.render import Camera, VideoWriter
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import Actor, Stage
+from taichi_soft.world.bare import bare_world
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
 
 import gallery_hooks  # noqa: E402
 import make_gallery  # noqa: E402
-from worlds import bare_world  # noqa: E402
 
 DT = 1 / 50
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)

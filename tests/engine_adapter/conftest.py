@@ -1,9 +1,9 @@
 """A small world for the adapter to run."""
 
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, box
+from taichi_soft.world.bare import bare_world
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import bare_world
 
 import engine_adapter
 import taichi_soft
@@ -20,6 +19,7 @@ from taichi_soft import (
     UnstableStepWarning,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 

@@ -11,10 +11,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import trimesh
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Body, Material, OptionError, SoftBodyAsset, StateError
+from taichi_soft.world.bare import bare_world
 
 COUNT = 6
 EYE = np.array([-10.0, 0.0, 0.5])

@@ -14,7 +14,6 @@ pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[p
 from direct.showbase.ShowBase import ShowBase
 from panda3d import bullet, core
 from PIL import Image
-from worlds import bare_world
 
 import engine_adapter.panda3d
 from engine_adapter import EngineAdapter, FixedStep
@@ -27,6 +26,7 @@ from engine_adapter.panda3d import (
     add_colliders,
 )
 from taichi_soft import Material, OptionError, SoftBodyAsset, box
+from taichi_soft.world.bare import bare_world
 
 DT, EDGE, MASS, WEIGHT = 1 / 60, 0.6, 60.0, 9.81
 SKY = (51, 102, 204)

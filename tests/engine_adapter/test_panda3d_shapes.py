@@ -6,10 +6,10 @@ import pytest
 pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[panda3d]'")
 
 from panda3d import bullet, core
-from worlds import bare_world
 
 from engine_adapter.panda3d import add_colliders, shapes_of
 from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, SphereShape
+from taichi_soft.world.bare import bare_world
 
 P = core.LPoint3
 SOLIDS = {

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -15,6 +14,7 @@ from taichi_soft import (
     SphereShape,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

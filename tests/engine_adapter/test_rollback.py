@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from random_play import DT, SUBSTEPS, act, make_world
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep, Rollback
 from taichi_soft import OptionError, StateError
+from taichi_soft.world.bare import bare_world
 
 
 @pytest.fixture(scope="module")

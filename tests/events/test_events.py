@@ -5,7 +5,6 @@ import warnings
 import numpy as np
 import pytest
 from thread_scenes import motion, thrown
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -26,6 +25,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.events import log
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 STEPS = 4

@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -20,6 +19,7 @@ from taichi_soft import (
 )
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
+from taichi_soft.world.bare import bare_world
 
 DT, STEPS, TICKS = 1 / 60, 12, 150
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -17,6 +16,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 STEPS = 40

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(young=5e4, poisson=0.4, density=1000, damping_ratio=0.1)
 BALL = SoftBodyAsset(sphere(radius=0.3, resolution=2), JELLY)

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -18,6 +17,7 @@ from taichi_soft import (
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 PROMISED = 0.05
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from engine_adapter import Rollback
 from taichi_soft import Material, Plasticity, SnapshotError, SoftBodyAsset, Tearing, box
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

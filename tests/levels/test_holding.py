@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     ContactBegan,
@@ -18,6 +17,7 @@ from taichi_soft import (
 )
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
 BAR = [box((1.2, 0.3, 0.25), cells) for cells in ((16, 4, 4), (8, 3, 2), (5, 2, 2))]

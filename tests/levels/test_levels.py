@@ -8,7 +8,6 @@ import trimesh
 from mode_oracle import assembled_stiffness, lumped_masses
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import eigsh
-from worlds import bare_world
 
 from taichi_soft import (
     FrozenBodyWarning,
@@ -22,6 +21,7 @@ from taichi_soft import (
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
 RING = trimesh.creation.torus(0.5, 0.2)

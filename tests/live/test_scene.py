@@ -9,14 +9,13 @@ import pytest
 
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 
-from worlds import bare_world
-
 from taichi_soft import Material, OptionError, SoftBodyAsset, World, box, element_model, stable_step
 from taichi_soft.live import choices
 from taichi_soft.live.choices import PALETTES
 from taichi_soft.live.controls import Controls
 from taichi_soft.live.saving import packed, saved_script
 from taichi_soft.live.scene import SceneSource, found_source, made_scene
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 SCENE = """

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, ParticleMesh, SpringMaterial, StateError, box
 from taichi_soft.live import stress_table
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 

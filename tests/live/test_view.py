@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from visitor import Visitor
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, OptionError, StateError, box
 from taichi_soft.live import view
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 

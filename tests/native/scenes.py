@@ -2,7 +2,6 @@
 
 import numpy as np
 from games import line
-from worlds import bare_world
 
 from taichi_soft import (
     LAWS,
@@ -21,6 +20,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 64
 STEPS = 600

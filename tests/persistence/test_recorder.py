@@ -8,7 +8,6 @@ import zlib
 import numpy as np
 import pytest
 from random_play import DT, SUBSTEPS, act, make_world, play
-from worlds import bare_world
 
 from taichi_soft import (
     FrozenBodyWarning,
@@ -24,6 +23,7 @@ from taichi_soft.core.container import seal
 from taichi_soft.core.serialisation import to_json
 from taichi_soft.persistence.recorder import MARK, VERSION, read_recording
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

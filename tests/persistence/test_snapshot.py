@@ -7,7 +7,6 @@ import warnings
 import numpy as np
 import pytest
 from random_play import DT, SUBSTEPS, make_world, play
-from worlds import bare_world
 
 from taichi_soft import (
     BoxShape,
@@ -25,6 +24,7 @@ from taichi_soft import (
 )
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
+from taichi_soft.world.bare import bare_world
 
 
 def middle():

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import trimesh
-from worlds import bare_world
 
 from taichi_soft import OptionError, SpringMaterial, StateError, box, cloth, rope, sphere
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 SPRING = SpringMaterial(stiffness=100.0)

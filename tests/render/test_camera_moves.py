@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, box
 from taichi_soft.render import Camera
 from taichi_soft.render.camera_moves import Follow, Orbit
+from taichi_soft.world.bare import bare_world
 
 VIEW = Camera((1.0, -5.0, 2.5), (0.5, 0.2, 1.0), fov_degrees=35.0)
 SIZE = (320, 180)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from worlds import bare_world
 
 from engine_adapter import FixedStep
 from taichi_soft import (
@@ -24,6 +23,7 @@ from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
 from taichi_soft.render.artist import speed_of
 from taichi_soft.render.film import Actor, Follow, Stage, film
 from taichi_soft.render.props import SLATE, Scenery
+from taichi_soft.world.bare import bare_world
 
 
 def falling_box(dt: float = 1 / 50) -> Stage:

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, OptionError, box
@@ -12,6 +11,7 @@ from taichi_soft.render import Camera
 from taichi_soft.render.camera_moves import Orbit
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.framing import framed
+from taichi_soft.world.bare import bare_world
 
 
 def thrown(camera=None):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import trimesh
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -19,6 +18,7 @@ from taichi_soft import (
 from taichi_soft.render import Camera, Renderer
 from taichi_soft.render.film import Actor, Stage, film
 from taichi_soft.render.props import Prop, Scenery
+from taichi_soft.world.bare import bare_world
 
 
 def about_y(angle):

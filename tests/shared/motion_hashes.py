@@ -23,7 +23,6 @@ if __name__ == "__main__":
 # ruff: noqa: E402
 import random_play
 import thread_scenes
-from worlds import bare_world
 
 from taichi_soft import Material, box, delaunay_mesh, init
 from taichi_soft.core.errors import TaichiSoftError
@@ -31,6 +30,7 @@ from taichi_soft.core.types import Integrator
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
+from taichi_soft.world.bare import bare_world
 
 TICKS = 300
 DEMO_SECONDS = 2.0

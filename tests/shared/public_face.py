@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep, Rollback, RollbackSession
 from taichi_soft import (
@@ -31,6 +30,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 NAN, INF, HUGE = float("nan"), float("inf"), 10**400
 DT, SUBSTEPS = 1 / 60, 8

@@ -18,8 +18,6 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 # ruff: noqa: E402, E501
-from worlds import bare_world
-
 from taichi_soft import (
     Contact,
     HeightFieldShape,
@@ -32,6 +30,7 @@ from taichi_soft import (
     box,
     init,
 )
+from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 60, 10
 SOFT = Material(young=3e4, poisson=0.3, density=500.0, damping=5.0)

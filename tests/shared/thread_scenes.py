@@ -19,10 +19,10 @@ if __name__ == "__main__":
 
 # ruff: noqa: E402
 import random_play
-from worlds import bare_world
 
 from taichi_soft import Contact, Material, SoftBodyAsset, SpringMaterial, box, cloth, init, sphere
 from taichi_soft.bodies.render_mesh import MIN_PARALLEL_VERTICES
+from taichi_soft.world.bare import bare_world
 
 CUBE = box(cells=(2, 2, 2))
 TOP = np.flatnonzero(CUBE.vertices[:, 2] > 0.49)

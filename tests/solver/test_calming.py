@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, SLEEP = 1 / 60, 0.02
 JELLY = Material(5e4, 0.4, 1000)

@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -16,6 +15,7 @@ from taichi_soft import (
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 BALL = sphere(0.5, 3)
 JELLY = Material(1e5, 0.3, 1000.0)

@@ -9,7 +9,6 @@ import pytest
 import trimesh
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
-from worlds import bare_world
 
 from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
 from taichi_soft import Material, SoftBodyAsset, TetMesh, beam, box, internal_forces, sphere
@@ -17,6 +16,7 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import element_model, fit_model
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

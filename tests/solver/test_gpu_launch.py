@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Device, FrozenBodyWarning, Material, box, sphere
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import choose_schedule, make_launch
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

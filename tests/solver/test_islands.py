@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, SoftBodyAsset, box
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.islands import find_islands
+from taichi_soft.world.bare import bare_world
 
 COUNT, EMPTY = 24, 3
 DT = 1 / 60

@@ -1,12 +1,12 @@
 """What a step that is too coarse for the moment does: it is taken back, and made finer."""
 
 import numpy as np
-from worlds import bare_world
 
 from lab.drop_test.robustness.cells import choose_cells
 from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
 from lab.drop_test.robustness.trial import run_cell
 from taichi_soft import Material
+from taichi_soft.world.bare import bare_world
 
 DT, HEIGHT = 1 / 60, 2.0
 

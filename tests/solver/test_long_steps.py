@@ -5,10 +5,10 @@ import threading
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, box, sphere
 from taichi_soft.solver import schedules
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -5,10 +5,10 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
-from worlds import bare_world
 
 from lab.drop_test.robustness.foreign_meshes import sliver_lattice
 from taichi_soft import Material, SoftBodyAsset, SolverWarning, box, sphere
+from taichi_soft.world.bare import bare_world
 
 BALL = sphere(1.0, 2)
 RNG = np.random.default_rng(4)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import BoxShape, Material, PlaneShape, box
 from taichi_soft.core.math.rotations import matrix_of
+from taichi_soft.world.bare import bare_world
 
 DT, SPEED = 1 / 60, 47.0
 FOAM = Material(young=4e4, poisson=0.4, density=213.0, damping=6.0)  # sound: 14 m/s

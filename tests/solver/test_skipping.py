@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     ContactBegan,
@@ -18,6 +17,7 @@ from taichi_soft import (
     box,
 )
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

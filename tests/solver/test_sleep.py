@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import BoxShape, Contact, Material, PlaneShape, SphereShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 EDGE = 0.5

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, box
 from taichi_soft.persistence.kernels.packing import carried, owners
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import context_of_world
 
 CUBE = box((1, 1, 1), (4, 4, 4))

@@ -5,10 +5,10 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, StateError, beam, box, sphere
 from taichi_soft.bodies import fields as states
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

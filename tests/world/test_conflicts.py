@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -18,6 +17,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.core import conflicts
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(1e5, 0.3, 1000.0)
 WOOD = AnisotropicMaterial(Stiffness.isotropic(1e4, 0.3), 500.0)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from reading import burst, leave, not_finite
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Event, Material, PlaneShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from random_play import ACTIONS, DT, SOFT, SUBSTEPS, WAVES, act
 from reading import leave, misread
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep, Rollback
 from taichi_soft import (
@@ -24,6 +23,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -8,7 +8,6 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import bare_world
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
@@ -25,6 +24,7 @@ from taichi_soft import (
 from taichi_soft.core.taichi_workarounds.known_kernels import FirstLaunches
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import make_launch
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

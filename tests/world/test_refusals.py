@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -16,6 +15,7 @@ from taichi_soft import (
     TaichiSoftError,
     UnstableStepWarning,
 )
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 

@@ -1,9 +1,9 @@
 """Bodies that cannot come into a world, or that cannot leave it: refused, and nothing changes."""
 
 import pytest
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, box, sphere
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH = box(cells=(2, 2, 2))

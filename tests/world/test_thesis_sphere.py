@@ -6,9 +6,9 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import PRESETS, FrozenBodyWarning, Material, UnstableStepWarning, preset, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 

@@ -7,7 +7,6 @@ from contextlib import nullcontext, suppress
 import numpy as np
 import pytest
 from public_face import CALLS, DT, READERS, SUBSTEPS, Game
-from worlds import bare_world
 
 from taichi_soft import (
     Event,
@@ -25,6 +24,7 @@ from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.joints import MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
 from taichi_soft.core.compilation import BURST
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -2,7 +2,6 @@
 
 import pytest
 from reading import leave, misread
-from worlds import bare_world
 
 from taichi_soft import (
     Event,
@@ -17,6 +16,7 @@ from taichi_soft import (
     rope,
 )
 from taichi_soft.core.compilation import BURST
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

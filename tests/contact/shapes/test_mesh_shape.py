@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from worlds import bare_world
 
 from taichi_soft import (
     MeshError,
@@ -21,6 +20,7 @@ from taichi_soft import (
     sphere,
     torus,
 )
+from taichi_soft.world.bare import bare_world
 
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -19,6 +18,7 @@ from taichi_soft import (
     stable_step,
 )
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import bare_world
 
 from taichi_soft import Material, OptionError, internal_forces
+from taichi_soft.world.bare import bare_world
 
 LAWS = ("st_venant_kirchhoff", "neo_hookean")
 EACH_LAW = pytest.mark.parametrize("law", LAWS)

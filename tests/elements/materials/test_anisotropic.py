@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from worlds import bare_world
 
 from taichi_soft import (
     AnisotropicMaterial,
@@ -19,6 +18,7 @@ from taichi_soft import (
     internal_forces,
 )
 from taichi_soft.core.serialisation import as_plain, from_plain
+from taichi_soft.world.bare import bare_world
 
 WOOD = Stiffness.orthotropic((10e9, 1e9, 0.6e9), (0.4, 0.35, 0.3), (0.1e9, 0.6e9, 0.7e9))
 CUBE = box((1, 1, 1), (1, 1, 1))

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from worlds import bare_world
+
+from taichi_soft.world.bare import bare_world
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-from worlds import bare_world
 
 from taichi_soft import (
     LAWS,
@@ -22,6 +21,7 @@ from taichi_soft import (
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 

@@ -5,7 +5,6 @@ import warnings
 import numpy as np
 import pytest
 from step_oracle import dense, largest_step
-from worlds import bare_world
 
 from taichi_soft import (
     Material,
@@ -18,6 +17,7 @@ from taichi_soft import (
     torus,
 )
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 MESHES = {
     "box": box((1.0, 0.6, 0.8), (2, 1, 2)),
