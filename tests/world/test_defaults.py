@@ -74,12 +74,11 @@ def test_bodies_at_rest_fall_asleep_and_wake_when_pushed(stack):
     assert upper.is_asleep
 
 
-def test_a_body_alone_falls_asleep_and_a_lone_body_of_a_bare_world_does_not():
-    game, bare = built(World(), (0, 0, 0.26)), built(bare_world(), (0, 0, 0.26))
-    for world in (game, bare):
-        step(world, 4.0)
-    assert game.bodies[0].is_asleep
-    assert not bare.bodies[0].is_asleep
+@pytest.mark.parametrize(("make", "sleeps"), [(World, True), (bare_world, False)])
+def test_a_body_alone_falls_asleep_but_not_in_a_bare_world(make, sleeps):
+    world = built(make(), (0, 0, 0.26))
+    step(world, 4.0)
+    assert world.bodies[0].is_asleep == sleeps
 
 
 def test_a_body_alone_is_built_without_contact_between_bodies():
@@ -167,12 +166,20 @@ def test_colliders_before_build_leave_the_room_after_it(before, monkeypatch):
     )
 
 
+def test_flat_can_be_built_with_the_defaults():
+    world = built(World(schedule="flat"), (0, 0, 0.5), (2, 0, 0.5))
+    world.step(DT, 20)
+    assert world.settings.schedule == "flat"
+    assert not chosen(world).soft
+
+
 @pytest.mark.parametrize("options", [{"schedule": "flat"}, {"integrator": "explicit_euler"}])
 def test_flat_leaves_out_what_it_does_not_support_and_refuses_it_by_name(options):
-    world = built(World(**options), (0, 0, 0.5), (2, 0, 0.5))
+    world = World(**options)
+    for x in (0, 2):
+        world.add_body(BLOCK, FIRM, position=(x, 0, 0.5))
     settings = chosen(world)
     assert (settings.soft, settings.sleep_speed, settings.collider_room) == (False, 0.0, 0)
-    world.step(DT, 20)
     for asked in ({"soft_contact": True}, {"sleep_speed": 0.02}, {"collider_room": 1}):
         with pytest.raises(OptionError, match="flat"):
             built(World(**options, **asked), (0, 0, 0.5))
