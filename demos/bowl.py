@@ -17,7 +17,6 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
-SLEEP_SPEED = 0.02  # [m/s]
 DRAG = 1.0  # damping rate [1/s]: nothing else stops a ball that rolls between others
 STEP = FixedStep(dt=1 / 50)
 
@@ -30,7 +29,7 @@ def stage() -> Stage:
         cylinder(0.34, 0.6, rings=2, layers=4),
         torus(0.34, 0.15, rings=1, segments=18),
     ]
-    world = World(soft_contact=True, sleep_speed=SLEEP_SPEED)
+    world = World()
     world.add_collider(MeshShape(_bowl()), position=(0, 0, RADIUS + WALL + 0.01), friction=0.4)
     actors = []
     for i in range(BODIES):

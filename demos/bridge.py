@@ -50,7 +50,7 @@ def stage() -> Stage:
     mesh = _bridge()
     columns = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] % (PLANK + GAP)
     material = Material(np.where(columns < PLANK, WOOD, HEMP), 0.2, 300.0, damping_ratio=0.1)
-    world = World(soft_contact=True)
+    world = World()
     pillar = BoxShape((1.2, WIDTH + 0.2, HEIGHT))
     for x in (-0.65, LENGTH + 0.65):
         world.add_collider(pillar, position=(x, 0.0, HEIGHT / 2))

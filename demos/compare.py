@@ -27,7 +27,7 @@ PITCH, DEPTH = 2.8, 3.2  # distance between spheres, across and along the view [
 def stage() -> Stage:
     """Spheres of 540 tetrahedra 4 m above the floor, one per law."""
     mesh = sphere(1.0, 3)
-    world = World()
+    world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
     missing = {"cmpm": missing_packages("voronoi")}
     laws = [law for law in LAWS if not missing.get(law)]

@@ -66,7 +66,7 @@ def stage() -> Stage:
     mesh = _leaning(box(SIZE, (8, 8, 20)))
     top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
     asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=600)
-    world = World()
+    world = World(soft_contact=False, sleep_speed=0.0)
     world.reserve(asset, 2)
     bar = world.spawn(asset, position=(0.0, 0.0, HEIGHT))
     world.build()

@@ -19,7 +19,7 @@ SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0, damping
 def stage() -> Stage:
     """Two spheres above the floor, on their way down at 6 m/s."""
     mesh = load_mesh(ASSETS / "sphere.npz")
-    world = World()
+    world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
     for flips, x, color in (("tolerant", -1.6, PALETTE[0]), ("recover", 1.6, PALETTE[1])):
         body = world.add_body(

@@ -53,7 +53,7 @@ def toy(height: float, dye: str) -> trimesh.Scene:
 
 def stage() -> Stage:
     """The elephants upright above the steps."""
-    world = World(soft_contact=True, friction=0.8)
+    world = World(friction=0.8)
     colors = {}
     for i in range(STEPS):
         depth = TREAD * (STEPS - i)

@@ -93,7 +93,7 @@ def _flies_into_crate(body: Body) -> bool:
 
 def stage() -> Stage:
     """Bodies in two rows on the floor, and the crate."""
-    world = World(soft_contact=True, friction=0.8)
+    world = World(friction=0.8)
     _add_crate(world)
     contact = Contact(friction=0.6)
     meshes = [

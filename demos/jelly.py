@@ -41,7 +41,7 @@ class Scale:
 
 def stage() -> Stage:
     """The undeformed stack of blocks, and the ball above it."""
-    world = World(soft_contact=True, friction=0.8)
+    world = World(friction=0.8)
     contact = Contact(friction=0.8, thickness=SKIN)
     block = box(SIZE, (7, 7, 3))
     block = block.translated(-np.mean(block.bounds, axis=0))

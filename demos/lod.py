@@ -27,7 +27,7 @@ def stage() -> Stage:
     """The balls above the upper end of the chute, which has a wall at its lower end."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     asset = SoftBodyAsset.from_surface(ball, JELLY, cells=CELLS, contact=Contact(friction=0.8))
-    world = World(friction=0.8)
+    world = World(friction=0.8, soft_contact=False)
     turn = (np.sin(SLOPE / 2), 0.0, 0.0, np.cos(SLOPE / 2))
     middle = 0.5 * LENGTH * np.array([0.0, np.cos(SLOPE), np.sin(SLOPE)])
     world.add_collider(BoxShape((WIDTH, LENGTH, 0.2)), position=middle, rotation=turn, friction=0.8)

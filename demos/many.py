@@ -19,7 +19,7 @@ SOFT = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.03)
 def stage() -> Stage:
     """A square grid of spheres at irregular heights."""
     mesh = load_mesh(ASSETS / "sphere.npz")
-    world = World()
+    world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
     for i in range(ROWS * ROWS):
         row, column = divmod(i, ROWS)

@@ -30,7 +30,7 @@ class Game(ShowBase):
     def __init__(self) -> None:
         super().__init__()
         self.disable_mouse()
-        self.world, self.rigid = World(floor=None, soft_contact=True), bullet.BulletWorld()
+        self.world, self.rigid = World(floor=None), bullet.BulletWorld()
         self.rigid.set_gravity(core.LVector3(0, 0, -9.81))
         self.coupling = soft.BulletCoupling(self.world, self.rigid)
         self.build_level()

@@ -97,7 +97,7 @@ def stage() -> Stage:
         cylinder(0.32, 0.56, rings=2, layers=4),
         torus(0.33, 0.15, rings=1, segments=18),
     ]
-    world = World(soft_contact=True)
+    world = World()
     course = Course(world)
     actors = []
     for i in range(LAYERS * ROWS * COLUMNS):

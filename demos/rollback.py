@@ -29,7 +29,7 @@ Keys = tuple[float, float, float]
 
 def make_world() -> World:
     """Make an arena with the two players' bodies and four free ones."""
-    world = World(soft_contact=True, friction=0.3)
+    world = World(friction=0.3)
     reach = (ROOM + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
         size = (WALL if x else ROOM + 2 * WALL, WALL if y else ROOM, HEIGHT)

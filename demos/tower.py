@@ -44,7 +44,7 @@ class Ball:
 
 def stage() -> Stage:
     """The tower, and the displaced ball."""
-    world = World(soft_contact=True, friction=0.6)
+    world = World(friction=0.6, sleep_speed=0.0)
     contact = Contact(friction=0.6, thickness=SKIN)
     block = box(SIZE, (5, 5, 3))
     block = block.translated(-np.mean(block.bounds, axis=0))

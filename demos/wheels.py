@@ -52,7 +52,7 @@ class Drivers:
 
 def stage() -> Stage:
     """Wheels side by side in front of the steps."""
-    world = World(soft_contact=True)
+    world = World()
     width = LANE * len(STIFFNESSES) + 2 * ASIDE
     for i in range(STEPS):
         length = TREAD if i < STEPS - 1 else TOP

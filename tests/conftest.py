@@ -13,10 +13,11 @@ from hypothesis import settings
 from xdist.workermanage import NodeManager
 
 from lab.extras import EXTRAS as LAB_EXTRAS
-from taichi_soft import Material, World, box, init, load_mesh
+from taichi_soft import Material, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import EXTRAS, missing_among
 from taichi_soft.core.runtime import DEBUG
+from taichi_soft.world.bare import bare_world
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
@@ -233,7 +234,7 @@ def solo():
 
     def build(mesh, material, world_options=None, **body_options):
         usual = {} if "position" in body_options else {"floor": None}
-        world = World(**{**usual, **(world_options or {})})
+        world = bare_world(**{**usual, **(world_options or {})})
         body = world.add_body(mesh, material, **{"law": "virial", **body_options})
         world.build()
         return world, body

@@ -21,6 +21,7 @@ from taichi_soft.render import (
 from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.film import Actor, Stage, film
 from taichi_soft.render.framing import framed
+from taichi_soft.world.bare import bare_world
 
 ODD = (
     *(None, True, 0, -0.0, -1, 1.5, np.nan, np.inf, 10**400, 1j, np.float32(2), np.int64(3)),
@@ -43,7 +44,7 @@ def keywords(call, *names):
 
 
 def add_body(**options):
-    ts.World(floor=None).add_body(MESH, JELLY, **options)
+    bare_world(floor=None).add_body(MESH, JELLY, **options)
 
 
 def asset(**options):
@@ -51,7 +52,7 @@ def asset(**options):
 
 
 def spawn(**options):
-    world = ts.World(floor=None)
+    world = bare_world(floor=None)
     world.reserve(ASSET, 1)
     world.spawn(ASSET, **options)
 
@@ -81,10 +82,10 @@ CALLS = {
     **keywords(spawn, "position", "rotation", "velocity", "angular_velocity"),
     "spawn asset": lambda v, game: game.world.spawn(v),
     "despawn": lambda v, game: game.world.despawn(v),
-    "reserve asset": lambda v, _: ts.World().reserve(v, 1),
-    "reserve count": lambda v, _: ts.World().reserve(ASSET, v),
-    "add_body mesh": lambda v, _: ts.World(floor=None).add_body(v, JELLY),
-    "add_body material": lambda v, _: ts.World(floor=None).add_body(MESH, v),
+    "reserve asset": lambda v, _: bare_world().reserve(v, 1),
+    "reserve count": lambda v, _: bare_world().reserve(ASSET, v),
+    "add_body mesh": lambda v, _: bare_world(floor=None).add_body(v, JELLY),
+    "add_body material": lambda v, _: bare_world(floor=None).add_body(MESH, v),
     **keywords(material, "young", "poisson", "density", "damping"),
     "per_tet": lambda v, _: JELLY.per_tet("young", v),
     "preset": lambda v, _: ts.preset(v),
@@ -229,7 +230,7 @@ def stage_of(game):
 
 @pytest.fixture(scope="module")
 def game():
-    world = ts.World()
+    world = bare_world()
     world.add_body(MESH, JELLY, position=(0, 0, 1))
     world.build()
     return EngineAdapter(world)

@@ -83,7 +83,7 @@ def jelly() -> Scene:
 
     Pull the pudding, or drop berries on it. Its bottom is fixed, and its Young's modulus is 20 kPa.
     """
-    world = World(soft_contact=True, friction=0.8, record=STEPS)
+    world = World(friction=0.8, record=STEPS)
     contact = Contact(friction=0.8, thickness=0.01)
     mesh = _pudding()
     material = Material(young=2e4, poisson=0.42, density=500.0, damping_ratio=0.05)
@@ -128,7 +128,7 @@ def bowl() -> Scene:
 
     Tip the bowl with its sliders until it is empty, or pull a body out.
     """
-    world = World(soft_contact=True, friction=0.5, record=STEPS)
+    world = World(friction=0.5, record=STEPS)
     material = Material(young=1e5, poisson=0.3, density=500.0, damping_ratio=0.1)
     shapes = [sphere(0.3, 3), box((0.5, 0.5, 0.5), (3, 3, 3)), torus(0.3, 0.14, rings=1, segments=16)]
     assets = [
@@ -178,7 +178,7 @@ def elephant() -> Scene:
 
     Drop elephants onto the steps. There is room for four; a fifth replaces the first.
     """
-    world = World(soft_contact=True, friction=0.8, record=STEPS)
+    world = World(friction=0.8, record=STEPS)
     depth, rise, width = 0.6, 0.24, 2.4
     for i in range(3):
         deep = depth * (3 - i)
@@ -253,7 +253,7 @@ def tower() -> Scene:
 
     Push the ball through the tower with its slider, blast it, or pull out a block.
     """
-    world = World(soft_contact=True, friction=0.6, record=STEPS)
+    world = World(friction=0.6, record=STEPS)
     contact = Contact(friction=0.6, thickness=0.015)
     material = Material(young=6e4, poisson=0.35, density=300.0, damping_ratio=0.2)
     block = SoftBodyAsset(box((0.7, 0.7, 0.4), (4, 4, 2)), material, contact=contact)
@@ -287,7 +287,7 @@ def stiffness() -> Scene:
 
     The Young's moduli of the four balls are 20, 50, 100 and 400 kPa, from left to right.
     """
-    world = World(soft_contact=True, friction=0.6, record=STEPS)
+    world = World(friction=0.6, record=STEPS)
     for i, young in enumerate((2e4, 5e4, 1e5, 4e5)):
         material = Material(young=young, poisson=0.4, density=500.0, damping_ratio=0.03)
         ball = SoftBodyAsset(sphere(0.4, 4), material, contact=Contact(friction=0.5, thickness=0.01))

@@ -13,6 +13,7 @@ from lab.drop_test.case import LARGEST, SHAPES, STEPS_PER_SECOND, Case, shape_me
 from lab.drop_test.outcome import Outcome
 from taichi_soft import Contact, FrozenBodyWarning, HeightFieldShape, Material, SoftBodyAsset, World
 from taichi_soft.core.types import FlipsName, LawName
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
@@ -127,7 +128,7 @@ def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
 
 def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
     """Build a world of the usual capacity with the cases in it."""
-    world = World(floor=None, collider_room=MOST_COLLIDERS - 1 - sum(len(case.course) for case in batch))
+    world = bare_world(floor=None, collider_room=MOST_COLLIDERS - 1 - sum(len(case.course) for case in batch))
     samples = 0
     bodies = []
     for bit, case in enumerate(batch):

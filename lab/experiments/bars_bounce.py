@@ -24,8 +24,9 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import Body, Material, TetMesh, World, load_mesh
+from taichi_soft import Body, Material, TetMesh, load_mesh
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def bars_mesh() -> TetMesh:
 def measure(point: Point) -> Numbers:
     """Measure deflections, lengths and energies at 100 Hz, and five poses."""
     mesh = bars_mesh()
-    world = World(retries=0)
+    world = bare_world(retries=0)
     material = Material(MATERIAL.young * point["stiffness"], 0.2, 1000.0, 20.0, damping_ratio=0.0)
     low = float((mesh.vertices @ UPRIGHT.T)[:, 2].min())
     body = world.add_body(mesh, material, rotation=UPRIGHT, position=(0, 0, DROP - low), law="virial")

@@ -25,6 +25,7 @@ from lab.experiments.law_stability import vibration
 from lab.experiments.timing import in_turns
 from taichi_soft import Material, TetMesh, World
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 CMPM: LawName = "cmpm"
@@ -65,7 +66,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _world(mesh: TetMesh, law: LawName) -> World:
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     world.add_body(mesh, MATERIAL, law=law)
     world.build()
     return world

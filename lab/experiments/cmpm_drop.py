@@ -6,8 +6,9 @@ import warnings
 from functools import cache
 
 from lab.experiments.experiment import Numbers
-from taichi_soft import Body, FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, sphere
+from taichi_soft import Body, FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, sphere
 from taichi_soft.core.types import IntegratorName, LawName
+from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
 """So stiff that leapfrog needs steps of about 1e-4 s. Without damping this law gains energy at any step."""
@@ -50,7 +51,7 @@ class Drop:
             factor: step over the largest stable step of leapfrog.
             resolution: of the mesh, see `sphere`.
         """
-        self.world = World(integrator=integrator, retries=0)
+        self.world = bare_world(integrator=integrator, retries=0)
         mesh = _mesh(resolution)
         self.rest_volume = mesh.volume
         self.body: Body = self.world.add_body(mesh, material, law=law, position=(0.0, 0.0, HEIGHT))

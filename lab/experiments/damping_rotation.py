@@ -24,8 +24,9 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import Material, TetMesh, World, box, load_mesh
+from taichi_soft import Material, TetMesh, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # rad/s, so slow that nothing stretches
 DT, SUBSTEPS = 1 / 60, 12
@@ -54,7 +55,7 @@ def body_mesh(name: str) -> TetMesh:
 def measure(point: Point) -> Numbers:
     """Angular momentum about the axis over time, relative to the start, and the expected rate."""
     mesh = body_mesh(point["mesh"])
-    world = World(gravity=(0, 0, 0), retries=0)
+    world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     body = world.add_body(mesh, material, damping_model=point["model"], position=(0, 0, 5.0), law="virial")
     world.build()

@@ -24,7 +24,8 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import Material, TetMesh, World, box
+from taichi_soft import Material, TetMesh, box
+from taichi_soft.world.bare import bare_world
 
 SIZE = (3.0, 1.5, 1.5)  # [m]
 LIGHT, HEAVY, YOUNG, POISSON, DAMPING = 200.0, 2000.0, 4e5, 0.2, 20.0
@@ -56,7 +57,7 @@ def measure(point: Point) -> Numbers:
     """Height of both ends' bottoms and thickness of both ends, each over time, and four poses."""
     mesh = block(point["cells"])
     substeps = SUBSTEPS * point["cells"] // 4
-    world = World(retries=0)
+    world = bare_world(retries=0)
     material = Material(YOUNG, POISSON, density_of(mesh, point["density"]), DAMPING, damping_ratio=0.0)
     body = world.add_body(mesh, material, position=(0, 0, DROP + SIZE[2] / 2), law="virial")
     world.build()

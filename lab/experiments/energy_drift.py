@@ -24,7 +24,8 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import Body, FrozenBodyWarning, Material, World, box
+from taichi_soft import Body, FrozenBodyWarning, Material, box
+from taichi_soft.world.bare import bare_world
 
 YOUNG, DENSITY, EDGE = 1e5, 1000.0, 1.0
 STRETCH, TWIST = 1.15, 0.4  # and rad/m, at the start
@@ -55,7 +56,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the energies of a floating cube that is released stretched and twisted."""
     mesh = box((EDGE, EDGE, EDGE), (3, 3, 3))
-    world = World(gravity=(0, 0, 0), retries=0)
+    world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, point["poisson"], DENSITY, point["damping"], damping_ratio=0.0)
     body = world.add_body(mesh, material, law=point["law"], position=(0, 0, 10.0))
     world.build()

@@ -23,8 +23,9 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning, World
+from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning
 from taichi_soft.core.types import IntegratorName
+from taichi_soft.world.bare import bare_world
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
@@ -60,7 +61,7 @@ def measure(point: Point) -> Numbers:
     found = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnstableStepWarning)
-        world = World(
+        world = bare_world(
             gravity=(0, 0, 0), floor=None, integrator=point["integrator"], tolerance=1e-6, retries=0
         )
         body = world.add_body(

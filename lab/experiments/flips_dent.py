@@ -26,8 +26,9 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import FrozenBodyWarning, Material, World, load_mesh
+from taichi_soft import FrozenBodyWarning, Material, load_mesh
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=1e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPEED, HEIGHT = 20.0, 1.05  # of the sphere that is thrown down, of radius 1 m
@@ -49,7 +50,7 @@ def measure(point: Point) -> Numbers:
     """Measure which tetrahedra invert and where, over the impact and a few seconds."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     rest = mesh.vertices
-    world = World(retries=0)
+    world = bare_world(retries=0)
     body = world.add_body(
         mesh,
         MATERIAL,

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, internal_forces
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, internal_forces
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 STEPS = 200
 GROWTH = 3.0
@@ -39,7 +40,7 @@ def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
             for side in (-1, 1)
         )
         stiffness[:, k] = (behind - ahead).ravel() / (2 * nudge)
-    mass = np.repeat(World(floor=None, retries=0).add_body(mesh, material, law=law).masses, 3)
+    mass = np.repeat(bare_world(floor=None, retries=0).add_body(mesh, material, law=law).masses, 3)
     squares = np.linalg.eigvals(stiffness / mass[:, None])
     squares = squares[np.abs(squares) > 1e-6 * np.abs(squares).max()]  # without rigid motion
     roots = np.sqrt(squares.astype(complex))
@@ -51,7 +52,7 @@ class ShakenBody:
 
     def __init__(self, mesh: TetMesh, material: Material, law: LawName) -> None:
         """Build a world without gravity."""
-        self.world = World(gravity=(0, 0, 0), floor=None, retries=0)
+        self.world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
         self.body = self.world.add_body(mesh, material, law=law)
         self.world.build()
         self.rest = mesh.vertices

@@ -22,7 +22,8 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import Material, World, box
+from taichi_soft import Material, box
+from taichi_soft.world.bare import bare_world
 
 INTEGRATORS = ("explicit_euler", "lazy_leapfrog", "leapfrog", "implicit_euler")
 MATERIAL = Material(
@@ -43,7 +44,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Distance of a stretched cube from its start, after as many steps back as forth."""
     cube = box(cells=(2, 2, 2))
-    world = World(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")
     world.build()
     start = (cube.vertices * (STRETCH, 1.0, 1.0)).astype(np.float32)

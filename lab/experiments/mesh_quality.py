@@ -23,9 +23,10 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, box
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, box
 from taichi_soft.bodies.stability import stable_step
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 YOUNG, DENSITY = 1e6, 1000.0
 KINDS = ("tetrahedron", "layer")
@@ -71,7 +72,7 @@ def measure(point: Point) -> Numbers:
     """Smallest dihedral angle, estimated largest stable step, and the steps that were stable or not."""
     meshes = [mesh for _, _, mesh in cubes()]
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
-    world = World(gravity=(0, 0, 0), retries=0)
+    world = bare_world(gravity=(0, 0, 0), retries=0)
     bodies = [
         world.add_body(mesh, material, position=(3.0 * i, 0, 3.0), law="virial")
         for i, mesh in enumerate(meshes)

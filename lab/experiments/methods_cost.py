@@ -19,8 +19,9 @@ from lab.experiments.experiment import (
 )
 from lab.experiments.irregular import cube
 from lab.experiments.judgement import judged, judged_but_for
-from taichi_soft import Material, World, box, internal_forces, voronoi_graph
+from taichi_soft import Material, box, internal_forces, voronoi_graph
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
@@ -70,7 +71,7 @@ def _cost(point: Point) -> Numbers:
     mesh = box((1.0, 1.0, 1.0), (point["cells"],) * 3)
     worlds = {}
     for law in LAWS:
-        worlds[law] = World(floor=None, retries=0)
+        worlds[law] = bare_world(floor=None, retries=0)
         worlds[law].add_body(mesh, MATERIAL, law=law)
         worlds[law].build()
     seconds: dict[str, list[float]] = {law: [] for law in LAWS}

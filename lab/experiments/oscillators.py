@@ -11,8 +11,9 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning, World
+from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning
 from taichi_soft.core.types import IntegratorName
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def run_oscillators(
     mesh = ParticleMesh(rest, np.arange(2 * count).reshape(-1, 2), np.ones(2 * count))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnstableStepWarning)
-        world = World(gravity=(0, 0, 0), floor=None, integrator=integrator, tolerance=1e-6, retries=0)
+        world = bare_world(gravity=(0, 0, 0), floor=None, integrator=integrator, tolerance=1e-6, retries=0)
         body = world.add_body(mesh, SpringMaterial(k, b), law="springs", pinned=np.arange(0, 2 * count, 2))
         world.build()
         positions, velocities = rest.copy(), np.zeros_like(rest)

@@ -19,9 +19,10 @@ from lab.experiments.experiment import (
     Verdict,
 )
 from lab.experiments.timing import seconds_of
-from taichi_soft import World, load_mesh, preset
+from taichi_soft import load_mesh, preset
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render import Camera, Renderer, Surface
+from taichi_soft.world.bare import bare_world
 
 RATE = 40.0
 """Frames per second of real time, the thesis's [Hz]."""
@@ -40,7 +41,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Seconds of each frame: for its steps, for reading its positions, and for drawing it."""
     mesh = load_mesh(ASSETS / "sphere.npz")
-    world = World(retries=0)
+    world = bare_world(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
     world.build()
     surface = Surface.of(mesh)

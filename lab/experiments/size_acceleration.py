@@ -18,9 +18,10 @@ from lab.experiments.experiment import (
     Table,
 )
 from lab.experiments.judgement import Span, judged
-from taichi_soft import Material, TetMesh, World, internal_forces, sphere
+from taichi_soft import Material, TetMesh, internal_forces, sphere
 from taichi_soft.core.types import LawName
 from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.world.bare import bare_world
 
 LAWS: tuple[LawName, ...] = ("virial", "face")
 MATERIAL = Material(1e6, 0.3, 1000.0, damping_ratio=0.0)
@@ -44,7 +45,7 @@ def measure(point: Point) -> Numbers:
     mesh = _sphere(point["size"])
     stretched = mesh.vertices * (1.1, 1.0, 0.9)
     forces = internal_forces(mesh, MATERIAL, stretched, law=point["law"])
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=point["law"])
     world.build()
     body.set_motion(stretched, np.zeros_like(stretched))

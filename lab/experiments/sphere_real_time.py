@@ -22,8 +22,9 @@ from lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft import World, device, load_mesh, preset
+from taichi_soft import device, load_mesh, preset
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
@@ -38,7 +39,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Seconds of each frame."""
     mesh = load_mesh(ASSETS / "sphere.npz")
-    world = World(retries=0)
+    world = bare_world(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
     world.build()
     out = body.positions()

@@ -26,11 +26,12 @@ from lab.experiments.experiment import (
     Verdict,
 )
 from lab.experiments.sphere_outcomes import COLLAPSED, OUTCOMES, outcomes, window
-from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, load_mesh, sphere
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, load_mesh, sphere
 from taichi_soft.bodies.stability import stable_step
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.core.types import FlipsName
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 DENSITY, DAMPING, HEIGHT, VOLUME = 1000.0, 100.0, 7.0, 4.0
 DT, SUBSTEPS = 1 / 50, 14  # 700 substeps a second
@@ -79,7 +80,7 @@ def measure(point: Point) -> Numbers:
     if point["part"] == "limit":
         return {"young": _linear_limit(mesh, nu), "tets": len(mesh.tets)}
     moduli = np.geomspace(LEAST, MOST, point["moduli"])
-    world = World(retries=0)
+    world = bare_world(retries=0)
     bodies = [
         world.add_body(
             mesh,

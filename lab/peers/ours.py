@@ -6,7 +6,8 @@ import numpy as np
 
 from lab.peers.drop import Drop
 from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
-from taichi_soft import Material, World
+from taichi_soft import Material
+from taichi_soft.world.bare import bare_world
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
@@ -14,7 +15,7 @@ def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     material = Material(drop.young, drop.poisson, drop.density, damping=0.0, damping_ratio=0.0)
 
     def make(steps: int) -> Simulation:
-        world = World(friction=0.0)
+        world = bare_world(friction=0.0)
         lift = drop.start[0] - drop.mesh.vertices[0]
         body = world.add_body(drop.mesh, material, position=lift)
         world.build()

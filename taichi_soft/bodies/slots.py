@@ -44,6 +44,16 @@ class Pools(Generic[Kind]):
         return tuple(self._free)
 
     @property
+    def can_touch(self) -> bool:
+        """True if bodies, or parts of one body, can touch each other.
+
+        This takes two slots, or an asset that touches itself.
+        """
+        return len(self.slots) > 1 or any(
+            level.contact.itself for asset in self.kinds for level in asset.levels
+        )
+
+    @property
     def occupants(self) -> tuple[Kind, ...]:
         """All bodies, by slot."""
         if self._occupants is None:

@@ -53,6 +53,7 @@ class Colliders(Slice):
         self.floor: Collider | None = None  # of a world with colliders, from `World.build` on
         self._contact: ColliderFields | None = None
         self._body_count = 0
+        self._built_count = 0  # colliders at `World.build`, with the floor
         self._impulses: Floats | None = None  # of the last step, once asked for
         # Called with the box (two corners [m]) in which a collider appears, vanishes, leaves or arrives.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
@@ -118,8 +119,10 @@ class Colliders(Slice):
                 return index
         if self._contact is not None and len(self._rows) >= self._contact.capacity.colliders:
             raise StateError(
-                f"there is room for {len(self._rows)} colliders and all are in use: remove one, or make the "
-                "world with a larger collider_room"
+                f"{len(self._rows)} colliders are in use, and the world has room for "
+                f"{self._contact.capacity.colliders}: remove one, or make the world with "
+                f"World(collider_room={len(self._rows) + 1 - self._built_count}) or more, or add colliders "
+                "before build()"
             )
         return len(self._rows)
 
@@ -158,6 +161,7 @@ class Colliders(Slice):
     def load(self, colliders: ColliderFields, body_count: int) -> None:
         """Fill the fields with the colliders that were added before `build`."""
         self._contact, self._body_count, self._impulses = colliders, body_count, None
+        self._built_count = len(self._rows)
         if colliders.capacity.samples:
             write_samples(colliders, 0, np.zeros(1, dtype=np.float32))  # compiles
         begin = 0

@@ -31,8 +31,9 @@ def set_friction(body: SoftBody, friction: float) -> None:
     context, coefficient = context_of(body), as_friction(friction)
     if not context.built.state.capacity.contact.soft:
         raise StateError(
-            "a body's friction applies between bodies, and this world has no soft contact: make it with "
-            "soft_contact, or use World.set_friction for the floor and Collider.set_friction for a collider"
+            "a body's friction applies between bodies, and this world has no contact between bodies: "
+            "make it with World(soft_contact=True), or use World.set_friction for the floor and "
+            "Collider.set_friction for a collider"
         )
     if coefficient != body.friction:
         change(body, give_friction, body, coefficient)

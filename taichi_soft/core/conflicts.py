@@ -23,7 +23,7 @@ FLAT = Conflict(
     "colliders beside the floor, hulls, soft contact, sleep, cuts, levels of detail, forces, wind, linear "
     "damping, force fields, grabs, joints, motors, two-way attachments, events of contact",
     "its loops run over the particles of all bodies at once",
-    "use schedule='per_body' or 'auto', and another integrator than 'explicit_euler'",
+    "use schedule='per_body', and another integrator than 'explicit_euler'",
 )
 FLAT_SOLVES = Conflict(
     "schedule 'flat'",

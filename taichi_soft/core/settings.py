@@ -28,6 +28,16 @@ class Settings:
     schedule: Schedule  # as chosen by `World.build`; AUTO until then if not given
 
 
+DEFAULT_SLEEP_SPEED = 0.02
+"""Default `sleep_speed` [m/s], within the 0.01 to 0.05 m/s of engines of rigid bodies (Box2D, Jolt).
+
+The stop of a body of game size, 0.1 m to 10 m, is not visible at this speed: it moves a third of a millimetre
+between two frames. With a lower value, bodies would tremble visibly longer before they fall asleep."""
+
+DEFAULT_COLLIDER_ROOM = 15
+"""Default `collider_room`: with the floor 16, a power of two, to which the room is rounded up."""
+
+
 @dataclass(frozen=True)
 class ContactSettings:
     """Contact and sleep settings."""
@@ -36,3 +46,30 @@ class ContactSettings:
     sleep_speed: float  # [m/s]; 0 turns sleep off
     collider_room: int  # number of colliders that can be added after `World.build`
     sample_room: int  # grid samples of these colliders
+
+
+@dataclass(frozen=True)
+class ContactRequest:
+    """Contact and sleep arguments of `World`; None for the default."""
+
+    soft: bool | None
+    sleep_speed: float | None
+    collider_room: int | None
+    sample_room: int
+
+    def settings(self, *, can_touch: bool, is_flat: bool) -> ContactSettings:
+        """Replace each None by its default.
+
+        Args:
+            can_touch: True if bodies, or parts of one body, can touch each other. Otherwise contact between
+                bodies would only be compiled in vain.
+            is_flat: True for the schedule "flat", which supports none of this.
+        """
+        defaults = (False, 0.0, 0) if is_flat else (can_touch, DEFAULT_SLEEP_SPEED, DEFAULT_COLLIDER_ROOM)
+        soft, sleep_speed, collider_room = defaults
+        return ContactSettings(
+            soft if self.soft is None else self.soft,
+            sleep_speed if self.sleep_speed is None else self.sleep_speed,
+            collider_room if self.collider_room is None else self.collider_room,
+            self.sample_room,
+        )

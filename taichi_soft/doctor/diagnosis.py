@@ -216,7 +216,7 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
 
 def _frame_time(asset: SoftBodyAsset, substeps: int) -> float:
     """Median time of a frame while the body falls and lands [s]."""
-    world = World()
+    world = World(sleep_speed=0.0)
     low = float(asset.mesh.vertices[:, 2].min())
     world.add_body(asset, position=(0.0, 0.0, 0.01 - low))
     with warnings.catch_warnings():

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.elements.materials import Material
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
-from taichi_soft.world.world import World
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Trial:
     def __init__(self, asset: SoftBodyAsset) -> None:
         """Build the world. Raises: StateError, see `World.build`."""
         mesh = asset.mesh
-        self._world = World(floor=0.0)
+        self._world = bare_world(floor=0.0)
         self._lowest = float(mesh.vertices[:, 2].min())
         self._height = float(np.ptp(mesh.vertices[:, 2]))
         self._size = float(np.ptp(mesh.vertices, axis=0).max())

@@ -37,7 +37,7 @@ PULLS = 40
 _SCENE = """\
 from taichi_soft import Material, World, sphere
 
-world = World(soft_contact=True)
+world = World(sleep_speed=0)
 mesh, material = sphere(0.3, 4), Material(young=1.5e5, poisson=0.4, density=500.0, damping_ratio=0.15)
 for i in range({count}):
     world.add_body(mesh, material, position=(0.8 * (i % 8), 0.8 * (i // 8), 0.35))

@@ -21,7 +21,7 @@ from taichi_soft.render.film import Stage
 _PLAYGROUND = """\
 from taichi_soft import Material, World, box, cylinder, sphere, torus
 
-world = World(soft_contact=True, collider_room=2)
+world = World()
 material = Material(young=1.5e5, poisson=0.4, density=500.0, damping_ratio=0.15)
 shapes = [sphere(0.3, 3), box((0.5, 0.5, 0.5), (3, 3, 3)), cylinder(0.28, 0.5, 2, 4)]
 shapes.append(torus(0.32, 0.13, 1, 18))

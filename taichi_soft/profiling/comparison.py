@@ -16,7 +16,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import box
 from taichi_soft.profiling.baseline import Baseline
 from taichi_soft.profiling.spread import Spread, compare
-from taichi_soft.world.world import World
+from taichi_soft.world.bare import bare_world
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
 """Cells of a box by approximate number of tetrahedra. Largest first, because the others reuse its kernels."""
@@ -55,7 +55,7 @@ def compare_with_baseline(
 
 def _compare(library: ctypes.CDLL, repeats: int, cells: tuple[int, int, int], law: LawName) -> Comparison:
     mesh = box((1.0, 1.0, 1.0), cells)
-    world = World(floor=None, schedule="per_body")
+    world = bare_world(floor=None, schedule="per_body")
     body = world.add_body(mesh, MATERIAL, law=law, position=(0.0, 0.0, 1.0))
     world.build()
     model = element_model(law)

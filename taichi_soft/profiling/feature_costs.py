@@ -20,6 +20,7 @@ from taichi_soft.elements.materials.material import DAMPING_RATIO
 from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
 from taichi_soft.profiling.spread import Spread, compare, time_calls
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
@@ -76,7 +77,7 @@ def _spheres(
     **options: Any,
 ) -> World:
     """Make spheres side by side, with centres at `height` [m]."""
-    world = World(**options)
+    world = bare_world(**options)
     material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
         place = (SPACING * (i % 4), SPACING * (i // 4), height)
@@ -106,7 +107,7 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
     pooled = _spheres(high, floor=None)
     pooled.reserve(SoftBodyAsset(_mesh(), preset("thesis_sphere")), COUNT)
     against(free, "as many empty slots of a pool", False, pooled)
-    spare = World(floor=None)
+    spare = bare_world(floor=None)
     asset = SoftBodyAsset(_mesh(), preset("thesis_sphere"), spare_vertices=100)
     spare.reserve(asset, COUNT)
     for i in range(COUNT):
@@ -136,9 +137,9 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
     windy.set_wind((5.0, 0.0, 0.0))
     against(free, "wind", True, windy)
     against(free, "lying on the floor", True, _settled(_spheres(1.0)))
-    lying = _settled(_spheres(1.0, collider_room=8, sleep_speed=0.0))
+    lying = _settled(_spheres(1.0, collider_room=8))
     against(free, "lying on a collider", True, lying)
-    soft = _settled(_spheres(1.0, collider_room=8, soft_contact=True, sleep_speed=0.0))
+    soft = _settled(_spheres(1.0, collider_room=8, soft_contact=True))
     against(free, "lying on a collider, soft contact on", True, soft)
     itself = _spheres(high, Contact(itself=True), floor=None, collider_room=8, soft_contact=True)
     against(free, "touching itself allowed", True, itself)
@@ -166,8 +167,8 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
     """Drop 32 spheres into a pit and time them at rest: first alone, as in a game with one world, and then in
     turns with as many free spheres, which evict them from the CPU's caches."""
-    world = World(collider_room=8, soft_contact=True, sleep_speed=0.0)
-    free = World(floor=None)
+    world = bare_world(collider_room=8, soft_contact=True)
+    free = bare_world(floor=None)
     for side in (-1, 1):
         world.add_collider(BoxShape((1.0, 20.0, 6.0)), position=(side * 5.1, 0.0, 3.0))
         world.add_collider(BoxShape((20.0, 1.0, 6.0)), position=(0.0, side * 5.1, 3.0))
@@ -188,11 +189,11 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
 
 def measure_moments(repeats: int = 61) -> list[Moments]:
     """Measure a snapshot, and frames in which a body is spawned or despawned."""
-    big = World(floor=None)
+    big = bare_world(floor=None)
     big.add_body(box((1.0, 1.0, 1.0), (10, 10, 10)), preset("thesis_sphere"), law="virial")
     big.build()
     snapshot = Spread.of(_warm(big.snapshot, repeats)).scaled(1e3)
-    pool = World(floor=None)
+    pool = bare_world(floor=None)
     asset = SoftBodyAsset(_mesh(), preset("thesis_sphere"))
     pool.reserve(asset, COUNT)
     for i in range(COUNT - 1):

@@ -11,7 +11,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import box, sphere
 from taichi_soft.profiling.sparse import SparseBody
 from taichi_soft.profiling.spread import Spread, compare
-from taichi_soft.world.world import World
+from taichi_soft.world.bare import bare_world
 
 GROWTH = 100
 """Growth of the step in the thesis: from about 1e-4 s to 1e-2 s."""
@@ -50,7 +50,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
     mesh = sphere(1.0, 3)
     worlds = {}
     for integrator in ("leapfrog", "implicit_euler"):
-        world = World(integrator=integrator, tolerance=TOLERANCE)
+        world = bare_world(integrator=integrator, tolerance=TOLERANCE)
         world.add_body(mesh, CMPM_MATERIAL, law="cmpm", position=(0.0, 0.0, 1.5))
         world.build()
         worlds[integrator] = world
@@ -81,7 +81,7 @@ def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}
     for integrator in ("leapfrog", "implicit_euler"):
-        world = World(floor=None, integrator=integrator, tolerance=TOLERANCE)
+        world = bare_world(floor=None, integrator=integrator, tolerance=TOLERANCE)
         body = world.add_body(mesh, STIFF_BAR_MATERIAL, law="virial")
         world.build()
         body.set_motion(bent, np.zeros_like(bent))
@@ -103,7 +103,7 @@ def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
 
 def _bar_against_scipy(repeats: int) -> ImplicitGain:
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
-    world = World(floor=None, integrator="implicit_euler", tolerance=TOLERANCE)
+    world = bare_world(floor=None, integrator="implicit_euler", tolerance=TOLERANCE)
     body = world.add_body(mesh, BAR_MATERIAL, law="virial")
     world.build()
     native = SparseBody(mesh, BAR_MATERIAL)

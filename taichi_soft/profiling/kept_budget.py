@@ -91,7 +91,7 @@ def _kinds() -> list[SoftBodyAsset]:
 
 def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
     """Drop bodies side by side onto the floor, and then set them to `levels`."""
-    world = _TimedWorld(soft_contact=True, sleep_speed=0.0)
+    world = _TimedWorld(soft_contact=True, sleep_speed=0.0, collider_room=0)
     for kind in kinds:
         world.reserve(kind, -(-(ROWS**2) // len(kinds)))
     for i in range(ROWS**2):

@@ -11,7 +11,7 @@ from taichi_soft.elements.laws import LAWS, BondLaw, Law, element_model
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, Stiffness
 from taichi_soft.meshing import box
 from taichi_soft.profiling.spread import Spread, compare
-from taichi_soft.world.world import World
+from taichi_soft.world.bare import bare_world
 
 MESH = box((1.0, 1.0, 1.0), (10, 10, 10))
 TETS, EDGES = len(MESH.tets), len(MESH.edges)
@@ -59,7 +59,7 @@ def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> l
 def _falling(
     law: LawName, strain: StrainName | None, material: Material | AnisotropicMaterial
 ) -> partial[None]:
-    world = World(floor=None, schedule="per_body")
+    world = bare_world(floor=None, schedule="per_body")
     world.add_body(MESH, material, law=law, strain=strain)
     world.build()
     return partial(world.step, SUBSTEPS * SUBSTEP, SUBSTEPS)

@@ -13,6 +13,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh, sphere
 from taichi_soft.profiling.spread import Spread, time_calls
 from taichi_soft.solver.kernels.phase_timing import PHASES, repeat_phase
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
@@ -36,7 +37,7 @@ class Phases:
 def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = None) -> World:
     """Build a world of equal bodies in free fall, by default spheres of 1,280 tetrahedra."""
     mesh = mesh or sphere(radius=1.0, resolution=4)
-    world = World(schedule=schedule)
+    world = bare_world(schedule=schedule)
     side = int(np.ceil(np.sqrt(count)))
     for i in range(count):
         world.add_body(

@@ -35,7 +35,7 @@ world = World()
 body = world.add_body(sphere(radius=0.5), rubber, position=(0, 0, 3))
 """,
     "contact": """
-world = World(soft_contact=True)
+world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 0.52))
 world.reserve(SoftBodyAsset(sphere(radius=0.3), rubber), 4)
 world.add_collider(BoxShape((2, 2, 0.2)), position=(3, 0, 0.1))

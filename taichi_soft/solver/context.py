@@ -10,7 +10,9 @@ from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.core.errors import StateError
-from taichi_soft.core.settings import ContactSettings
+from taichi_soft.core.settings import ContactRequest, ContactSettings
+from taichi_soft.core.types import Schedule
+from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 
@@ -19,12 +21,27 @@ from taichi_soft.solver.substeps import Substeps
 class WorldContext(Context):
     """A world without its public interface."""
 
-    contact: ContactSettings
+    contact_request: ContactRequest
     substeps: Substeps
     make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # the handle of a slot
     fields: Simulation | None = None
     built_with: list[str] = field(default_factory=list)  # digests of the colliders' shapes at `build`
     structure: bytes = b""  # digest of the structure that a snapshot requires, computed on demand
+
+    @property
+    def contact(self) -> ContactSettings:
+        """Contact and sleep settings, before `World.build` for the slots that were added so far."""
+        return self._contact(can_touch=self.slots.can_touch)
+
+    @property
+    def contact_with_another(self) -> ContactSettings:
+        """The same for a world in which there is another body."""
+        return self._contact(can_touch=True)
+
+    def _contact(self, *, can_touch: bool) -> ContactSettings:
+        chosen = self.settings
+        is_flat = chosen.schedule is Schedule.FLAT or INTEGRATORS[chosen.integrator].only_flat
+        return self.contact_request.settings(can_touch=can_touch, is_flat=is_flat)
 
     @property
     def colliders(self) -> Colliders:

@@ -42,7 +42,7 @@ class Substeps:
     """Stable and chosen substeps of one world."""
 
     def __init__(
-        self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool, most: int | None
+        self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool | None, most: int | None
     ) -> None:
         """Start without choices.
 
@@ -83,7 +83,8 @@ class Substeps:
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
         if not self.has_stable_step:
-            return (0.999, SOFT_CONTACT_STEP) if self._soft_contact else (1.0, math.inf)
+            has_contact = self._pools.can_touch if self._soft_contact is None else self._soft_contact
+            return (0.999, SOFT_CONTACT_STEP) if has_contact else (1.0, math.inf)
         longest = min(each.stable_step.recommended for asset in self._pools.kinds for each in asset.levels)
         for body in self._pools.occupants:
             if record_of(body).description is not present_asset(body).description:

@@ -24,7 +24,7 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
 from taichi_soft.core.serialisation import digest_of
-from taichi_soft.core.settings import Settings
+from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.types import Schedule
 from taichi_soft.events import EventLog, Observer
 from taichi_soft.fracture.cutting import warm_up
@@ -43,7 +43,7 @@ _log = logging.getLogger(__name__)
 
 def build(context: WorldContext) -> Simulation:
     """Build a world for `World.build`."""
-    pools, scene, colliders, contact = context.slots, context.layout, context.colliders, context.contact
+    pools, scene, colliders = context.slots, context.layout, context.colliders
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
     context.substeps.review()
@@ -54,16 +54,19 @@ def build(context: WorldContext) -> Simulation:
     device = init()
     context.built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
     settings = replace(context.settings, schedule=_schedule(context, device))
+    contact = context.contact_request.settings(
+        can_touch=pools.can_touch, is_flat=settings.schedule is Schedule.FLAT
+    )
     has_contact = settings.schedule is Schedule.PER_BODY
     if has_contact:
         _add_floor(context)
-    capacity = _capacity(context, settings, has_contact)
-    program = _program(context, settings, device, has_contact)
+    capacity = _capacity(context, settings, contact, has_contact)
+    program = _program(context, settings, contact, device, has_contact)
     if program.integrator.warning:
         warnings.warn(program.integrator.warning, UnstableStepWarning, stacklevel=4)
     state = acquire(State, capacity, program)
     weakref.finalize(context, release, state)
-    _fill(context, state, program)
+    _fill(context, contact, state, program)
     _warm_up(context, state)
     for slot, rows in pools.starts.items():
         spawn_body(state, slot, rows)
@@ -123,7 +126,7 @@ def _add_floor(context: WorldContext) -> None:
 
 def _schedule(context: WorldContext, device: Device) -> Schedule:
     """Choose the schedule of a world. Raises: OptionError if the requested one lacks a feature."""
-    settings, contact = context.settings, context.contact
+    settings, request = context.settings, context.contact_request
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
     if integrator.only_flat:
@@ -135,42 +138,47 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
             asset.spare_vertices or asset.coarser for asset in context.slots.kinds
         ),
         "hulls": _has_hulls(context),
-        "colliders": len(context.colliders.handles) + contact.collider_room > 0,
-        "soft contact": contact.soft,
-        "sleep": contact.sleep_speed > 0.0,
+        "colliders": len(context.colliders.handles) + (request.collider_room or 0) > 0,
+        "soft contact": bool(request.soft),
+        "sleep": (request.sleep_speed or 0.0) > 0.0,
         FLAT_SOLVES.features: integrator.takes_solves,
     }.items():
         if is_asked and asked is Schedule.FLAT:
             raise OptionError(FLAT.message(feature=feature))
         if is_asked:
             asked = Schedule.PER_BODY
+    if asked is Schedule.AUTO and context.contact.soft:
+        asked = Schedule.PER_BODY
     if not integrator.has_hulls and _has_hulls(context):
         raise OptionError(SOLVED_HULLS.message())
     return choose_schedule(asked, context.layout, device)
 
 
-def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> Capacity:
-    contact = ContactCapacity()
+def _capacity(
+    context: WorldContext, settings: Settings, contact: ContactSettings, has_contact: bool
+) -> Capacity:
+    room = ContactCapacity()
     if has_contact:
-        chosen = context.contact
-        contact = context.colliders.capacity(chosen.collider_room, chosen.sample_room, soft=chosen.soft)
-        contact = replace(contact, hull=_has_hulls(context))
+        room = context.colliders.capacity(contact.collider_room, contact.sample_room, soft=contact.soft)
+        room = replace(room, hull=_has_hulls(context))
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,
         implicit=INTEGRATORS[settings.integrator].takes_solves,
-        contact=contact,
+        contact=room,
         plastic=_is_plastic(context),
     )
 
 
-def _program(context: WorldContext, settings: Settings, device: Device, has_contact: bool) -> StepProgram:
+def _program(
+    context: WorldContext, settings: Settings, contact: ContactSettings, device: Device, has_contact: bool
+) -> StepProgram:
     return StepProgram(
         tuple(dict.fromkeys(asset.description.model for asset in context.slots.kinds)),
         INTEGRATORS[settings.integrator],
         settings.floor is not None and not has_contact,
         has_contact,
-        context.contact.soft,
+        contact.soft,
         _is_plastic(context),
         device.threads if settings.schedule is Schedule.FLAT else 1,
     )
@@ -184,14 +192,14 @@ def _is_plastic(context: WorldContext) -> bool:
     return any(asset.plasticity is not None for asset in context.slots.kinds)
 
 
-def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
+def _fill(context: WorldContext, contact: ContactSettings, state: State, program: StepProgram) -> None:
     """Write all bodies to the fields. Their slots stay empty."""
     fill, assets = state.loader.fill, context.slots.assets
     if program.has_plasticity:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
-        fill(state.sleep_speed, np.array([context.contact.sleep_speed]))
+        fill(state.sleep_speed, np.array([contact.sleep_speed]))
         fill(state.colliders.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))

@@ -139,7 +139,7 @@ def _place(
 
 def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:
     """Raise an OptionError if a body with the initial state `rows` overlaps others and `rule` forbids it."""
-    if rule is Overlap.REFUSE and context.contact.soft:
+    if rule is Overlap.REFUSE and context.contact_with_another.soft:
         mesh, starts = asset.mesh, context.slots.starts
         others = (
             Placed(

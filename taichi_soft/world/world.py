@@ -19,7 +19,7 @@ from taichi_soft.core.conflicts import FLAT_SOLVES
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
 from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
-from taichi_soft.core.settings import ContactSettings, Settings
+from taichi_soft.core.settings import ContactRequest, Settings
 from taichi_soft.core.signals import Whole
 from taichi_soft.core.types import Integrator, IntegratorName, Schedule, ScheduleName
 from taichi_soft.persistence.recorder import Recorder
@@ -45,6 +45,12 @@ MOST_RETRIES = 10
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
+    By default bodies touch each other and fall asleep, and colliders can be added after `build`. For an
+    experiment that must not be disturbed by sleep, or whose bodies pass through each other, turn this off:
+    `World(soft_contact=False, sleep_speed=0, collider_room=0)`. The schedule "flat" and the integrator
+    "explicit_euler" support none of this, so it is off there by default. "auto" chooses "flat" for a single
+    large body.
+
     Any thread can call a world and its handles, but only one at a time: a concurrent call raises a StateError
     that names both threads, and changes nothing. So does a call in a process forked after Taichi started.
 
@@ -62,11 +68,12 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         most_iterations: of an implicit solve. A solve that needs more continues with its last iterate, with a
             `SolverWarning`.
         schedule: "auto", "per_body" or "flat": loop structure of the computation; no effect on the physics.
-        soft_contact: True for contact between soft bodies.
+        soft_contact: True for contact between soft bodies. None: True if anything can touch, that is, with
+            more than one slot for bodies, or an asset that touches itself.
         sleep_speed: bodies fall asleep if their particles, and those of bodies that they may touch, were
-            slower than this [m/s] for 0.5 s. They wake when something approaches or acts on them. 0 turns
-            sleep off.
-        collider_room: number of colliders that can be added after `build`.
+            slower than this [m/s] for 0.5 s. They wake when something approaches or acts on them. None: 0.02
+            m/s. 0 turns sleep off.
+        collider_room: number of colliders that can be added after `build`, at least. None: 15.
         sample_room: grid samples of these colliders: a `HeightFieldShape` or `MeshShape` uses
             `len(shape.samples)` while its collider exists.
         retries: how often a step that fails for a body is retried, each time with twice the substeps, and
@@ -98,9 +105,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         tolerance: float = 1e-3,
         most_iterations: int = 200,
         schedule: ScheduleName = Schedule.AUTO,
-        soft_contact: bool = False,
-        sleep_speed: float = 0.0,
-        collider_room: int = 0,
+        soft_contact: bool | None = None,
+        sleep_speed: float | None = None,
+        collider_room: int | None = None,
         sample_room: int = 0,
         retries: int = 3,
         max_substeps: int | None = None,
@@ -125,19 +132,21 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             raise OptionError(FLAT_SOLVES.message())
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
-        touching = ContactSettings(
-            collider_room=as_count(collider_room, "collider_room", 0),
-            sample_room=as_count(sample_room, "sample_room", 0, MOST_SAMPLES),
-            soft=as_flag(soft_contact, "soft_contact"),
-            sleep_speed=as_number(
-                sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more"
+        request = ContactRequest(
+            soft=None if soft_contact is None else as_flag(soft_contact, "soft_contact"),
+            sleep_speed=None
+            if sleep_speed is None
+            else as_number(
+                sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more, or None"
             ),
+            collider_room=None if collider_room is None else as_count(collider_room, "collider_room", 0),
+            sample_room=as_count(sample_room, "sample_room", 0, MOST_SAMPLES),
         )
         pools: Pools[SoftBody] = Pools()
         substeps = Substeps(
             pools,
             has_stable_step=model.has_stable_step,
-            soft_contact=touching.soft,
+            soft_contact=request.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
         self._context = WorldContext(
@@ -148,7 +157,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             layout=Scene(),
             renew_substeps=substeps.renew,
             make_handle=make_handle,
-            contact=touching,
+            contact_request=request,
             substeps=substeps,
             make_body=Body,
         )

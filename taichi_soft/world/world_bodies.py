@@ -88,8 +88,8 @@ class WorldBodies(WorldParts):
             velocity: velocity of all vertices that are not pinned, (3,) [m/s].
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
-            overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
-                from it in the first steps, or it is refused.
+            overlap: "part" or "refuse": if bodies touch each other, one that starts inside another is moved
+                apart from it in the first steps, or it is refused.
             pinned: vertices that stay fixed.
             contact: friction, thickness and groups of its surface.
             plasticity: permanent deformation; None for none.
@@ -158,8 +158,8 @@ class WorldBodies(WorldParts):
             angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices are at rest.
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
-            overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
-                from it over the next steps, or it is refused.
+            overlap: "part" or "refuse": if bodies touch each other, one that starts inside another is moved
+                apart from it over the next steps, or it is refused.
         Returns: a new handle.
         Raises: OptionError for a value or a position out of range, a position below the floor, inside a
             collider or, with "refuse", inside another body; StateError for an asset without slots in this
@@ -207,8 +207,8 @@ class WorldBodies(WorldParts):
         """Groups of bodies that came near each other in the last step or are joined, directly or through
         others.
 
-        Each body is in one island, by slot. Without `soft_contact` only joints form islands. A body spawned
-        since the last step forms its own island.
+        Each body is in one island, by slot. With `soft_contact=False` only joints form islands. A body
+        spawned since the last step forms its own island.
         Raises: StateError before `build`.
         """
         return cast("list[tuple[Body, ...]]", self._built.islands())

@@ -80,8 +80,8 @@ class WorldControl(WorldParts):
         group: int = 1,
         mask: int = ALL_GROUPS,
     ) -> Collider:
-        """Add a collider. After `build` this needs `collider_room`, and `sample_room` for a height field or
-        mesh.
+        """Add a collider. After `build` there is room for `World(collider_room=15)` more, and for
+        `sample_room` samples of height fields and meshes.
 
         The vertices of bodies collide with it; a shape smaller than a body's triangles can slip between them.
         Args:
@@ -205,9 +205,8 @@ class WorldControl(WorldParts):
                 passes through the centre of mass of the particles.
         Returns: a handle to change the speed and the limit, to read the effort, and to remove the motor.
         Raises: OptionError for invalid numbers or vertices, a body of another world, both limits or none, and
-            without `is_fixed` for particles on a line; StateError before `build`, in a world without a
-            collider, `collider_room` and `soft_contact`, and if the world's 64 motors, or their 16,384
-            particles, are all in use.
+            without `is_fixed` for particles on a line; StateError before `build`, with schedule "flat", and
+            if the world's 64 motors, or their 16,384 particles, are all in use.
         """
         require_own(self._context, body)
         motors = self._context.of(Motors)

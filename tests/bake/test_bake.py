@@ -17,11 +17,12 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, box, sphere
 from taichi_soft.bake import bake
 from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core import extras
 from taichi_soft.core.errors import BakeError, MissingExtraError
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(5e4, 0.4, 1000.0)
 FPS, SECONDS, FRAMES = 30.0, 0.5, 16
@@ -56,7 +57,7 @@ class Game:
     def __init__(self):
         self.skin = textured_ring()
         asset = SoftBodyAsset.from_surface(self.skin, JELLY, cells=6)
-        world = self.world = World(floor=0.0, retries=0)
+        world = self.world = bare_world(floor=0.0, retries=0)
         world.add_body(asset, position=(0, 0, 0.8), rotation=(0.3, 0.0, 0.0, np.sqrt(0.91)))
         world.add_body(asset, position=(1.2, 0, 0.4))
         self.block = world.add_body(box((0.4, 0.4, 0.4), cells=(2, 2, 2)), JELLY, position=(2.4, 0, 0.3))
@@ -434,7 +435,7 @@ def test_a_world_by_itself_makes_whole_steps_of_at_most_a_sixtieth_from_frame_to
 @pytest.mark.soak
 def test_a_body_that_goes_and_is_restored_is_seen_when_it_was_there(tmp_path):
     """A clip of its own from then on: what it did is not drawn together in time."""
-    world, kept, heights = World(), [], []
+    world, kept, heights = bare_world(), [], []
     kind = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), Material(8e4, 0.4, 900.0))
     world.reserve(kind, 2)
     world.spawn(kind, position=(0, 0, 0.3))

@@ -9,10 +9,10 @@ from taichi_soft import (
     MeshError,
     OptionError,
     SoftBodyAsset,
-    World,
     box,
 )
 from taichi_soft.bodies.layout import arrange
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH = box(cells=(2, 2, 2))
@@ -25,7 +25,7 @@ def cube(**options):
 @pytest.mark.parametrize("cells", [(1, 1, 1), (2, 2, 2), (3, 4, 5)])
 def test_blocks_hold_every_edge_once_and_each_half_of_one_first_end(cells):
     mesh = box(cells=cells)
-    world = World(floor=None)
+    world = bare_world(floor=None)
     arrays = world.add_body(mesh, JELLY).asset.arrays
     held = []
     for first, count in arrays.edge_blocks:
@@ -41,7 +41,7 @@ def test_blocks_hold_every_edge_once_and_each_half_of_one_first_end(cells):
 
 def test_blocks_of_edges_are_nearly_full():
     """Shares of places taken, where each particle has some nine edges."""
-    arrays = World(floor=None).add_body(box(cells=(5, 5, 5)), JELLY).asset.arrays
+    arrays = bare_world(floor=None).add_body(box(cells=(5, 5, 5)), JELLY).asset.arrays
     assert arrays.edge_blocks[:, 1].mean() > 0.85 * 8
 
 
@@ -53,14 +53,14 @@ def test_copies_are_arranged_once(monkeypatch):
         return arrange(description)
 
     monkeypatch.setattr("taichi_soft.bodies.asset.arrange", counted)
-    world, kind = World(floor=None), cube()
+    world, kind = bare_world(floor=None), cube()
     for x in range(4):
         world.add_body(MESH, JELLY, position=(3 * x, 0, 0))
     assert len(made) == 1
     world.add_body(MESH, JELLY, pinned=[0])
     world.add_body(MESH, JELLY, law="face")
     assert len(made) == 3
-    for other in (world, World(floor=None)):
+    for other in (world, bare_world(floor=None)):
         other.reserve(kind, 5)
     assert len(made) == 4
     assert len({body.asset for body in world.bodies}) == 3
@@ -71,7 +71,7 @@ def test_an_asset_cannot_be_changed_through_anything_it_shares():
     asset = cube(pinned=pinned)
     pinned[:] = 0
     assert asset.pinned.tolist() == [2, 4]
-    body = World(floor=None).add_body(MESH, JELLY)
+    body = bare_world(floor=None).add_body(MESH, JELLY)
     for name in ("mesh", "law", "pinned", "description"):
         with pytest.raises(AttributeError):
             setattr(asset, name, None)

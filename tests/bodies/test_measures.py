@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from taichi_soft import MeshError, World, box, cloth, rope, sphere
+from taichi_soft import MeshError, box, cloth, rope, sphere
 from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.elements.materials import SpringMaterial
+from taichi_soft.world.bare import bare_world
 
 RANDOM = np.random.default_rng(2)
 TURNS = [np.eye(3), *Rotation.random(4, random_state=3).as_matrix()]
@@ -71,7 +72,7 @@ def test_a_body_shrunk_to_a_point_is_not_turned():
 @pytest.fixture(scope="module")
 def bodies(jelly):
     """A cube, a sheet and a rope."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     world.add_body(box(cells=(2, 2, 2)), jelly)
     springs = SpringMaterial(stiffness=100.0)
     world.add_body(cloth((1, 1), (2, 2), 1.0), springs, law="springs")

@@ -10,13 +10,13 @@ from taichi_soft import (
     OptionError,
     ParticleMesh,
     SpringMaterial,
-    World,
     box,
     cloth,
     cloth_constants,
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.soak
 def test_a_weight_on_a_spring_swings_as_the_pendulum_formula_says(schedule):
     """x'' = g - k/m x from rest: x = (m g / k)(1 - cos(w t))."""
     mesh = ParticleMesh([[0, 0, 0], [0, 0, -1.0]], [[0, 1]], [1.0, 2.0])
-    world = World(floor=None, schedule=schedule)
+    world = bare_world(floor=None, schedule=schedule)
     body = world.add_body(mesh, SpringMaterial(500.0), law="springs", pinned=[0])
     world.build()
     w = np.sqrt(500.0 / 2.0)
@@ -38,7 +38,7 @@ def test_a_weight_on_a_spring_swings_as_the_pendulum_formula_says(schedule):
 
 def test_an_undamped_lattice_keeps_its_energy_in_flight():
     mesh = rope(1.0, 6, 1.0)
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     body = world.add_body(mesh, SpringMaterial(100.0), law="springs")
     world.build()
     body.set_motion(mesh.vertices, np.random.default_rng(0).normal(size=mesh.vertices.shape))
@@ -56,7 +56,7 @@ def test_a_cloth_without_bending_springs_hangs_by_its_threads_and_meshes_alone(i
     cells, k = (6, 6), {"tensile": 200.0, "shear": 100.0, "bend": 0.0}
     mesh = cloth((1.0, 1.0), cells, 0.3)
     stiffness = cloth_constants(mesh, cells, **k)
-    world = World(floor=None, integrator=integrator)
+    world = bare_world(floor=None, integrator=integrator)
     down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     body = world.add_body(
         mesh, SpringMaterial(stiffness, 0.5), pinned=[0, 6], position=(0, 0, 1.5), rotation=down
@@ -64,7 +64,7 @@ def test_a_cloth_without_bending_springs_hangs_by_its_threads_and_meshes_alone(i
     world.build()
     threads = cloth((1.0, 1.0), cells, 0.3, springs=("tensile", "shear"))
     of_threads = cloth_constants(threads, cells, tensile=k["tensile"], shear=k["shear"])
-    alike = World(floor=None, integrator=integrator)
+    alike = bare_world(floor=None, integrator=integrator)
     alike.add_body(threads, SpringMaterial(of_threads), position=(0, 0, 2))
     assert body.stable_step.undamped == pytest.approx(alike.bodies[0].stable_step.undamped, rel=0.02)
     for _ in range(steps):
@@ -95,7 +95,7 @@ def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
     every.append((chain, {"law": "springs", "pinned": [0], "position": (0.5, 3, 2)}))
 
     def moved(*bodies):
-        world = World(schedule=schedule)
+        world = bare_world(schedule=schedule)
         for made_of, options in bodies:
             world.add_body(*made_of, **options)
         world.build()
@@ -112,7 +112,7 @@ def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
 def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
     mesh = box((0.5, 0.5, 1.0), (1, 1, 2))
     top = np.flatnonzero(mesh.vertices[:, 2] > mesh.bounds[1, 2] - 1e-6)
-    world = World(schedule=schedule)
+    world = bare_world(schedule=schedule)
     body = world.add_body(mesh, Material(2e5, 0.2, 1000.0, 30.0), law=law, pinned=top, position=(0, 0, 2))
     world.build()
     before = body.positions()[top].tobytes()
@@ -135,7 +135,7 @@ def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
     ],
 )
 def test_pins_that_are_no_vertices_are_refused(pinned, text):
-    world = World()
+    world = bare_world()
     with pytest.raises(OptionError, match=text):
         world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.3, 1e3), position=(0, 0, 1), pinned=pinned)
     assert world.bodies == ()
@@ -143,7 +143,7 @@ def test_pins_that_are_no_vertices_are_refused(pinned, text):
 
 def test_a_spring_that_breaks_the_body_is_named_and_the_rest_goes_on():
     chain = rope(1.0, 4, 0.2)
-    world = World(floor=None, retries=0)
+    world = bare_world(floor=None, retries=0)
     bad = world.add_body(chain, SpringMaterial([10.0, 10.0, 1e9, 10.0]), law="springs")
     good = world.add_body(chain, SpringMaterial(10.0), law="springs", position=(0, 2, 0))
     world.build()
@@ -158,7 +158,7 @@ def test_a_spring_that_breaks_the_body_is_named_and_the_rest_goes_on():
 
 
 def test_what_needs_tetrahedra_says_so():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), law="springs")
     world.build()
     assert repr(body) == "Body(0, 5 vertices, 4 edges, active)"
@@ -170,7 +170,7 @@ def test_what_needs_tetrahedra_says_so():
 
 
 def test_a_particle_mesh_takes_springs_only():
-    world = World()
+    world = bare_world()
     with pytest.raises(
         MeshError, match=r"law 'virial' .*no tetrahedra: .* law='springs' with a SpringMaterial"
     ):

@@ -15,11 +15,11 @@ from taichi_soft import (
     Plasticity,
     SoftBodyAsset,
     Stiffness,
-    World,
     box,
 )
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.soft_body import rest_inverses_of
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -75,7 +75,7 @@ KINDS = {
 
 def make_world(mode, *kinds):
     """A world of one body of each kind, with every vertex pinned: it is deformed as `deform` says."""
-    world = World(floor=None, gravity=(0, 0, 0), **MODES[mode])
+    world = bare_world(floor=None, gravity=(0, 0, 0), **MODES[mode])
     for kind in kinds:
         world.add_body(MESH, CLAY, pinned=EVERY, **KINDS[kind])
     world.build()
@@ -182,7 +182,7 @@ def test_flow_only_takes_elastic_energy_away(fresh, law):
 def test_a_bar_that_was_pulled_stays_as_long_as_return_mapping_says():
     """Stretched at once and let go: it swings, damped, about a length that the yield strain alone tells."""
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     material = Material(YOUNG, POISSON, 1000.0, 60.0)
     body = world.add_body(mesh, material, plasticity=Plasticity(yield_strain=0.05))
     world.build()

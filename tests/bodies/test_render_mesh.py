@@ -12,13 +12,13 @@ from taichi_soft import (
     SpringMaterial,
     StateError,
     TetMesh,
-    World,
     box,
     cloth,
     rope,
     sphere,
 )
 from taichi_soft.bodies import render_mesh
+from taichi_soft.world.bare import bare_world
 
 CUBE, BALL, BLOCK = box((1, 1, 1), (1, 1, 1)), sphere(0.5, 5), box((1, 1, 1), (3, 3, 3))
 _TURN = np.linspace(0.0, 2 * np.pi, 13)[:-1]
@@ -36,7 +36,7 @@ class Zoo:
     """One world with all kinds of bodies, which each test finds as it was built."""
 
     def __init__(self):
-        world = self.world = World(floor=None, gravity=(0, 0, 0), retries=0)
+        world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
         block = SoftBodyAsset(BLOCK, JELLY, spare_vertices=100)
         world.reserve(block, 4)
         self.cube = world.add_body(CUBE, JELLY, position=(0, 0, 1))
@@ -198,7 +198,7 @@ def test_a_rope_has_no_surface_to_draw(zoo):
 
 
 def test_a_mesh_may_be_made_before_build_and_is_read_after():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     mesh = world.add_body(CUBE, JELLY).render_mesh(crease=30.0)
     assert mesh.vertex_count == 24
     with pytest.raises(StateError, match="not built"):
@@ -320,7 +320,7 @@ def test_what_is_no_mesh_of_this_world_and_no_alpha_is_refused(zoo):
     for bad in (None, "cube", CUBE):
         with pytest.raises(OptionError, match="mesh must be a RenderMesh, made by body"):
             world.read_render_mesh(bad, 1.0)
-    stranger = World(floor=None).add_body(CUBE, JELLY)
+    stranger = bare_world(floor=None).add_body(CUBE, JELLY)
     with pytest.raises(OptionError, match="mesh must belong to a body of this world"):
         world.read_render_mesh(stranger.render_mesh(), 1.0)
     for alpha in (-0.1, 1.1, float("nan"), None, "now"):

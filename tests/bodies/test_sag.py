@@ -6,7 +6,8 @@ import warnings
 import numpy as np
 import pytest
 
-from taichi_soft import Material, TooSoftWarning, World, box
+from taichi_soft import Material, TooSoftWarning, box
+from taichi_soft.world.bare import bare_world
 
 BLOCK = box((1, 1, 1), (2, 2, 2))
 SLAB = box((1, 1, 0.1), (2, 2, 1))
@@ -14,7 +15,7 @@ SLAB = box((1, 1, 0.1), (2, 2, 1))
 
 def said_of(mesh, material, **options):
     """What a world with such a body warns of when it is built."""
-    world = World(**options)
+    world = bare_world(**options)
     world.add_body(mesh, material, position=(0, 0, 5))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -14,7 +14,6 @@ from taichi_soft import (
     SpringMaterial,
     StateError,
     Tearing,
-    World,
     box,
     rope,
     sphere,
@@ -22,6 +21,7 @@ from taichi_soft import (
 from taichi_soft.bodies import skin_mesh
 from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.3, 1000.0)
 BAR = trimesh.creation.box((3.0, 0.6, 0.6)).subdivide().subdivide().subdivide()
@@ -32,7 +32,7 @@ class Zoo:
     """One world with all kinds of bodies, which each test finds as it was built."""
 
     def __init__(self):
-        world = self.world = World(floor=None, gravity=(0, 0, 0), retries=0)
+        world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
         self.bar = world.add_body(SoftBodyAsset.from_surface(BAR, JELLY, cells=10))
         self.blob = world.add_body(SoftBodyAsset.from_surface(BLOB, JELLY, cells=8), position=(5, 0, 0))
         carried = SoftBodyAsset(sphere(0.5, 5), JELLY, skin=(ball(0.6), ball(0.2)), spare_vertices=100)
@@ -149,7 +149,7 @@ def test_a_skin_does_not_follow_a_cut_and_says_so(zoo):
 
 def test_a_skin_does_not_follow_a_tear_and_says_so():
     asset = SoftBodyAsset.from_surface(BAR, JELLY, cells=10, tearing=Tearing(2e3), spare_vertices=200)
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     body = world.add_body(asset)
     world.build()
     (skin,) = body.render_meshes
@@ -171,7 +171,7 @@ def test_names_textures_and_the_nearest_vertices_are_told(tmp_path):
     crate.visual = trimesh.visual.TextureVisuals(uv=uv)
     scene.add_geometry(crate, node_name="crate")
     scene.export(tmp_path / "crate.glb")
-    world = World()
+    world = bare_world()
     body = world.add_body(
         SoftBodyAsset.from_surface(tmp_path / "crate.glb", JELLY, cells=4), position=(0, 0, 1)
     )
@@ -223,7 +223,7 @@ def test_vertices_that_are_split_at_seams_make_the_same_body_and_stay_together(t
     assert skin.vertex_count == 3 * len(bar.faces)
     facts = facts_of(split.skin)
     assert (facts.open_edges, facts.crowded_edges, facts.parts) == (0, 0, 1)
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     body = world.add_body(split)
     world.build()
     places = body.positions() + 0.1 * np.sin(3.0 * body.positions()[:, [1, 2, 0]])  # bent and twisted
@@ -255,7 +255,7 @@ def test_what_was_assumed_and_repaired_of_a_file_is_logged(tmp_path, caplog):
 
 def test_an_asset_and_options_of_its_own_do_not_go_together():
     asset = SoftBodyAsset(box((1, 1, 1), (1, 1, 1)), JELLY)
-    world = World()
+    world = bare_world()
     with pytest.raises(OptionError, match=r"material .*SoftBodyAsset"):
         world.add_body(asset, JELLY)
     with pytest.raises(OptionError, match=r"law .*SoftBodyAsset"):
@@ -265,7 +265,7 @@ def test_an_asset_and_options_of_its_own_do_not_go_together():
 
 
 def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
-    world = World()
+    world = bare_world()
     soft = Material(1e5, 0.3, 1000.0, damping_ratio=0.3)
     body = world.add_body(SoftBodyAsset.from_surface(BAR, soft, cells=10), position=(0, 0, 0.32))
     world.build()
@@ -279,7 +279,7 @@ def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
 
 def test_a_cage_is_in_a_recording_and_moves_the_same_again(tmp_path):
     asset = SoftBodyAsset.from_surface(BLOB, JELLY, cells=5)
-    world = World(record=10)
+    world = bare_world(record=10)
     world.add_body(asset, position=(0, 0, 1))
     world.build()
     for _ in range(20):

@@ -4,10 +4,11 @@ import gc
 
 import pytest
 
-from taichi_soft import Material, World, box
+from taichi_soft import Material, box
 from taichi_soft.bodies import fields
 from taichi_soft.contact.fields import ContactCapacity
 from taichi_soft.solver.state import Capacity
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -17,7 +18,7 @@ JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 
 def fallen(count):
     """A world of so many cubes in stacks of two, which have hit the floor and each other."""
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     for i in range(count):
         world.add_body(CUBE, JELLY, position=(2.0 * (i // 2), 0.1 * (i % 2), 0.7 + 1.2 * (i % 2)))
     world.build()

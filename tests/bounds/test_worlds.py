@@ -22,10 +22,10 @@ from taichi_soft import (
     SpringMaterial,
     Tearing,
     TetMesh,
-    World,
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
@@ -70,7 +70,7 @@ def wreck_all(world):
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 def test_bodies_of_all_kinds_that_were_wrecked(schedule):
-    world = World(schedule=schedule)
+    world = bare_world(schedule=schedule)
     world.add_body(BLOCK, JELLY, position=(0, 0, 1), law="virial", flips="recover")
     world.add_body(BLOCK, JELLY, position=(1, 0, 1), law="neo_hookean")
     world.add_body(BLOCK, Material(3e4, 0.2, 500.0), position=(2, 0, 1), law="volume_springs")
@@ -83,7 +83,7 @@ def test_bodies_of_all_kinds_that_were_wrecked(schedule):
 def test_lanes_beside_the_last_body():
     """Eight at a time are read of its particles and triangles, where there are four."""
     corners = 0.4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    world = World(soft_contact=True, floor=None, gravity=(0, 0, 0))
+    world = bare_world(soft_contact=True, floor=None, gravity=(0, 0, 0))
     for place, speed in ((0.0, 0.0), (0.2, -2.0)):
         world.add_body(TetMesh(corners, [[0, 1, 2, 3]]), JELLY, position=(place,) * 3, velocity=(speed,) * 3)
     world.build()
@@ -94,7 +94,7 @@ def test_lanes_beside_the_last_body():
 
 def crowd(**options):
     """On colliders of all kinds that overlap, with bodies that touch themselves, dent, tear and are held."""
-    world = World(soft_contact=True, floor=None, sleep_speed=0.05, **options)
+    world = bare_world(soft_contact=True, floor=None, sleep_speed=0.05, **options)
     ring = MeshShape(trimesh.creation.torus(0.8, 0.25, 16, 10), cell=0.1, cache=False)
     waves = HeightFieldShape(np.sin(np.arange(42.0)).reshape(7, 6) / 5, 0.5)
     solids = PlaneShape(), SphereShape(0.3), BoxShape((3.0, 0.3, 0.2)), CapsuleShape(0.1, 1.0)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from difficult_surfaces import BODIES, REFUSED, SCALED
 
-from taichi_soft import Material, MeshError, SoftBodyAsset, World
+from taichi_soft import Material, MeshError, SoftBodyAsset
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -17,7 +18,7 @@ class Fall:
     """Bodies dropped onto the floor side by side, when they have rested for a while."""
 
     def __init__(self, assets, scale=1.0, seconds=6.0):
-        world = self.world = World()
+        world = self.world = bare_world()
         self.scale, self.dt = scale, np.sqrt(scale) / 60
         self.bodies = {}
         for i, (name, asset) in enumerate(assets.items()):

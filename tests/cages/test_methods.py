@@ -21,7 +21,6 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     TetMesh,
-    World,
     load_mesh,
     save_mesh,
 )
@@ -29,6 +28,7 @@ from taichi_soft.cages import mesher_process, tetrahedra_of
 from taichi_soft.cages.mesher import winding_number
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.meshing.surfaces import read_surfaces
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -184,7 +184,7 @@ def test_a_body_of_it_falls_and_rests_and_is_drawn_as_the_artist_made_it(method,
     save_mesh(asset.mesh, tmp_path / "block.npz")
     again = SoftBodyAsset(load_mesh(tmp_path / "block.npz"), JELLY, skin=surface)
     above = 0.05 - surface.bounds[0][2]
-    world = World()
+    world = bare_world()
     bodies = [world.add_body(each, position=(2 * i, 0, above)) for i, each in enumerate((asset, again))]
     world.build()
     for i, body in enumerate(bodies):

@@ -7,10 +7,11 @@ import pytest
 import trimesh
 from surfaces import ball, joined, with_triangles
 
-from taichi_soft import Material, OptionError, SoftBodyAsset, World, element_model, stable_step
+from taichi_soft import Material, OptionError, SoftBodyAsset, element_model, stable_step
 from taichi_soft.cages import build_cage, tetrahedra_of
 from taichi_soft.cages.marking import part_count
 from taichi_soft.meshing.surfaces import read_surfaces
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0)
 TOP = (2.0, 1.2, 0.25)
@@ -211,7 +212,7 @@ def test_a_table_on_thin_legs_stands_on_them():
     """Light and stiff enough: legs are as stiff as the cells that carry them."""
     light = Material(young=1e8, poisson=0.3, density=100.0, damping_ratio=0.3)
     asset = SoftBodyAsset.from_surface(table(LEG), light, cells=6)
-    world = World()
+    world = bare_world()
     body = world.add_body(asset, position=(0.0, 0.0, 0.01 - asset.mesh.vertices[:, 2].min()))
     world.build()
     for _ in range(60):

@@ -12,14 +12,14 @@ from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, SpringMaterial, World, box, rope
 
 
-def make_world():
-    world = World()
+def make_world(**options):
+    world = World(**options)
     world.add_body(box((1, 1, 1), cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
     return world
 
 
 def with_a_rope():
-    world = make_world()
+    world = make_world(soft_contact=False)
     world.add_body(rope(1.0, 4, 0.2), SpringMaterial(1000.0, 1.0), position=(0, 3, 1))
     return world
 

@@ -20,10 +20,10 @@ from taichi_soft import (
     PlaneShape,
     SphereShape,
     StateError,
-    World,
     box,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 G = 9.81
 DT = 1 / 60
@@ -42,7 +42,7 @@ def run(world, seconds):
 
 def room(**options):
     """A world without a floor, of a capacity that most tests share."""
-    return World(**{"floor": None, "collider_room": 8, **options})
+    return bare_world(**{"floor": None, "collider_room": 8, **options})
 
 
 SLOPE = 0.3
@@ -218,7 +218,7 @@ def test_what_restitution_takes_from_a_body_the_collider_is_told(rebounds):
 
 @pytest.mark.parametrize(("restitution", "lowest", "highest"), [(None, 0.9, 1.0), (0.0, 0.0, 0.07)])
 def test_a_floor_among_colliders_has_their_restitution(restitution, lowest, highest):
-    world = World(restitution=restitution, gravity=(0, 0, 0), collider_room=1)
+    world = bare_world(restitution=restitution, gravity=(0, 0, 0), collider_room=1)
     ball = Material(1e8, 0.3, 1000.0, 0.0)
     body = world.add_body(sphere(0.5, 2), ball, position=(0, 0, 0.55), velocity=(0, 0, -4.0))
     world.build()
@@ -320,7 +320,7 @@ def thrown_at(world, number, pose, young, size):
 
 
 def test_nothing_passes_a_wall_of_2_cm_at_30_metres_a_second():
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     world.add_collider(BoxShape((0.02, 20.0, 20.0)), position=(0.01, 0, 0))
     for pose, young, size in WALLED:
         body = thrown_at(world, 0, pose, young, size)
@@ -615,7 +615,7 @@ def test_a_refused_call_changes_nothing():
 
 
 def test_a_body_that_breaks_among_colliders_tells_where():
-    world = World(collider_room=1, retries=0)
+    world = bare_world(collider_room=1, retries=0)
     world.add_collider(BoxShape((1.0, 1.0, 1.0)), position=(0.9, 0.0, 0.5))
     body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.6))
     world.build()
@@ -630,7 +630,7 @@ def test_a_body_that_breaks_among_colliders_tells_where():
 @pytest.mark.parametrize("integrator", ["leapfrog", "lazy_leapfrog"])
 def test_a_body_beside_a_wall_falls_freely_and_lands(integrator):
     """Beside a wall that it does not touch, z = z0 - g t^2 / 2; then the floor bears its weight."""
-    world = World(integrator=integrator, collider_room=8)
+    world = bare_world(integrator=integrator, collider_room=8)
     body = world.add_body(box(cells=(2, 2, 2)), FIRM, position=(0.0, 0.0, 1.0))
     world.add_collider(PlaneShape((1.0, 0.0, 0.0)), position=(-0.51, 0.0, 0.0))
     world.build()

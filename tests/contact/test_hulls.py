@@ -14,10 +14,10 @@ from taichi_soft import (
     PlaneShape,
     SoftBodyAsset,
     TetMesh,
-    World,
     box,
 )
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -74,7 +74,7 @@ def test_a_body_with_thin_parts_rests_on_what_is_drawn_of_it(leg):
     or sinks in, by 1.5 % of its size and more."""
     gaps = {}
     for hull in (None, 500):
-        world = World(floor=0.0, soft_contact=True)
+        world = bare_world(floor=0.0, soft_contact=True)
         body = world.add_body(asset_of(table(leg), hull, cells=5), position=(0, 0, 0.06))
         world.build()
         gaps[hull] = abs(at_rest(world, body, 4.5)[:, 2].min())
@@ -84,7 +84,7 @@ def test_a_body_with_thin_parts_rests_on_what_is_drawn_of_it(leg):
 
 def test_a_body_lies_on_what_is_drawn_of_another():
     """A plate on a ball, both by their hulls: their drawn surfaces meet to 1 % of the ball."""
-    world = World(floor=0.0, soft_contact=True, friction=1.0)
+    world = bare_world(floor=0.0, soft_contact=True, friction=1.0)
     heavy = asset_of(ball(), pinned=())
     lower = world.add_body(heavy, position=(0, 0, 0.5))
     plate = trimesh.creation.box((0.6, 0.6, 0.2)).subdivide().subdivide().subdivide().subdivide()
@@ -120,7 +120,7 @@ def cube_of(edge=0.6):
 def test_no_vertex_of_a_body_at_rest_is_faster_than_gravity_makes_it_within_a_substep(hull):
     """What bears it takes that away again. With a hull too, of which many points share vertices."""
     asset = asset_of(cube_of(), hull)
-    world = World(floor=0.0, soft_contact=True)
+    world = bare_world(floor=0.0, soft_contact=True)
     body = world.add_body(asset, position=(0, 0, 0.303))
     world.build()
     for _ in range(120):
@@ -140,7 +140,7 @@ def test_a_body_on_a_slope_sticks_or_slides_as_coulomb_has_it(friction):
     slope = np.radians(20)
     turn = np.array([0, np.sin(slope / 2), 0, np.cos(slope / 2)])
     down, up = np.array([np.cos(slope), 0, -np.sin(slope)]), np.array([np.sin(slope), 0, np.cos(slope)])
-    world = World(floor=None, soft_contact=True, collider_room=2)
+    world = bare_world(floor=None, soft_contact=True, collider_room=2)
     body = world.add_body(asset_of(cube_of(), True), position=0.303 * up, rotation=turn)
     world.add_collider(BoxShape((20, 20, 0.5)), position=-0.5 * up, rotation=turn, friction=friction)
     world.build()
@@ -168,7 +168,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
         place = 1.02 + random.uniform(0, 0.5), offset * np.cos(angle), offset * np.sin(angle)
         if offset > 0.45:
             continue  # beside each other more than against
-        world = World(gravity=(0, 0, 0), floor=None, soft_contact=True)
+        world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
         first = world.add_body(asset, velocity=(20, 0, 0), rotation=turns[0])
         second = world.add_body(asset, position=place, velocity=(-20, 0, 0), rotation=turns[1])
         world.build()
@@ -182,7 +182,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
 
 def test_a_body_bounces_no_higher_than_it_fell():
     """On its hull, from a floor that gives back nine tenths of a speed."""
-    world = World(floor=0.0, soft_contact=True, restitution=0.9)
+    world = bare_world(floor=0.0, soft_contact=True, restitution=0.9)
     body = world.add_body(asset_of(ball()), position=(0, 0, 1.5))
     world.build()
     heights = []
@@ -206,7 +206,7 @@ def momenta(world):
 @pytest.mark.parametrize("other", [500, None])
 def test_momentum_and_angular_momentum_of_two_that_meet(other):
     """Off centre, with friction, with a body that has a hull or none."""
-    world = World(gravity=(0, 0, 0), floor=None, soft_contact=True)
+    world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
     contact = Contact(friction=0.8)
     first = world.add_body(asset_of(ball(), 500, contact=contact), velocity=(2, 0, 0))
     second = world.add_body(
@@ -246,7 +246,7 @@ def weights_of(point):
 def test_one_impulse_at_one_point_as_an_equation_has_it():
     """Inelastic, sliding: P is along the normal so that the point stops there, friction at its bound."""
     asset = SoftBodyAsset(SHARDS, FLESH, hull=(POINTS, FACES))
-    world = World(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
+    world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
     body = world.add_body(asset, velocity=(3.0, 0.5, -1.0), position=(0, 0, 1.0))
     wall = world.add_collider(PlaneShape(), friction=0.2, position=(0.5, 0.25, 0.695))
     world.build()
@@ -267,7 +267,7 @@ def test_one_impulse_at_one_point_as_an_equation_has_it():
 
 def test_what_a_collider_feels_is_what_a_body_loses():
     """Momentum, and angular momentum about the collider, of a fall with friction onto a moving box."""
-    world = World(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
+    world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
     world.add_body(asset_of(urchin(), 500), position=(0, 0, 1.0), velocity=(1, 0.3, -3))
     ram = world.add_collider(BoxShape((1, 1, 0.2)), position=(0.2, 0, 0.0), friction=0.7)
     world.build()
@@ -285,7 +285,7 @@ def test_what_a_collider_feels_is_what_a_body_loses():
 
 
 def heap():
-    world = World(soft_contact=True, record=200)
+    world = bare_world(soft_contact=True, record=200)
     asset = asset_of(urchin(), 300)
     for i in range(3):
         world.add_body(asset, position=(0.05 * i, 0.1 * i, 0.9 + 1.75 * i))
@@ -315,7 +315,7 @@ def test_rewinding_and_recordings_are_exact(tmp_path):
 
 
 def test_a_world_whose_body_has_frozen_on_its_hull_is_taken_back():
-    world = World()
+    world = bare_world()
     world.add_body(asset_of(urchin(), 300), position=(9.9999e6, 0, 3), velocity=(1.9e4, 0, 0))
     world.build()
     with pytest.warns(FrozenBodyWarning):
@@ -329,7 +329,7 @@ def test_a_body_without_hull_moves_beside_hulls_as_without_them():
     """Two boxes, one thrown onto the other; far away a hull, or none."""
     found = []
     for hull in (300, None):
-        world = World(soft_contact=True)
+        world = bare_world(soft_contact=True)
         for z, speed in ((0.3, 0.0), (0.9, -1.0)):
             world.add_body(
                 box((0.5, 0.5, 0.5), (2, 2, 2)), JELLY, position=(0, 0.1 * z, z), velocity=(0, 0, speed)
@@ -346,7 +346,7 @@ def test_a_hull_stays_where_it_is_when_the_level_changes():
     asset = SoftBodyAsset.from_surface(table(0.08), JELLY, cells=(8, 5), hull=400)
     hulls = [level.bound_hull.points for level in asset.levels]
     assert hulls[0] == pytest.approx(hulls[1], abs=1e-6)
-    world = World(floor=0.0, soft_contact=True)
+    world = bare_world(floor=0.0, soft_contact=True)
     body = world.add_body(asset, position=(0, 0, 0.02))
     world.build()
     at_rest(world, body, 1.5)
@@ -355,7 +355,7 @@ def test_a_hull_stays_where_it_is_when_the_level_changes():
 
 
 def test_a_body_falls_asleep_on_its_hull_and_wakes():
-    world = World(soft_contact=True, sleep_speed=0.05, collider_room=2)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=2)
     body = world.add_body(asset_of(table(0.08), 300), position=(0, 0, 0.02))
     world.build()
     for _ in range(240):
@@ -373,7 +373,7 @@ def test_a_body_that_skips_a_step_makes_it_where_a_collider_comes_near_its_hull(
     """The hull stands 0.15 m out of the cage, and the collider comes near that alone."""
     wide = trimesh.creation.box((0.6, 0.6, 0.6)).subdivide()
     asset = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), JELLY, skin=wide, hull=60)
-    world = World(soft_contact=True, collider_room=2)
+    world = bare_world(soft_contact=True, collider_room=2)
     body = world.add_body(asset, position=(0, 0, 3.0))
     world.build()
     wall = world.add_collider(BoxShape((0.1, 0.1, 0.1)), position=(0.38, 0, 3.0))
@@ -417,7 +417,7 @@ def test_what_takes_no_hull_is_refused():
         SoftBodyAsset(mesh, JELLY, skin=ball(), hull=100, spare_vertices=10)
     with pytest.raises(OptionError, match="itself"):
         SoftBodyAsset(mesh, JELLY, skin=ball(), hull=100, contact=Contact(itself=True))
-    world = World(integrator="implicit_euler")
+    world = bare_world(integrator="implicit_euler")
     world.add_body(SoftBodyAsset(mesh, JELLY, skin=ball(), hull=100), position=(0, 0, 1))
     with pytest.raises(OptionError, match="implicit_euler"):
         world.build()

@@ -19,11 +19,11 @@ from taichi_soft import (
     PlaneShape,
     SphereShape,
     SpringMaterial,
-    World,
     box,
     cloth,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -36,7 +36,7 @@ CUBE = box((0.5, 0.5, 0.5), (3, 3, 3))
 
 
 def room(**options):
-    return World(**{"floor": None, "collider_room": 1, "integrator": "implicit_euler", **options})
+    return bare_world(**{"floor": None, "collider_room": 1, "integrator": "implicit_euler", **options})
 
 
 def add(world, number, mesh, material, **options):
@@ -267,7 +267,7 @@ def test_its_rehearsal_leaves_out_the_joints_it_does_not_have():
 
 
 def test_bodies_that_collide_keep_their_momentum():
-    world = World(
+    world = bare_world(
         floor=None,
         gravity=(0, 0, 0),
         integrator="implicit_euler",
@@ -287,7 +287,7 @@ def test_bodies_that_collide_keep_their_momentum():
 
 
 def test_two_blocks_stand_on_each_other_and_fall_asleep():
-    world = World(integrator="implicit_euler", soft_contact=True, sleep_speed=0.02)
+    world = bare_world(integrator="implicit_euler", soft_contact=True, sleep_speed=0.02)
     for i in range(2):
         world.add_body(CUBE, FIRM, position=(0, 0, 0.26 + 0.52 * i))
     world.build()
@@ -302,7 +302,7 @@ import sys
 import numpy as np
 from taichi_soft import BoxShape, Material, World, box, init
 init("cpu", threads=int(sys.argv[1]))
-world = World(integrator="implicit_euler", soft_contact=True)
+world = World(integrator="implicit_euler", sleep_speed=0)
 world.add_collider(BoxShape((4.0, 4.0, 0.2)), rotation=(0.1, 0.0, 0.0, 0.995))
 for i in range(4):
     place = (0.1 * i + 3.0 * (i % 2), 0.05 * i, 0.6 + 0.4 * i)
@@ -326,7 +326,7 @@ def test_the_same_bits_for_one_and_two_threads(tmp_path):
 
 
 def test_explicit_euler_still_takes_no_colliders():
-    world = World(integrator="explicit_euler", collider_room=1)
+    world = bare_world(integrator="explicit_euler", collider_room=1)
     world.add_body(CUBE, JELLY, position=(0, 0, 1))
     with pytest.raises(OptionError, match=r"colliders, .*'explicit_euler'"):
         world.build()

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Material, TetMesh, World, box
+from taichi_soft import Contact, Material, TetMesh, box
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.contact.kernels.narrow_phase import find_contacts
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 THICKNESS = 0.02
@@ -25,7 +26,7 @@ class Candidates:
     """A vertex and a triangle of each of three other bodies, all of them candidates of contact."""
 
     def __init__(self) -> None:
-        world = World(floor=None, gravity=(0, 0, 0), soft_contact=True)
+        world = bare_world(floor=None, gravity=(0, 0, 0), soft_contact=True)
         for i in range(BODY + 1):
             contact = Contact(thickness=THICKNESS)
             world.add_body(box((0.1,) * 3, (2, 2, 2)), SOFT, position=(0.3 * i, 0, 0), contact=contact)
@@ -142,7 +143,7 @@ def test_a_tip_in_a_valley_rests_on_both_its_sides():
     x[tip, 2] -= 0.1
     firm = Material(young=3e5, poisson=0.3, density=500.0, damping=40.0)
     contact = Contact(friction=0.3, thickness=THICKNESS)
-    world = World(floor=None, soft_contact=True)
+    world = bare_world(floor=None, soft_contact=True)
     world.add_body(
         TetMesh(v, groove.tets),
         firm,

@@ -9,11 +9,11 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     SpringMaterial,
-    World,
     box,
     cloth,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 SOFT = Material(young=1e5, poisson=0.4, density=800.0)
@@ -42,7 +42,7 @@ def overlap(body, other):
 
 
 def free_world(**options):
-    return World(**{"floor": None, "gravity": (0, 0, 0), "soft_contact": True, **options})
+    return bare_world(**{"floor": None, "gravity": (0, 0, 0), "soft_contact": True, **options})
 
 
 def run(world, seconds):
@@ -108,7 +108,7 @@ def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown
 
 @pytest.mark.soak
 def test_30_bodies_spawned_at_one_place_over_a_floor_come_to_rest_beside_and_on_each_other():
-    world = World(soft_contact=True, sleep_speed=0.02)
+    world = bare_world(soft_contact=True, sleep_speed=0.02)
     ball = SoftBodyAsset(sphere(0.2, 2), Material(3e5, 0.3, 800.0, damping_ratio=0.3))
     world.reserve(ball, 30)
     world.build()
@@ -194,7 +194,7 @@ def test_a_world_restored_while_bodies_part_goes_on_bit_by_bit():
 
 def test_a_body_may_be_refused_where_it_overlaps_another():
     """The message names the body and the depth, which is that of the deepest vertex or middle."""
-    world = World(floor=None, soft_contact=True)
+    world = bare_world(floor=None, soft_contact=True)
     asset = world.add_body(CUBE, SOFT).asset
     world.reserve(asset, 3)
     with pytest.raises(OptionError, match=r"the body starts 0\.04 m inside body 0"):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_soft import BoxShape, Material, World, box, sphere
+from taichi_soft import BoxShape, Material, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, EDGE, COUNT = 1 / 60, 0.5, 5
 DENSITY, GRAVITY = 1000.0, 9.81
@@ -25,7 +26,7 @@ def buckling_modulus(height, edge):
 def stack(young):
     """Five blocks on each other, and far away a column in one piece of the same size and material."""
     material = Material(young, 0.3, DENSITY, 600.0 * np.sqrt(young / 5e6))
-    world = World(floor=0.0, gravity=(0, 0, -GRAVITY), soft_contact=True)
+    world = bare_world(floor=0.0, gravity=(0, 0, -GRAVITY), soft_contact=True)
     for i in range(COUNT):
         world.add_body(BLOCK, material, position=(0, 0, EDGE / 2 + 1.01 * EDGE * i))
     world.add_body(COLUMN, material, position=(FAR, 0, COUNT * EDGE / 2))
@@ -86,7 +87,7 @@ def test_a_block_bears_one_of_many_times_its_mass_for_a_minute(heavier, density,
     creep sideways by more than a 100th of its edge in 50 s: 0.7 % on one processor."""
     block, material = box((EDGE,) * 3, (3, 3, 3)), Material(young, 0.3, density)
     assert 0.02 < heavier * density * GRAVITY * EDGE / young < 0.05
-    world = World(gravity=(0, 0, -GRAVITY), soft_contact=True)
+    world = bare_world(gravity=(0, 0, -GRAVITY), soft_contact=True)
     lower = world.add_body(block, material, position=(0, 0, EDGE / 2))
     upper = world.add_body(block, replace(material, density=heavier * density), position=(0, 0, 1.52 * EDGE))
     world.build()
@@ -104,7 +105,7 @@ def test_a_block_bears_one_of_many_times_its_mass_for_a_minute(heavier, density,
 
 def test_a_heap_falls_asleep_and_stays_asleep():
     """Eight balls in a pit, which lie where four walls and others let them."""
-    world = World(soft_contact=True, sleep_speed=0.02, collider_room=4)
+    world = bare_world(soft_contact=True, sleep_speed=0.02, collider_room=4)
     ball, material = sphere(0.25, 3), Material(5e5, 0.3, 1000.0, 100.0)
     for side in (-1, 1):
         world.add_collider(BoxShape((1, 4, 2)), position=(1.13 * side, 0, 1))

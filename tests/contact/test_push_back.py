@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, SphereShape, World, box
+from taichi_soft import Material, SphereShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -13,7 +14,7 @@ RADIUS = 0.2
 @pytest.fixture(scope="module")
 def cushion():
     """A world with a soft block of 500 kg at rest on the floor, room for a ball, and its state."""
-    world = World(collider_room=2)
+    world = bare_world(collider_room=2)
     world.add_body(
         box((1, 1, 0.5), (4, 4, 2)),
         Material(3e5, 0.3, 1000.0, 60.0, damping_ratio=0.0),

@@ -6,7 +6,8 @@ Without gravity and floor, two bodies and what passes between them are all there
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Material, World, beam, box, sphere
+from taichi_soft import Contact, Material, beam, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
@@ -14,7 +15,7 @@ SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 
 def world_of(*bodies, **options):
     """A world with soft contact, of (mesh, material, options of `add_body`)."""
-    world = World(**{"floor": None, "gravity": (0, 0, 0), "soft_contact": True, **options})
+    world = bare_world(**{"floor": None, "gravity": (0, 0, 0), "soft_contact": True, **options})
     for mesh, material, each in bodies:
         world.add_body(mesh, material, **each)
     world.build()

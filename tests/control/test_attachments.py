@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, World, box
+from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, box
 from taichi_soft.bodies.kernels.readout import read_velocities
 from taichi_soft.control.frames import Frames
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import context_of_world
 
 SIDE = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 0] < -0.4)
@@ -25,7 +26,7 @@ def about_z(angle):
 def made():
     worlds = {}
     for kind in KINDS:
-        world = World(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
         body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0))
         world.build()
         worlds[kind] = world, body
@@ -226,7 +227,7 @@ def test_a_jump_leaves_no_trace_on_how_a_hanging_body_swings(plain):
 
 @pytest.mark.soak
 def test_what_is_dragged_too_far_in_a_step_without_retries_is_told_the_way_out():
-    world = World(floor=-1e3, retries=0)
+    world = bare_world(floor=-1e3, retries=0)
     body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")
     world.build()
     frame = world.add_frame()
@@ -306,7 +307,7 @@ def test_frames_that_come_and_go_take_no_room(plain):
 
 
 BAD_CALLS = {
-    "frame of another world": (lambda w, b: b.attach([1], World().add_frame()), OptionError),
+    "frame of another world": (lambda w, b: b.attach([1], bare_world().add_frame()), OptionError),
     "frame that is a place": (lambda w, b: b.attach([1], (0, 0, 1)), OptionError),
     "no particles": (lambda w, b: b.attach([], w.add_frame()), OptionError),
     "particle out of range": (lambda w, b: b.attach([27], w.add_frame()), OptionError),
@@ -338,7 +339,7 @@ def test_a_refused_call_changes_nothing(plain, name):
 
 
 def test_the_flat_schedule_attaches_one_way_only(cube, jelly):
-    world = World(schedule="flat", floor=-1e3)  # as above
+    world = bare_world(schedule="flat", floor=-1e3)  # as above
     body = world.add_body(cube, jelly)
     world.build()
     frame = world.add_frame()

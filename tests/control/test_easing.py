@@ -10,9 +10,9 @@ from taichi_soft import (
     SoftBodyAsset,
     SpringMaterial,
     Stiffness,
-    World,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -54,7 +54,7 @@ def energy(body):
 
 def row_of(integrator):
     """A cube of each kind, two metres apart."""
-    world = World(integrator=integrator)
+    world = bare_world(integrator=integrator)
     for i, name in enumerate(CHOSEN[integrator]):
         mesh, material, law = KINDS[name]
         world.add_body(mesh, material(SOFT), position=(2.0 * i, 0, SIDE / 2 + 1e-4), **law)
@@ -208,7 +208,7 @@ def test_a_change_under_way_goes_on_after_restore_bit_for_bit(scene):
 
 def test_pieces_and_those_who_come_after_are_of_what_they_should_be():
     """A change goes on in all pieces of a body that is cut, and ends with a body that is removed."""
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     asset = SoftBodyAsset(CUBE, jelly(SOFT), law="neo_hookean", spare_vertices=60)
     world.reserve(asset, 4)
     world.build()

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, World, box
+from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, box
+from taichi_soft.world.bare import bare_world
 
 NAN = float("nan")
 KINDS = ("leapfrog", "lazy_leapfrog", "implicit_euler")
@@ -14,7 +15,7 @@ def made():
     """Per integrator a world of two cubes."""
     worlds = {}
     for kind in KINDS:
-        world = World(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
         for i in range(2):
             world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(3 * i, 0, 0))
         world.build()
@@ -223,7 +224,7 @@ def test_a_refused_call_changes_nothing(plain, name):
 
 
 def test_what_acts_within_substeps_is_refused_under_the_flat_schedule(cube, jelly):
-    world = World(schedule="flat")
+    world = bare_world(schedule="flat")
     body = world.add_body(cube, jelly, position=(0, 0, 2))
     world.build()
     for call in (
@@ -242,7 +243,7 @@ def test_what_acts_within_substeps_is_refused_under_the_flat_schedule(cube, jell
 
 
 def test_nothing_acts_before_build(cube, jelly):
-    world = World()
+    world = bare_world()
     body = world.add_body(cube, jelly, position=(0, 0, 2))
     for call in (
         lambda: body.apply_force((1, 0, 0)),

@@ -10,11 +10,11 @@ from taichi_soft import (
     SoftBodyAsset,
     SpringMaterial,
     StateError,
-    World,
     box,
     cloth,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 MESH = box(cells=(4, 4, 4))
 MIDDLE = int(np.argmin(np.linalg.norm(MESH.vertices - [0, 0, 0.5], axis=1)))  # of the top face
@@ -29,7 +29,7 @@ def made():
     """Per integrator a world with a soft cube and a stiffer one far away."""
     worlds = {}
     for kind in KINDS:
-        world = World(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
         world.add_body(MESH, Material(1e5, 0.3, 1000.0, 20.0))
         world.add_body(MESH, Material(2e6, 0.3, 1000.0, 100.0), position=(0, 0, 50))
         world.build()
@@ -188,7 +188,7 @@ def test_a_world_has_sixteen_hands(plain):
 
 @pytest.mark.soak
 def test_cloth_is_held_by_its_springs(made):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     mesh = cloth((1.0, 1.0), (8, 8), 0.5)
     body = world.add_body(mesh, SpringMaterial(300.0, 0.05), law="springs")
     world.build()
@@ -253,7 +253,7 @@ def test_a_released_grab_is_spent(plain):
 
 
 def test_a_grab_of_a_body_that_went_holds_nothing(cube, jelly):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     asset = SoftBodyAsset(cube, jelly)
     world.reserve(asset, 1)
     world.build()
@@ -267,14 +267,14 @@ def test_a_grab_of_a_body_that_went_holds_nothing(cube, jelly):
 
 
 def test_what_cannot_be_grabbed_says_so(cube, jelly):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     line = world.add_body(rope(1.0, 5, 0.1), SpringMaterial(100.0, 0.1), law="springs")
     body = world.add_body(cube, jelly)
     with pytest.raises(StateError, match="not built"):
         body.grab(0)
     with pytest.raises(MeshError, match="no surface"):
         line.grab(0)
-    flat = World(schedule="flat", floor=None)
+    flat = bare_world(schedule="flat", floor=None)
     body = flat.add_body(cube, jelly)
     flat.build()
     with pytest.raises(StateError, match="schedule='per_body'"):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, StateError, World, box, sphere
+from taichi_soft import Material, OptionError, StateError, box, sphere
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 SCHEDULES = ("per_body", "flat", "implicit")
@@ -12,7 +13,7 @@ SCHEDULES = ("per_body", "flat", "implicit")
 def make(schedule, **options):
     """A soft cube that is deformed and turning, a ball beside it, no gravity."""
     integrator = "implicit_euler" if schedule == "implicit" else "leapfrog"
-    world = World(
+    world = bare_world(
         # The floor is far below: other tests here have its kernels.
         **{"gravity": (0, 0, 0), "floor": -1e3, **options},
         integrator=integrator,
@@ -248,7 +249,7 @@ def test_a_refused_call_changes_nothing(plain, name):
 
 
 def test_nothing_can_be_pushed_before_build(cube, jelly):
-    world = World()
+    world = bare_world()
     body = world.add_body(cube, jelly, position=(0, 0, 2))
     for call in (
         lambda: body.apply_impulse((1, 0, 0)),

@@ -6,8 +6,9 @@ In a file of their own: their world is gone before those of `test_joints`, which
 import numpy as np
 import pytest
 
-from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, World, box
+from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, box
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 BIG = box(cells=(2, 2, 2))
@@ -19,7 +20,7 @@ BOTTOM = np.flatnonzero(BIG.vertices[:, 2] < -0.49)
 def resting(tmp_path_factory):
     """A world with sleep and room for three blocks."""
     out = tmp_path_factory.mktemp("frozen") / "frozen.recording"
-    world = World(soft_contact=True, sleep_speed=0.05, record=500, record_to=out, retries=0)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, record=500, record_to=out, retries=0)
     kind = SoftBodyAsset(BIG, Material(1e5, 0.3, 1000.0, 200.0))
     world.reserve(kind, 3)
     world.build()

@@ -9,11 +9,11 @@ from taichi_soft import (
     OptionError,
     SpringMaterial,
     StateError,
-    World,
     box,
     rope,
 )
 from taichi_soft.control.kernels.joints import JOINT_ROWS, MOST_JOINTS
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 BIG, SMALL = box(cells=(2, 2, 2)), box((0.7, 0.6, 0.5), (3, 3, 2))  # whose vertices lie nowhere alike
@@ -36,7 +36,7 @@ def made():
     """Per kind of world a small body on a big one, and two blocks far away."""
     worlds = {}
     for name, options in WAYS.items():
-        world = World(floor=None, **options)
+        world = bare_world(floor=None, **options)
         world.add_body(BIG, CALM)
         world.add_body(SMALL, CALM, position=ABOVE)
         world.add_body(BIG, JELLY, position=(0, -50, 0))
@@ -117,7 +117,7 @@ def state_of(world):
 
 def test_rows_run_out_and_come_back():
     grain = box(cells=(7, 7, 7))
-    world = World(floor=None, collider_room=1)
+    world = bare_world(floor=None, collider_room=1)
     a, b = (world.add_body(grain, JELLY, position=(3 * i, 0, 0)) for i in range(2))
     world.build()
     every = np.arange(512)
@@ -142,7 +142,7 @@ def test_rows_run_out_and_come_back():
 
 @pytest.mark.soak
 def test_a_joint_works_whatever_groups_say():
-    world = World(floor=None, soft_contact=True)
+    world = bare_world(floor=None, soft_contact=True)
     a = world.add_body(BIG, JELLY, contact=Contact(mask=0))
     b = world.add_body(BIG, JELLY, position=(0, 0, -1), contact=Contact(group=4, mask=0))
     world.build()
@@ -157,7 +157,7 @@ def test_a_joint_works_whatever_groups_say():
 
 @pytest.mark.soak
 def test_a_rope_is_held_by_a_body_and_by_a_rope():
-    world = World(floor=None, collider_room=1)
+    world = bare_world(floor=None, collider_room=1)
     line = rope(1.0, 8, 0.5)
     far = int(np.argmax(line.vertices[:, 0]))
     near = int(np.argmin(line.vertices[:, 0]))
@@ -385,7 +385,7 @@ def test_a_full_world_refuses_and_changes_nothing(soft):
 
 
 def test_a_world_without_joints_says_what_to_do():
-    world = World(floor=None, schedule="flat")
+    world = bare_world(floor=None, schedule="flat")
     a = world.add_body(BIG, JELLY)
     b = world.add_body(BIG, JELLY, position=(0, 0, -1))
     with pytest.raises(StateError, match="not built"):
@@ -393,6 +393,6 @@ def test_a_world_without_joints_says_what_to_do():
     world.build()
     with pytest.raises(StateError, match=r"'flat' .* joints.*'per_body'"):
         b.attach_to(a, TOP)
-    other = World(floor=None)
+    other = bare_world(floor=None)
     with pytest.raises(OptionError, match="of the same world"):
         other.add_body(BIG, JELLY).attach_to(a, TOP)

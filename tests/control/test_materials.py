@@ -13,10 +13,10 @@ from taichi_soft import (
     SpringMaterial,
     StateError,
     Stiffness,
-    World,
     box,
     cloth,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -64,7 +64,7 @@ KINDS = {
 def build(which):
     """A world of one body of each kind, hung by its first vertex, of its first (2) or second (3) material."""
     gc.collect()
-    world = World(floor=None)
+    world = bare_world(floor=None)
     bodies = {}
     for place, (name, row) in enumerate(KINDS.items()):
         bodies[name] = world.add_body(row[1], row[which], **row[0], position=(3 * place, 0, 0), pinned=[0])
@@ -149,7 +149,7 @@ def test_momentum_goes_with_the_density(told):
 
 
 def test_the_number_of_substeps_follows_at_once():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(CUBE, Material(1e5, 0.2, 1000.0, 20.0, damping_ratio=0.0))
     world.build()
     counts = []
@@ -197,7 +197,7 @@ def test_a_material_of_another_kind_is_refused(told, name, wrong, text):
 
 
 def test_no_material_is_set_before_build(cube, jelly):
-    world = World()
+    world = bare_world()
     body = world.add_body(cube, jelly, position=(0, 0, 2))
     with pytest.raises(StateError, match="not built"):
         body.set_material(Material(2e5, 0.2, 1000.0, damping_ratio=0.0))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, World, box, cylinder
+from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, box, cylinder
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 WHEEL = cylinder(0.5, 0.4, rings=3, layers=3)
@@ -16,7 +17,7 @@ IMPLICIT = pytest.param("implicit_euler", marks=pytest.mark.soak)
 
 
 def made(mesh, material=RUBBER, *, pinned=(), position=(0.0, 0.0, 0.0), **options):
-    world = World(**{"floor": None, "gravity": (0.0, 0.0, 0.0), "collider_room": 1, **options})
+    world = bare_world(**{"floor": None, "gravity": (0.0, 0.0, 0.0), "collider_room": 1, **options})
     body = world.add_body(mesh, material, pinned=pinned, position=position)
     world.build()
     return world, body
@@ -109,7 +110,7 @@ def test_an_axis_goes_with_the_particles_or_stays_in_space():
 def test_a_driven_wheel_rolls():
     """Without slipping: as fast as its rim turns, from the axle to the floor."""
     stands = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    world = World(friction=1.0, collider_room=1)
+    world = bare_world(friction=1.0, collider_room=1)
     body = world.add_body(WHEEL, RUBBER, position=(0, 0, 0.5), rotation=stands)
     world.build()
     motor = world.add_motor(body, HUB, (0, 1, 0), speed=4.0, max_torque=400.0)
@@ -185,7 +186,7 @@ def test_effort_counts_the_attempt_that_was_kept_only():
 
 
 def test_a_body_stays_awake_while_a_motor_starts_slowly():
-    world = World(floor=None, gravity=(0, 0, 0), sleep_speed=0.05, collider_room=1)
+    world = bare_world(floor=None, gravity=(0, 0, 0), sleep_speed=0.05, collider_room=1)
     body = world.add_body(WHEEL, RUBBER)
     world.build()
     motor = world.add_motor(body, HUB, (0, 0, 1), speed=1.0, max_torque=1.0)
@@ -201,7 +202,7 @@ def test_a_body_stays_awake_while_a_motor_starts_slowly():
 
 
 def test_a_motor_leaves_with_its_body_and_comes_back_with_a_snapshot():
-    world = World(floor=None, gravity=(0, 0, 0), collider_room=1)
+    world = bare_world(floor=None, gravity=(0, 0, 0), collider_room=1)
     asset = SoftBodyAsset(WHEEL, RUBBER)
     world.reserve(asset, 2)
     body = world.spawn(asset)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, StateError, World, box
+from taichi_soft import Material, OptionError, StateError, box
+from taichi_soft.world.bare import bare_world
 
 TOP = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 2] > 0.4)
 NAN = float("nan")
@@ -12,7 +13,7 @@ KINDS = ("leapfrog", "leapfrog flat", "lazy_leapfrog", "implicit")
 
 def make(kind):
     """A cube on its way down, well above the floor."""
-    world = World(
+    world = bare_world(
         integrator="implicit_euler" if kind == "implicit" else kind.removesuffix(" flat"),
         schedule="flat" if kind.endswith("flat") else "per_body",
     )

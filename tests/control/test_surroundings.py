@@ -10,10 +10,10 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     StateError,
-    World,
     box,
 )
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
 FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0, damping_ratio=0.0)
@@ -60,7 +60,7 @@ def test_a_free_fall_goes_on_by_the_gravity_that_was_set(options):
 
     The energy is - m g x of the present gravity.
     """
-    world = World(floor=None, **options)
+    world = bare_world(floor=None, **options)
     body = world.add_body(box(cells=(2, 2, 2)), FIRM)
     world.build()
     x, v, t, half = np.zeros(3), np.zeros(3), 0.25, 0.5 * DT / 16
@@ -81,7 +81,7 @@ def test_a_free_fall_goes_on_by_the_gravity_that_was_set(options):
 @pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_a_block_slides_on_the_floor_where_its_friction_is_below_the_tangent(integrator):
     """Without colliders: at rest above the tangent, g (sin a - mu cos a) below it, and at rest again."""
-    world = World(gravity=DOWN, friction=2 * np.tan(SLOPE), integrator=integrator)
+    world = bare_world(gravity=DOWN, friction=2 * np.tan(SLOPE), integrator=integrator)
     body = world.add_body(box((1.0, 1.0, 0.5), (2, 2, 1)), FIRM, position=(0, 0, 0.25))
     world.build()
     run(world, 1.0)
@@ -100,7 +100,7 @@ def test_a_block_slides_on_the_floor_where_its_friction_is_below_the_tangent(int
 @pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_a_world_built_with_other_gravity_and_friction_goes_on_from_a_snapshot(integrator):
     def made(**options):
-        world = World(integrator=integrator, **options)
+        world = bare_world(integrator=integrator, **options)
         world.add_body(box(cells=(1, 1, 1)), FIRM, position=(0, 0, 0.5), velocity=(1, 0, 0))
         world.build()
         return world
@@ -125,7 +125,7 @@ def test_a_world_built_with_other_gravity_and_friction_goes_on_from_a_snapshot(i
 @pytest.mark.parametrize("soft_contact", [False, True])
 def test_before_build_a_world_is_built_with_what_was_set(soft_contact):
     """A block on the slope of 0.3, whose friction would hold it: it slides by g sin a."""
-    world = World(soft_contact=soft_contact)
+    world = bare_world(soft_contact=soft_contact)
     world.set_gravity(DOWN)
     world.set_friction(0.0)
     body = world.add_body(box((1.0, 1.0, 0.5), (2, 2, 1)), FIRM, position=(0, 0, 0.25))
@@ -139,7 +139,7 @@ def test_before_build_a_world_is_built_with_what_was_set(soft_contact):
 
 def touching(spare_vertices=0, cells=(), **options):
     """A world with soft contact and a pool of three cubes of friction 0.4."""
-    world = World(soft_contact=True, **options)
+    world = bare_world(soft_contact=True, **options)
     cube = SoftBodyAsset(
         box(cells=(2, 2, 2)), FIRM, contact=Contact(friction=0.4), spare_vertices=spare_vertices
     )
@@ -228,7 +228,7 @@ def test_a_recording_makes_it_again_to_the_bit(tmp_path):
 @pytest.fixture(scope="module")
 def leaning():
     """A slope with three blocks that sleep: on the floor, on a box, on a plate that is a body."""
-    world = World(
+    world = bare_world(
         gravity=DOWN, friction=2 * np.tan(SLOPE), soft_contact=True, sleep_speed=0.02, collider_room=1
     )
     block = SoftBodyAsset(box((0.4, 0.4, 0.2), (2, 2, 1)), FIRM, contact=Contact(2 * np.tan(SLOPE)))
@@ -357,8 +357,8 @@ def test_a_floor_that_is_a_collider_tells_the_world_what_it_was_given(slope):
 
 def test_where_there_is_nothing_to_set_it_is_refused_and_says_where_it_is(slope):
     with pytest.raises(StateError, match=r"no floor.*Collider.set_friction.*Body.set_friction"):
-        World(floor=None).set_friction(0.1)
-    world = World()
+        bare_world(floor=None).set_friction(0.1)
+    world = bare_world()
     body = world.add_body(box(cells=(1, 1, 1)), FIRM, position=(0, 0, 0.5))
     world.build()
     with pytest.raises(StateError, match=r"soft_contact.*World.set_friction"):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, SpringMaterial, World, box, cloth, sphere
+from taichi_soft import Material, OptionError, SpringMaterial, box, cloth, sphere
+from taichi_soft.world.bare import bare_world
 
 AIR = 1.2
 
@@ -16,7 +17,7 @@ def drag_speed(start, k, t):
 @pytest.fixture(scope="module")
 def blown():
     """A light box and a light ball."""
-    world = World(floor=-1e3)  # far below: other tests here have its kernels
+    world = bare_world(floor=-1e3)  # far below: other tests here have its kernels
     foam = Material(1e5, 0.2, 20.0, 0.5)
     cube = world.add_body(box(cells=(2, 2, 2)), foam)
     ball = world.add_body(sphere(0.5, 6), foam, position=(5, 0, 0))
@@ -118,7 +119,7 @@ def test_a_sheltered_body_feels_no_wind_and_none_blows_when_it_is_off(windy):
 
 def test_a_flag_flies_with_the_wind():
     """A sheet has each triangle twice, and so the drag of a plate: at once 1/2 rho A v^2."""
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     mesh = cloth((1.0, 0.6), (10, 6), 0.2)
     body = world.add_body(mesh, SpringMaterial(200.0, 0.02), law="springs")
     world.build()

@@ -85,7 +85,7 @@ if len(cores) > 1:
     os.sched_setaffinity(0, {cores[0]})  # the caller's thread alone
     assert init(cores=cores) is device()
     os.sched_setaffinity(0, set(cores))
-world = World()
+world = World(soft_contact=False, sleep_speed=0)
 for i in range(8 * len(cores)):
     world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(2 * i, 0, 1))
 world.build()

@@ -17,13 +17,13 @@ from taichi_soft import (
     Material,
     MeshShape,
     StateError,
-    World,
     box,
     force_gradient,
     init,
     internal_forces,
 )
 from taichi_soft.core.handles import Handle
+from taichi_soft.world.bare import bare_world
 
 ROOT = Path(__file__).parents[2]
 CUBE, JELLY = box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0)
@@ -31,7 +31,7 @@ DT = 1 / 60
 
 
 def made(**options):
-    world = World(**options)
+    world = bare_world(**options)
     world.add_body(CUBE, JELLY, position=(0, 0, 0.52), velocity=(0, 0, -3))
     world.build()
     return world

@@ -8,6 +8,7 @@ from scipy.special import ellipe, ellipk
 
 from engine_adapter import EngineAdapter
 from taichi_soft import LAWS, OptionError
+from taichi_soft.core import settings
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
@@ -164,7 +165,7 @@ def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_ar
 def test_a_heap_that_never_sleeps_comes_to_lie_still_and_does_not_tremble(monkeypatch):
     """From this start a vertex in front of an edge was thrown to and fro for ever, at 20 mm/s."""
     demo = load_demo("bowl")
-    monkeypatch.setattr(demo, "SLEEP_SPEED", 0.0)
+    monkeypatch.setattr(settings, "DEFAULT_SLEEP_SPEED", 0.0)
     world = demo.stage().world
     for body in world.bodies:
         body.set_velocity((7e-4, 0, 0))

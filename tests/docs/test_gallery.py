@@ -16,13 +16,13 @@ from taichi_soft import (
     BoxShape,
     Material,
     MissingExtraError,
-    World,
     box,
 )
 from taichi_soft.core.package_data import DEMOS
 from taichi_soft.render import Camera, VideoWriter
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import Actor, Stage
+from taichi_soft.world.bare import bare_world
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -36,7 +36,7 @@ RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
 
 def falling_stage():
     """A red box falls beside a blue slab that moves and turns; below is a slab that does neither."""
-    world = World(floor=-0.5)
+    world = bare_world(floor=-0.5)
     body = world.add_body(box((0.6, 0.5, 0.4), (2, 2, 2)), Material(1e5, 0.2, 1000.0), position=(0, 0, 2.5))
     mover = world.add_collider(BoxShape((0.3, 0.4, 0.5)), position=(1.2, 0.0, 0.5))
     world.add_collider(BoxShape((4.0, 2.0, 0.2)), position=(0.3, 0.0, -0.4))

@@ -2,7 +2,8 @@
 
 import pytest
 
-from taichi_soft import Material, World, box
+from taichi_soft import Material, box
+from taichi_soft.world.bare import bare_world
 
 
 @pytest.fixture
@@ -10,7 +11,7 @@ def make_world():
     """Builds a world with one soft cube that falls from 1 m."""
 
     def build(**options):
-        world = World(**options)
+        world = bare_world(**options)
         world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.0))
         world.build()
         return world

@@ -17,9 +17,9 @@ from taichi_soft import (
     OptionError,
     StateError,
     UnstableStepWarning,
-    World,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 
@@ -133,7 +133,7 @@ def test_positions_lie_between_the_last_two_steps(alpha, shared_run):
 @pytest.fixture(scope="module")
 def shared_run():
     """One world that fell for a while, seen at any alpha."""
-    world = World()
+    world = bare_world()
     body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.0))
     world.build()
     for _ in range(30):
@@ -256,7 +256,7 @@ def test_a_step_that_raises_leaves_the_count_of_time_in_order(adapter, monkeypat
 
 
 def test_a_world_that_is_not_built_is_refused():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0))
     with pytest.raises(StateError, match="build"):
         EngineAdapter(world)
@@ -341,7 +341,7 @@ def test_time_is_that_of_the_positions_also_after_other_steps(make_world):
 
 
 def test_a_step_that_was_made_is_not_dropped_where_its_warning_is_an_error():
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     mesh = box(cells=(2, 2, 2))
     steel = Material(1e9, 0.2, 1000.0)
     bodies = [world.add_body(mesh, steel, position=(x, 0, 0), law="virial") for x in (0, 3)]

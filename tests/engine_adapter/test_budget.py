@@ -13,7 +13,8 @@ import pytest
 import trimesh
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Body, Material, OptionError, SoftBodyAsset, StateError, World
+from taichi_soft import Body, Material, OptionError, SoftBodyAsset, StateError
+from taichi_soft.world.bare import bare_world
 
 COUNT = 6
 EYE = np.array([-10.0, 0.0, 0.5])
@@ -63,7 +64,7 @@ def clock(monkeypatch):
 
 def row_of(clock, count=COUNT, apart=2.0, soft_contact=False, **options):
     """Balls in a row that drift side by side, the first nearest to the eye."""
-    world = World(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
+    world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
     world.reserve(kind(), count)
     bodies = [world.spawn(kind(), position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
     world.build()
@@ -288,7 +289,7 @@ def test_a_bad_budget_and_a_bad_place_are_refused(clock, value):
 
 
 def test_frozen_bodies_and_bodies_without_levels_are_left_alone(clock):
-    world = World(retries=0)
+    world = bare_world(retries=0)
     plain = SoftBodyAsset(kind().mesh, kind().material)
     world.reserve(kind(), 1)
     world.reserve(plain, 1)

@@ -25,7 +25,8 @@ from engine_adapter.panda3d import (
     SoftBodyTask,
     add_colliders,
 )
-from taichi_soft import Material, OptionError, SoftBodyAsset, World, box
+from taichi_soft import Material, OptionError, SoftBodyAsset, box
+from taichi_soft.world.bare import bare_world
 
 DT, EDGE, MASS, WEIGHT = 1 / 60, 0.6, 60.0, 9.81
 SKY = (51, 102, 204)
@@ -60,7 +61,7 @@ def textured_block():
 @pytest.fixture(scope="module")
 def world():
     """A plain block of 720 kg that can be cut, and one with a textured skin, both at rest on the floor."""
-    made = World(floor=0.0, friction=0.8, collider_room=8)
+    made = bare_world(floor=0.0, friction=0.8, collider_room=8)
     jelly = Material(young=6e4, poisson=0.3, density=1000, damping_ratio=0.3)
     plain = SoftBodyAsset(box((1.2, 1.2, 0.5), (8, 8, 4)), jelly, spare_vertices=200)
     made.add_body(plain, position=(0, 0, 0.26))
@@ -248,7 +249,7 @@ def test_a_mesh_with_colours_of_its_own_is_drawn_in_them(base):
     one.visual.vertex_colors = (250, 100, 0, 255)
     plain = trimesh.visual.material.PBRMaterial(baseColorFactor=(0, 100, 50, 255))
     other.visual = trimesh.visual.TextureVisuals(material=plain)
-    world = World(floor=None)
+    world = bare_world(floor=None)
     for x, mesh in ((-1, one), (1, other)):
         world.add_body(SoftBodyAsset.from_surface(mesh, jelly, cells=3), position=(x, 0, 0))
     world.build()

@@ -8,7 +8,8 @@ pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[p
 from panda3d import bullet, core
 
 from engine_adapter.panda3d import add_colliders, shapes_of
-from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, SphereShape, World
+from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, SphereShape
+from taichi_soft.world.bare import bare_world
 
 P = core.LPoint3
 SOLIDS = {
@@ -105,7 +106,7 @@ def test_rays_of_bullet_end_on_the_surface_of_the_shape(kind):
 
 
 def test_colliders_of_a_whole_scene_are_where_their_nodes_are():
-    world, root = World(), core.NodePath("root")
+    world, root = bare_world(), core.NodePath("root")
     level = root.attach_new_node(core.CollisionNode("level"))
     level.node().add_solid(SOLIDS["box"][0])
     level.node().add_solid(SOLIDS["sphere"][0])
@@ -150,7 +151,7 @@ def node_with(solid):
     ids=lambda solid: type(solid).__name__,
 )
 def test_a_solid_without_such_a_shape_is_refused_by_name_with_nothing_added(solid):
-    world, path = World(), core.NodePath("scene")
+    world, path = bare_world(), core.NodePath("scene")
     node_with(core.CollisionSphere(0, 0, 0, 1)).reparent_to(path)
     node_with(solid).reparent_to(path)
     with pytest.raises(OptionError, match=rf"{type(solid).__name__} of node 'n' is not one of .*Sphere"):
@@ -175,4 +176,4 @@ def test_scales_that_a_shape_cannot_have_are_refused():
     with pytest.raises(OptionError, match="'plain' must be a CollisionNode or a node of Bullet"):
         shapes_of(core.NodePath("plain"))
     with pytest.raises(OptionError, match="no CollisionNode and no node of Bullet"):
-        add_colliders(World(), core.NodePath("plain"))
+        add_colliders(bare_world(), core.NodePath("plain"))

@@ -12,9 +12,9 @@ from taichi_soft import (
     Released,
     SoftBodyAsset,
     SphereShape,
-    World,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -58,7 +58,7 @@ FIELDS = {
 @pytest.fixture(scope="module", params=["leapfrog", "implicit_euler"])
 def game(request):
     """Four crates with levels of detail, two of which fall onto a sphere and a third."""
-    world = World(soft_contact=True, sleep_speed=0.05, integrator=request.param, record=8)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, integrator=request.param, record=8)
     world.add_collider(SphereShape(0.3))
     world.reserve(CRATE, COUNT)
     world.build()

@@ -5,7 +5,8 @@ import pytest
 from random_play import DT, SUBSTEPS, act, make_world
 
 from engine_adapter import EngineAdapter, FixedStep, Rollback
-from taichi_soft import OptionError, StateError, World
+from taichi_soft import OptionError, StateError
+from taichi_soft.world.bare import bare_world
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def test_bad_rings_are_refused(game):
     with pytest.raises(OptionError, match="World"):
         Rollback("world", 3)
     with pytest.raises(StateError, match="build"):
-        Rollback(World(), 3)
+        Rollback(bare_world(), 3)
     with pytest.raises(OptionError, match="none yet"):
         Rollback(world, 3).rewind_to(0)
 

@@ -21,11 +21,11 @@ from taichi_soft import (
     StateError,
     StressExceeded,
     Woke,
-    World,
     box,
     sphere,
 )
 from taichi_soft.events import log
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 STEPS = 4
@@ -38,7 +38,7 @@ BOUNCY, DULL = SoftBodyAsset(BALL, RUBBER), SoftBodyAsset(CUBE, Material(3e5, 0.
 @pytest.fixture(scope="module")
 def level():
     """A floor that is a collider, room for an obstacle, for two balls that bounce and a cube that rests."""
-    world = World(collider_room=1, sleep_speed=0.02)
+    world = bare_world(collider_room=1, sleep_speed=0.02)
     world.reserve(BOUNCY, 2)
     world.reserve(DULL, 1)
     world.build()
@@ -276,7 +276,7 @@ def test_recording_does_not_change_the_motion(collision):
 
 
 def test_a_flat_world_sees_no_contacts_and_nothing_is_seen_before_build():
-    world = World(schedule="flat")
+    world = bare_world(schedule="flat")
     world.add_body(box(cells=(1, 1, 1)), RUBBER, position=(0, 0, 0.5))
     for call in (world.record_events, world.drain_events, lambda: world.on(Event, print)):
         with pytest.raises(StateError, match="build"):

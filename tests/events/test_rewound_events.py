@@ -15,11 +15,11 @@ from taichi_soft import (
     StressExceeded,
     TearCandidates,
     Woke,
-    World,
     box,
 )
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
+from taichi_soft.world.bare import bare_world
 
 DT, STEPS, TICKS = 1 / 60, 12, 150
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
@@ -30,7 +30,7 @@ class Game:
     """Bodies that bounce on each other and on the floor, come to rest, are woken, come and go."""
 
     def __init__(self):
-        world = self.world = World(soft_contact=True, collider_room=1, sleep_speed=0.05)
+        world = self.world = bare_world(soft_contact=True, collider_room=1, sleep_speed=0.05)
         world.reserve(BOUNCY, 3)
         world.reserve(DULL, 1)
         world.build()

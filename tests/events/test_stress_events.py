@@ -13,10 +13,10 @@ from taichi_soft import (
     Stiffness,
     StressExceeded,
     TearCandidates,
-    World,
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 STEPS = 40
@@ -68,7 +68,7 @@ def von_mises(body):
 @pytest.fixture(scope="module")
 def beams():
     """A world with an isotropic beam, a beam of wood and a rope, swinging."""
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     for i, material in enumerate((Material(2e5, 0.3, 1000.0, 5.0), AnisotropicMaterial(WOOD, 1000.0, 5.0))):
         world.add_body(BEAM, material, position=(0, 3 * i, 0))
     world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e3), law="springs", position=(0, 9, 0))
@@ -225,7 +225,7 @@ def test_what_cannot_be_watched_is_refused_and_the_old_threshold_stays(swinging,
 
 
 def test_nothing_is_watched_before_build_or_of_who_is_gone_and_nothing_recorded_by_the_attempt():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(BEAM, Material(2e5, 0.3, 1000.0))
     with pytest.raises(StateError, match="build"):
         body.watch_stress(1e4)

@@ -3,22 +3,23 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(young=5e4, poisson=0.4, density=1000, damping_ratio=0.1)
 BALL = SoftBodyAsset(sphere(radius=0.3, resolution=2), JELLY)
 
 
 def cut():
-    world = World()
+    world = bare_world()
     world.add_body(box((1, 1, 1), (2, 2, 2)), JELLY, spare_vertices=20, position=(0, 0, 1))
     return world
 
 
 def plain():
-    world = World()
+    world = bare_world()
     world.add_body(BALL, position=(0, 0, 1))
     return world
 
@@ -59,7 +60,7 @@ def skipping():
 
 
 def flat():
-    world = World(schedule="flat")
+    world = bare_world(schedule="flat")
     world.add_body(BALL, position=(0, 0, 1))
     return world
 

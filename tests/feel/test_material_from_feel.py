@@ -12,12 +12,12 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     TetMesh,
-    World,
     box,
     material_from_feel,
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 PROMISED = 0.05
 
@@ -53,7 +53,7 @@ def targets(count, seed):
 
 
 def world_of(mesh, feel):
-    world = World(floor=0.0)
+    world = bare_world(floor=0.0)
     low = np.array([0.0, 0.0, -mesh.vertices[:, 2].min()])
     body = world.add_body(mesh, feel.material, position=low)
     world.build()

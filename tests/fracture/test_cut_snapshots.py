@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from engine_adapter import Rollback
-from taichi_soft import Material, Plasticity, SnapshotError, SoftBodyAsset, Tearing, World, box
+from taichi_soft import Material, Plasticity, SnapshotError, SoftBodyAsset, Tearing, box
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -33,7 +34,7 @@ def make_world(**options):
         spare_vertices=40,
         tearing=Tearing(2.5e4),
     )
-    world = World(**options)
+    world = bare_world(**options)
     world.reserve(bar, 6)
     world.reserve(slab, 3)
     world.build()

@@ -13,10 +13,10 @@ from taichi_soft import (
     StateError,
     Stiffness,
     TetMesh,
-    World,
     box,
     surface_mesh,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -40,7 +40,7 @@ def bar(**options):
 
 def make(mode="leapfrog", count=3, asset=None, **options):
     """A built world without gravity, with a bar that swings, turns and flies, and empty slots."""
-    world = World(floor=None, gravity=(0, 0, 0), **MODES[mode], **options)
+    world = bare_world(floor=None, gravity=(0, 0, 0), **MODES[mode], **options)
     asset = asset or bar()
     world.reserve(asset, count)
     body = world.spawn(asset, velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, 1.0, 3.0))
@@ -119,7 +119,7 @@ def half(side):
 def test_parts_move_as_bodies_built_that_way(mode):
     """Cut at rest, along the centres of tetrahedra; then swung in the same way, in one world."""
     side = (BAR.vertices[BAR.tets].mean(axis=1) - ALONG[0]) @ ALONG[1] > 0
-    world = World(floor=None, gravity=(0, 0, 0), **MODES[mode])
+    world = bare_world(floor=None, gravity=(0, 0, 0), **MODES[mode])
     asset, halves = bar(), [half(side), half(~side)]
     world.reserve(asset, 2)
     body = world.spawn(asset)
@@ -341,7 +341,7 @@ def test_bad_blades_are_refused(swinging, blade, message):
 
 
 def test_bodies_that_cannot_be_cut_say_so():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     whole = world.add_body(BAR, JELLY)
     ready = world.add_body(BAR, JELLY, spare_vertices=50)
     with pytest.raises(OptionError, match="make its asset with spare_vertices"):
@@ -352,7 +352,7 @@ def test_bodies_that_cannot_be_cut_say_so():
         SoftBodyAsset(BAR, Material(1e5, 0.3, 1000.0, damping_ratio=0.0), law="springs", spare_vertices=5)
     with pytest.raises(OptionError, match="spare_vertices must be a whole number"):
         bar(spare_vertices=-1)
-    flat = World(schedule="flat")
+    flat = bare_world(schedule="flat")
     flat.reserve(bar(), 1)
     with pytest.raises(OptionError, match="'flat' does not support bodies that are cut"):
         flat.build()
@@ -369,7 +369,7 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
         damping_ratio=0.0,
     )
     held = np.flatnonzero(BAR.vertices[:, 0] < -0.99)
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     fibres = SoftBodyAsset(BAR, wood, pinned=held, spare_vertices=60)
     clay = SoftBodyAsset(BAR, JELLY, plasticity=Plasticity(yield_strain=0.02), spare_vertices=60)
     for asset in (fibres, clay):

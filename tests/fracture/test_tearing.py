@@ -14,9 +14,9 @@ from taichi_soft import (
     Tearing,
     TetMesh,
     Torn,
-    World,
     box,
 )
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 STRENGTH = 3e4
@@ -60,7 +60,7 @@ def test_a_bar_holds_just_below_its_strength_and_tears_just_above_it_by_its_own_
         "neo_hookean": m * (1 - 1 / (s**2 + 3)) * s + (lame + 5 / 6 * mu) * (s - 1) - mu,
     }[law]
     mesh = box((3, 1, 1), cells=(3, 1, 1))
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     kinds = [
         SoftBodyAsset(mesh, JELLY, law=law, tearing=Tearing(part * stress), spare_vertices=40)
         for part in (1.002, 0.998)
@@ -84,7 +84,7 @@ def test_a_bar_holds_just_below_its_strength_and_tears_just_above_it_by_its_own_
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_a_bar_that_is_drawn_to_a_line_tears_without_a_warning():
     """Its faces have no normal there. By the virial law nothing drives it back."""
-    world, kind = World(floor=None, gravity=(0, 0, 0)), asset(law="virial")
+    world, kind = bare_world(floor=None, gravity=(0, 0, 0)), asset(law="virial")
     world.reserve(kind, 1)
     world.build()
     body = world.spawn(kind)
@@ -96,7 +96,7 @@ def test_a_bar_that_is_drawn_to_a_line_tears_without_a_warning():
 @pytest.fixture(scope="module")
 def world():
     """With a pool of three bars that tear, and one of one that cannot fall apart."""
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     world.assets = asset(), asset(spare_vertices=61), asset(pinned=())
     world.reserve(world.assets[0], 3)
     world.reserve(world.assets[2], 3)

@@ -13,11 +13,11 @@ from taichi_soft import (
     Released,
     SoftBodyAsset,
     StateError,
-    World,
     box,
 )
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
 BAR = [box((1.2, 0.3, 0.25), cells) for cells in ((16, 4, 4), (8, 3, 2), (5, 2, 2))]
@@ -41,7 +41,7 @@ def nearest(point):
 
 def floating(**options):
     """A bar, and a second one above it, without weight."""
-    world = World(**{"floor": None, "gravity": (0, 0, 0), "collider_room": 1, **options})
+    world = bare_world(**{"floor": None, "gravity": (0, 0, 0), "collider_room": 1, **options})
     bodies = [world.add_body(kind(), position=(0, 0, z)) for z in (2.0, 2.26)]
     world.build()
     return world, *bodies
@@ -80,7 +80,7 @@ def joined(world, low, high):
 
 def test_a_hand_carries_the_weight_before_and_after_a_change_and_the_body_stays_under_it():
     """m g; the vertex that it holds hangs g / omega^2 below its target, before and after."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(kind(), position=(0, 0, 2))
     world.build()
     body.set_linear_damping(8.0)

@@ -17,11 +17,11 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     StateError,
-    World,
     box,
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
 RING = trimesh.creation.torus(0.5, 0.2)
@@ -89,7 +89,7 @@ def test_cages_of_several_sizes_have_the_same_mass_and_centre_and_less_of_everyt
 @pytest.fixture
 def flying():
     """A body in the air that turns, drifts and wobbles."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     world.reserve(ring(), 2)
     body = world.spawn(
         ring(), position=(0.5, 0.0, 3.0), velocity=(2.0, -1.0, 0.5), angular_velocity=(3.0, 1.0, -4.0)
@@ -159,7 +159,7 @@ def test_the_skin_stays_where_it_is_and_so_do_its_buffers(flying):
 
 def test_pins_pass_to_the_nearest_vertices_and_a_hanging_body_stays_hung():
     asset = SoftBodyAsset(BAR[0], RUBBER).with_coarser(BAR[1])
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(asset, position=(0, 0, 2))
     world.build()
     end = BAR[0].vertices[:, 0].min()
@@ -180,7 +180,7 @@ def test_pins_pass_to_the_nearest_vertices_and_a_hanging_body_stays_hung():
 
 def test_pins_come_back_as_they_were_from_a_round_trip_and_hold_their_place():
     asset = SoftBodyAsset(BAR[0], RUBBER, pinned=[0, 7, 30]).with_coarser(*BAR[1:])
-    world = World(floor=None)
+    world = bare_world(floor=None)
     bodies = [world.add_body(asset, position=(0, 0, 2)), world.add_body(asset, position=(3, 0, 2))]
     world.build()
     end = np.flatnonzero(BAR[0].vertices[:, 0] == BAR[0].vertices[:, 0].min())
@@ -212,7 +212,7 @@ def test_what_was_pinned_at_a_coarse_level_is_held_at_the_finest(flying):
 
 def test_a_push_keeps_its_force_and_its_torque():
     """What it does in the next step is what it would have done: momentum and spin, without gravity."""
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     world.reserve(ring(), 1)
     body = world.spawn(ring(), position=(0.3, 0.2, 1.0))
     world.build()
@@ -231,7 +231,7 @@ def test_a_push_keeps_its_force_and_its_torque():
 
 def hung_bar(two_way=False):
     """A bar of three levels, of which a frame holds the one end and another frame the other."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(bar(), position=(0, 0, 2))
     world.build()
     ends = [np.flatnonzero(BAR[0].vertices[:, 0] == end) for end in (-0.6, 0.6)]
@@ -355,7 +355,7 @@ def test_warming_up_changes_levels_and_leaves_every_bit(flying):
 @pytest.mark.soak
 def test_after_warming_up_no_change_of_a_level_has_anything_to_prepare(monkeypatch):
     kind = SoftBodyAsset.from_surface(RING, RUBBER, cells=(6, 4, 3))
-    world = World()
+    world = bare_world()
     world.reserve(kind, 1)
     body = world.spawn(kind, position=(0, 0, 2.0))
     world.build()
@@ -383,7 +383,7 @@ def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
 
 @pytest.mark.soak
 def test_levels_in_contact_change_back_and_forth_and_the_pile_stays_whole():
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     world.reserve(ring(), 3)
     bodies = [world.spawn(ring(), position=(0.05 * i, 0, 0.3 + 0.5 * i)) for i in range(3)]
     world.build()
@@ -425,7 +425,7 @@ def test_a_level_that_there_is_not_is_refused(flying, level):
 
 
 def test_a_frozen_body_and_a_world_that_is_not_built_change_nothing():
-    world = World(floor=None, retries=0)
+    world = bare_world(floor=None, retries=0)
     body = world.add_body(ring())
     with pytest.raises(StateError, match="not built"):
         body.set_level(1)
@@ -474,7 +474,7 @@ def test_what_spawns_after_a_rewind_does_not_take_over_the_level_of_who_was_ther
     """Vibrations of the finest level fade at its own rate, whatever was in the slot when the snapshot was
     taken and when it is restored."""
     damped = SoftBodyAsset(BAR[0], Material(8e4, 0.4, 900.0, damping_ratio=0.3)).with_coarser(BAR[1])
-    world = World(floor=None)
+    world = bare_world(floor=None)
     world.reserve(damped, 1)
     world.build()
 

@@ -15,6 +15,7 @@ from taichi_soft.live.choices import PALETTES
 from taichi_soft.live.controls import Controls
 from taichi_soft.live.saving import packed, saved_script
 from taichi_soft.live.scene import SceneSource, found_source, made_scene
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 SCENE = """
@@ -22,7 +23,7 @@ from taichi_soft import Material, SoftBodyAsset, World, box
 
 soft = Material(young=1e5, poisson=0.3, density=500.0)
 asset = SoftBodyAsset(box((0.5, 0.5, 0.5), (1, 1, 1)), soft, strain="exact")
-game = World(gravity=(0, 0, -2))
+game = World(gravity=(0, 0, -2), soft_contact=False)
 game.add_body(box((0.5, 0.5, 0.5), (1, 1, 1)), soft, position=(0, 0, 1))
 game.reserve(asset, 2)
 game.spawn(asset, position=(1, 0, 1))
@@ -54,10 +55,10 @@ def test_without_a_choice_a_scene_is_as_it_says(tmp_path):
 def test_worlds_that_are_made_outside_are_as_ever_also_after_an_error():
     before = {name: getattr(World, name) for name in ("add_body", "reserve", "spawn", "build")}
     with pytest.raises(OptionError, match="magic"), choices(law="magic", has_palette=True):
-        World().add_body(box((0.5, 0.5, 0.5), (1, 1, 1)), SOFT)
+        bare_world().add_body(box((0.5, 0.5, 0.5), (1, 1, 1)), SOFT)
     assert {name: getattr(World, name) for name in before} == before
     asset = SoftBodyAsset(box((0.5, 0.5, 0.5), (1, 1, 1)), SOFT)
-    assert World(floor=None).add_body(asset).asset is asset
+    assert bare_world(floor=None).add_body(asset).asset is asset
 
 
 def test_what_a_command_names_is_found_and_what_is_none_is_refused(tmp_path):
@@ -106,7 +107,7 @@ def test_a_saved_script_and_that_of_the_scene_do_not_take_each_others_place(tmp_
 def test_the_substeps_predicted_for_another_material_are_those_that_bodies_of_it_need():
     """Of bodies of different size, stiffness and shape of one material, against a new estimate of each."""
     with choices(has_palette=True):
-        world = World()
+        world = bare_world()
         world.add_body(box((2.0, 2.0, 0.2), (6, 6, 1)), SOFT, position=(0, 0, 1))
         stiff = Material(young=4e5, poisson=0.2, density=500.0)
         world.add_body(box((2.0, 2.0, 2.0), (2, 2, 2)), stiff, position=(0, 0, 4))

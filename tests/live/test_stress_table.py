@@ -5,15 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from taichi_soft import Material, ParticleMesh, SpringMaterial, StateError, World, box
+from taichi_soft import Material, ParticleMesh, SpringMaterial, StateError, box
 from taichi_soft.live import stress_table
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 
 
 def stretched(share):
     """A bar that is pulled along x by a share of its length, and one at rest."""
-    world = World(floor=None, gravity=(0.0, 0.0, 0.0))
+    world = bare_world(floor=None, gravity=(0.0, 0.0, 0.0))
     mesh = box((1.0, 0.2, 0.2), (5, 1, 1))
     for y in (0.0, 1.0):
         world.add_body(mesh, SOFT, law="virial", position=(0.0, y, 0.0))
@@ -49,8 +50,8 @@ def test_a_notebook_gets_a_line_for_each_body_and_a_bar_for_each_range():
 
 def test_a_world_without_tetrahedra_or_not_built_has_no_stress():
     with pytest.raises(StateError, match="not built"):
-        stress_table(World())
-    world = World(floor=None)
+        stress_table(bare_world())
+    world = bare_world(floor=None)
     rope = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], masses=[1.0, 1.0])
     world.add_body(rope, SpringMaterial(stiffness=100.0))
     world.build()

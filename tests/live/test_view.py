@@ -8,15 +8,16 @@ import pytest
 from visitor import Visitor
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Material, OptionError, StateError, World, box
+from taichi_soft import Material, OptionError, StateError, box
 from taichi_soft.live import view
+from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 
 
 @pytest.fixture(scope="module")
 def world():
-    world = World(gravity=(0.0, 0.0, 0.0))
+    world = bare_world(gravity=(0.0, 0.0, 0.0))
     world.add_body(box((0.5, 0.5, 0.5), (2, 2, 2)), SOFT, position=(0.0, 0.0, 1.0), velocity=(0.5, 0.0, 0.0))
     world.build()
     return world
@@ -116,7 +117,7 @@ def test_what_is_no_built_world_is_refused():
     with pytest.raises(OptionError, match="world must be"):
         view("world")
     with pytest.raises(StateError, match="build"):
-        view(World())
+        view(bare_world())
 
 
 @pytest.mark.parametrize(

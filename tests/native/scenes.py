@@ -13,7 +13,6 @@ from taichi_soft import (
     SoftBodyAsset,
     SphereShape,
     SpringMaterial,
-    World,
     box,
     cloth,
     cloth_constants,
@@ -21,6 +20,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 64
 STEPS = 600
@@ -36,7 +36,7 @@ def turn(axis, angle):
 
 def heap():
     """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
-    world = World(soft_contact=True, sleep_speed=0.4, collider_room=10)
+    world = bare_world(soft_contact=True, sleep_speed=0.4, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
     for asset, count in ((ball, 5), (brick, 5)):
@@ -124,7 +124,7 @@ def heap_game():
 
 def free():
     """Bodies that touch nothing but the floor: frames, pins, forces and wind."""
-    world = World(floor=0.0, retries=2)
+    world = bare_world(floor=0.0, retries=2)
     beams = []
     for i in range(4):
         held = () if i else (0, 1, 2, 3)
@@ -188,7 +188,7 @@ def free_game():
 
 def drape():
     """Cloth under implicit Euler falls over a ball that moves."""
-    world = World(integrator="implicit_euler", collider_room=1)
+    world = bare_world(integrator="implicit_euler", collider_room=1)
     mesh = cloth((1.2, 1.2), (8, 8), 0.3)
     constants = cloth_constants(mesh, (8, 8), tensile=400.0, shear=100.0, bend=1.0)
     world.add_body(mesh, SpringMaterial(constants, damping=0.05), position=(0.0, 0.0, 1.0))
@@ -210,7 +210,7 @@ def drape_game():
 
 def held():
     """Bodies that are bent for good, joined to each other, and pulled by a grab."""
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     tin = Plasticity(yield_stress=2e3, creep=20.0)
     block = world.add_body(box((0.6, 0.3, 0.3), (4, 2, 2)), RUBBER, position=(0, 0, 0.5), plasticity=tin)
     other = world.add_body(box((0.3, 0.3, 0.3), (2, 2, 2)), RUBBER, position=(0.46, 0, 0.5))
@@ -263,7 +263,7 @@ def held_game():
 
 def laws():
     """A body under every law, each with a floor below it."""
-    world = World(floor=0.0)
+    world = bare_world(floor=0.0)
     for number, law in enumerate(LAWS):
         place = (1.2 * number, 0.0, 0.7)
         world.add_body(
@@ -280,7 +280,7 @@ def laws_game():
 
 def toys():
     """An artist's textured mesh on cages, which a kernel draws in every frame."""
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     cloth_of_toys = Material(young=3e4, poisson=0.4, density=200, damping_ratio=0.08)
     toy = SoftBodyAsset.from_surface(ASSETS / "elephant.glb", cloth_of_toys, cells=5, up="y")
     world.reserve(toy, 3)
@@ -300,7 +300,7 @@ def toys_game():
 
 def tilted():
     """Bodies on a floor that is no collider, while the game tilts gravity and greases it."""
-    world = World(floor=0.0, gravity=(0.0, 0.0, -5.0))
+    world = bare_world(floor=0.0, gravity=(0.0, 0.0, -5.0))
     for i in range(3):
         world.add_body(box((0.4, 0.3, 0.2), (3, 2, 2)), RUBBER, position=(0.0, i, 0.15), velocity=(1.0, 0, 0))
     world.build()
@@ -323,7 +323,7 @@ def tilted_game():
 
 def joined():
     """Boxes that slide on each other, are joined and driven, while friction and gravity change."""
-    world = World(soft_contact=True, sleep_speed=0.3, collider_room=3)
+    world = bare_world(soft_contact=True, sleep_speed=0.3, collider_room=3)
     crate = SoftBodyAsset(box((0.4, 0.4, 0.3), (2, 2, 2)), RUBBER, contact=Contact(friction=0.2))
     bar = SoftBodyAsset(box((1.0, 0.2, 0.2), (5, 1, 1)), RUBBER)
     world.reserve(crate, 5)
@@ -405,7 +405,7 @@ def joined_game():
 
 def hulled():
     """Bodies that touch colliders, and no body, by a hull; what joints hold is stepped together."""
-    world = World(sleep_speed=0.2, collider_room=3)
+    world = bare_world(sleep_speed=0.2, collider_room=3)
     surface = sphere(radius=0.3, resolution=5)
     coarse = sphere(radius=0.32, resolution=2)
     ball = SoftBodyAsset(coarse, RUBBER, hull=(surface.vertices, surface.surface))
@@ -458,7 +458,7 @@ def hulled_game():
 
 def levels():
     """Bodies with levels of detail: balls with a skin and a hull, and bars."""
-    world = World(soft_contact=True, collider_room=2, sleep_speed=0.3)
+    world = bare_world(soft_contact=True, collider_room=2, sleep_speed=0.3)
     round_one = sphere(radius=0.25, resolution=6)
     ball = SoftBodyAsset.from_surface(
         (round_one.vertices, round_one.surface),
@@ -607,7 +607,7 @@ def levels_game():
 
 def solved_levels():
     """Bodies with levels of detail under implicit Euler, in a world that is not made for contact."""
-    world = World(floor=0.0, integrator="implicit_euler")
+    world = bare_world(floor=0.0, integrator="implicit_euler")
     finest, *coarser = (box((0.9, 0.3, 0.2), each) for each in ((8, 3, 2), (5, 2, 2), (3, 1, 1)))
     block = SoftBodyAsset(finest, RUBBER).with_coarser(*coarser)
     for i in range(2):
@@ -634,7 +634,7 @@ def solved_levels_game():
 
 def thesis_sphere():
     """What docs/native.md measures a step of."""
-    world = World(floor=0.0)
+    world = bare_world(floor=0.0)
     material = Material(young=2e5, poisson=0.3, density=1000, damping=200.0)
     world.add_body(load_mesh(ASSETS / "sphere.npz"), material, position=(0.0, 0.0, 3.0))
     world.build()

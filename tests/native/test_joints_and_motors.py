@@ -90,7 +90,7 @@ def test_bad_calls_are_refused_with_a_way_out_and_change_nothing(native, export)
 
 SCRIPT = """
 from taichi_soft import Material, World, box
-world = World(soft_contact=True)
+world = World(sleep_speed=0)
 jelly = Material(young=6e4, poisson=0.4, density=1000, damping_ratio=0.1)
 crate = box((0.4, 0.4, 0.4), (2, 2, 2))
 left, right = (world.add_body(crate, jelly, position=(0.42 * i, 0, 0.3)) for i in range(2))

@@ -16,7 +16,6 @@ from taichi_soft import (
     SnapshotError,
     SoftBodyAsset,
     StateError,
-    World,
     box,
 )
 from taichi_soft.cli import main
@@ -24,6 +23,7 @@ from taichi_soft.core.container import seal
 from taichi_soft.core.serialisation import to_json
 from taichi_soft.persistence.recorder import MARK, VERSION, read_recording
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -43,7 +43,7 @@ def broken(tmp_path_factory):
     whether the second was written over the first."""
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
     # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
-    world = World(record=5, record_to=path, retries=0)
+    world = bare_world(record=5, record_to=path, retries=0)
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 0.6))
     world.build()
@@ -245,12 +245,12 @@ def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
 def test_bad_options_are_refused(tmp_path):
     for bad in (-1, 2.5, True):
         with pytest.raises(OptionError):
-            World(record=bad)
+            bare_world(record=bad)
     with pytest.raises(OptionError):
-        World(record=3, record_to=5)
+        bare_world(record=3, record_to=5)
     with pytest.raises(StateError, match="build"):
-        World(record=3).save_recording(tmp_path / "x")
-    world = World()
+        bare_world(record=3).save_recording(tmp_path / "x")
+    world = bare_world()
     asset = SoftBodyAsset(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0))
     world.reserve(asset, 1)
     world.build()

@@ -19,12 +19,12 @@ from taichi_soft import (
     SphereShape,
     SpringMaterial,
     StateError,
-    World,
     box,
     rope,
 )
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION, row_counts
+from taichi_soft.world.bare import bare_world
 
 
 def middle():
@@ -62,7 +62,7 @@ def played(living):
 @pytest.fixture(scope="module")
 def small():
     """Two cubes without anything else."""
-    world = World(retries=0)  # or none would freeze
+    world = bare_world(retries=0)  # or none would freeze
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 1.5))
     world.build()
@@ -261,7 +261,7 @@ def test_materials_that_were_set_come_back(small):
 @pytest.mark.soak
 @pytest.mark.parametrize("integrator", ["implicit_euler", "lazy_leapfrog"])
 def test_other_integrators_go_on_the_same(integrator):
-    world = World(integrator=integrator)
+    world = bare_world(integrator=integrator)
     world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 0.52))
     world.build()
     for _ in range(10):
@@ -331,7 +331,7 @@ def other_worlds():
 
 @pytest.mark.parametrize(("bodies", "options", "what"), [case[1:] for case in other_worlds()])
 def test_the_snapshot_of_another_world_is_refused_with_what_differs(small, bodies, options, what):
-    world = World(**options)
+    world = bare_world(**options)
     for i, (mesh, material, more) in enumerate(bodies):
         world.add_body(mesh, material, position=(2 * i, 0, 1.5), **more)
     world.build()
@@ -422,7 +422,7 @@ def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
 @pytest.fixture(scope="module")
 def held():
     """A world with all that notes tell of: colliders, a frame, a grab, an attachment, a joint, a motor."""
-    world = World(collider_room=2)
+    world = bare_world(collider_room=2)
     mesh = box(cells=(1, 1, 1))
     a, b = (world.add_body(mesh, Material(1e5, 0.2, 1000.0), position=(0, 0, z)) for z in (0.6, 1.7))
     world.add_collider(BoxShape((1, 1, 1)), position=(3, 0, 0.5)).set_velocity((0.1, 0, 0))
@@ -466,7 +466,7 @@ def test_whatever_a_note_says_it_is_refused_whole_or_restored_whole(held):
 
 
 def test_it_is_no_call_before_build():
-    world = World()
+    world = bare_world()
     for call in (world.snapshot, world.state_hash, lambda: world.restore(b"")):
         with pytest.raises(StateError, match="build"):
             call()
@@ -474,7 +474,7 @@ def test_it_is_no_call_before_build():
 
 @pytest.mark.soak
 def test_a_rope_goes_on_the_same():
-    world = World()
+    world = bare_world()
     world.add_body(
         rope(1.0, 8, mass=0.4), SpringMaterial(500.0, 0.2), law="springs", position=(0, 0, 2), pinned=[0]
     )
@@ -491,7 +491,7 @@ def test_an_asset_made_again_is_the_same():
     """A late player builds the world from the same numbers, not from the same objects."""
     names = []
     for number in (1000.0, 1000):
-        world = World()
+        world = bare_world()
         asset = SoftBodyAsset(box(cells=(1, 1, 1)), Material(1e5, 0.2, number, 20))
         world.reserve(asset, 1)
         world.build()
@@ -509,7 +509,7 @@ def bendable():
         plasticity=Plasticity(yield_strain=0.02),
         spare_vertices=30,
     )
-    world = World()
+    world = bare_world()
     world.reserve(asset, 2)
     world.build()
     world.spawn(asset, position=(0, 0, 0.6))
@@ -542,7 +542,7 @@ def test_rest_shapes_come_back(bendable):
 def test_what_a_larger_world_held_before_is_not_in_the_snapshots_of_the_next():
     """Which takes over its fields."""
     for cells in (4, 1):
-        world = World(floor=None)
+        world = bare_world(floor=None)
         mesh = box(cells=(cells,) * 3)
         bodies = [world.add_body(mesh, Material(1e5, 0.2, 1000.0), position=(x, 0, 0)) for x in (0, 3)]
         world.build()

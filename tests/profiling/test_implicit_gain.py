@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from taichi_soft import Material, World, box, force_gradient, internal_forces
+from taichi_soft import Material, box, force_gradient, internal_forces
 from taichi_soft.profiling.implicit import measure_implicit
 from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.sparse import SparseBody
+from taichi_soft.world.bare import bare_world
 
 MESH = box((1.0, 0.8, 0.6), (2, 2, 2))
 MATERIAL = Material(1e5, 0.3, 1000.0, 3.0, damping_ratio=0.0)
@@ -32,7 +33,7 @@ def test_scipys_projected_matrix_is_that_of_the_kernels_in_every_pose():
 
 def test_scipys_steps_move_a_body_as_the_world_does():
     native = SparseBody(MESH, MATERIAL)
-    world = World(floor=None, integrator="implicit_euler", tolerance=1e-6)
+    world = bare_world(floor=None, integrator="implicit_euler", tolerance=1e-6)
     body = world.add_body(MESH, MATERIAL, law="virial")
     world.build()
     x = shaken(3, 0.03)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from taichi_soft import OptionError, SpringMaterial, StateError, World, box, cloth, rope, sphere
+from taichi_soft import OptionError, SpringMaterial, StateError, box, cloth, rope, sphere
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 SPRING = SpringMaterial(stiffness=100.0)
@@ -16,7 +17,7 @@ FAR = np.array([2000.0, -1000.0, 500.0])
 @pytest.fixture(scope="module")
 def crowd(jelly):
     """Seven bodies of every kind; none of these tests moves one."""
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
     ball, block, sheet = sphere(0.5, 3), box(cells=(2, 2, 2)), cloth((1.0, 1.0), (4, 4), 1.0)
     line = rope(1.5, 5, 1.0)
     random = np.random.default_rng(4)
@@ -402,7 +403,7 @@ def test_frozen_bodies_answer_and_absent_ones_do_not(crowd):
 
 
 def test_of_equally_near_bodies_the_first_answers(jelly):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     mesh = box(cells=(1, 1, 1))
     for _ in range(3):
         world.add_body(mesh, jelly)
@@ -468,7 +469,7 @@ def test_questions_without_sense_are_refused(crowd, unchanged, call, message):
 
 
 def test_bodies_of_another_world_and_worlds_not_built_are_refused(crowd, jelly):
-    other = World(floor=None)
+    other = bare_world(floor=None)
     stranger = other.add_body(box(cells=(1, 1, 1)), jelly)
     with pytest.raises(OptionError, match="this world's bodies"):
         crowd.raycast((0, 0, 0), UP, bodies=[stranger])
@@ -492,7 +493,7 @@ def test_bodies_of_another_world_and_worlds_not_built_are_refused(crowd, jelly):
 
 
 def test_answers_follow_the_motion(jelly):
-    world = World(floor=None, gravity=(0, 0, -10))
+    world = bare_world(floor=None, gravity=(0, 0, -10))
     world.add_body(box(cells=(1, 1, 1)), jelly)
     world.build()
     start = world.raycast((0.1, 0.2, 3), (0, 0, -1)).distance

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, World, box
+from taichi_soft import Material, OptionError, box
 from taichi_soft.render import Camera
 from taichi_soft.render.camera_moves import Follow, Orbit
+from taichi_soft.world.bare import bare_world
 
 VIEW = Camera((1.0, -5.0, 2.5), (0.5, 0.2, 1.0), fov_degrees=35.0)
 SIZE = (320, 180)
@@ -15,7 +16,7 @@ SIZE = (320, 180)
 
 @pytest.fixture(scope="module")
 def body():
-    world = World()
+    world = bare_world()
     return world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.2, 1000), position=(0, 0, 2))
 
 

@@ -23,10 +23,11 @@ from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
 from taichi_soft.render.artist import speed_of
 from taichi_soft.render.film import Actor, Follow, Stage, film
 from taichi_soft.render.props import SLATE, Scenery
+from taichi_soft.world.bare import bare_world
 
 
 def falling_box(dt: float = 1 / 50) -> Stage:
-    world = World()
+    world = bare_world()
     body = world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 4))
     world.build()
     camera = Camera.framing((-1, -1, 0), (1, 1, 5))
@@ -45,7 +46,7 @@ def test_skins_are_drawn_with_their_textures(tmp_path):
     pixels[2:6, 2:6] = (230, 20, 20)
     picture = trimesh.visual.TextureVisuals(uv=uv, image=Image.fromarray(pixels))
     textured = trimesh.Trimesh(crate.vertices, crate.faces, process=False, visual=picture)
-    world = World()
+    world = bare_world()
     for mesh, x in ((textured, -0.8), (trimesh.creation.box(), 0.8)):
         asset = SoftBodyAsset.from_surface(mesh, Material(1e6, 0.2, 1000.0), cells=3)
         world.add_body(asset, position=(x, 0, 0.6))
@@ -217,7 +218,7 @@ def test_a_blurred_film_shows_the_time_of_the_shutter_and_the_world_makes_the_sa
 
 
 def test_a_blurred_film_of_what_stands_still_is_the_sharp_film(tmp_path):
-    world = World(gravity=(0.0, 0.0, 0.0))
+    world = bare_world(gravity=(0.0, 0.0, 0.0))
     body = world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 1))
     world.build()
     camera = Camera.framing((-1, -1, 0), (1, 1, 2))
@@ -298,7 +299,7 @@ def test_simulated_time_is_that_of_the_world():
 @pytest.mark.soak
 def test_colors_of_bodies_and_colliders_are_explained_and_told_apart(tmp_path):
     """The bar and the legend stand in the upper right corner; a collider may have a colour of its own."""
-    world = World()
+    world = bare_world()
     colliders = [world.add_collider(BoxShape((1, 1, 1)), position=(x, 0, 0.5)) for x in (-1.5, 1.5)]
     body = world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 4))
     world.build()
@@ -330,7 +331,7 @@ def test_colliders_have_another_colour_than_the_floor():
 
 
 def test_a_stage_of_a_world_shows_every_body_with_triangles_and_goes_on_from_where_it_stands(tmp_path):
-    world = World(floor=-0.5)
+    world = bare_world(floor=-0.5)
     places = [(-3.0, 0.0, 1.0), (0.0, 2.0, 0.1), (1.0, -1.0, 2.5)]
     for place in places:
         world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=place)
@@ -350,7 +351,7 @@ def test_a_stage_of_a_world_shows_every_body_with_triangles_and_goes_on_from_whe
 
 
 def built_rope():
-    world = World()
+    world = bare_world()
     world.add_body(rope(1.0, 4, 0.2), SpringMaterial(1000.0, 1.0), position=(0, 0, 5))
     world.build()
     return world

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Material, OptionError, World, box
+from taichi_soft import Material, OptionError, box
 from taichi_soft.render import Camera
 from taichi_soft.render.camera_moves import Orbit
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.framing import framed
+from taichi_soft.world.bare import bare_world
 
 
 def thrown(camera=None):
     """A box that flies five metres to the right, whose script counts its calls."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.2, 1000), position=(0, 0, 4))
     world.build()
     body.set_velocity((5.0, 0.0, 0.0))

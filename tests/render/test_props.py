@@ -13,12 +13,12 @@ from taichi_soft import (
     OptionError,
     PlaneShape,
     SphereShape,
-    World,
     box,
 )
 from taichi_soft.render import Camera, Renderer
 from taichi_soft.render.film import Actor, Stage, film
 from taichi_soft.render.props import Prop, Scenery
+from taichi_soft.world.bare import bare_world
 
 
 def about_y(angle):
@@ -29,7 +29,7 @@ def about_y(angle):
 @pytest.fixture(scope="module")
 def world():
     """A box far above a collider, a frame and the floor."""
-    world = World(soft_contact=False)
+    world = bare_world(soft_contact=False)
     world.add_collider(BoxShape((1, 2, 3)), position=(0, 0, 2))
     world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 50))
     world.build()
@@ -60,7 +60,7 @@ def test_a_prop_goes_with_its_frame(world):
 
 
 def test_the_floor_is_left_to_the_renderer_and_a_slope_is_not():
-    world = World()
+    world = bare_world()
     world.add_collider(PlaneShape((0, 0, 2.0)))
     assert not Scenery(world).at(1.0)
     world.add_collider(PlaneShape((0, 1, 2)))
@@ -68,7 +68,7 @@ def test_the_floor_is_left_to_the_renderer_and_a_slope_is_not():
 
 
 def test_ground_is_drawn_with_sides_that_face_outwards():
-    world = World()
+    world = bare_world()
     heights = 1.0 + np.random.default_rng(3).random((4, 6))
     heights[1, 2] = 0.5
     world.add_collider(HeightFieldShape(heights, spacing=0.5))
@@ -93,7 +93,7 @@ def test_all_shapes_face_outwards_in_the_picture():
 
 
 def test_a_script_acts_before_every_step_of_a_film_and_colliders_are_in_the_picture(monkeypatch, tmp_path):
-    world = World()
+    world = bare_world()
     lift = world.add_collider(BoxShape((1, 1, 0.2)), position=(0, 0, 1.0))
     body = world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 4))
     world.build()

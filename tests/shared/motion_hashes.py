@@ -24,12 +24,13 @@ if __name__ == "__main__":
 import random_play
 import thread_scenes
 
-from taichi_soft import Material, World, box, delaunay_mesh, init
+from taichi_soft import Material, box, delaunay_mesh, init
 from taichi_soft.core.errors import TaichiSoftError
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
+from taichi_soft.world.bare import bare_world
 
 TICKS = 300
 DEMO_SECONDS = 2.0
@@ -49,7 +50,7 @@ def hash_of(worlds):
 def fallen(law, integrator, options):
     """A body of a law dropped onto the floor, or what refused it."""
     mesh = delaunay_mesh(box(cells=(2, 2, 2))) if law.startswith("cmpm") else box(cells=(2, 2, 2))
-    world = World(integrator=integrator)
+    world = bare_world(integrator=integrator)
     try:
         world.add_body(mesh, MATERIAL, law=law, position=(0, 0, 0.55), velocity=(1, 0, -3), **options)
         world.build()

@@ -30,6 +30,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 NAN, INF, HUGE = float("nan"), float("inf"), 10**400
 DT, SUBSTEPS = 1 / 60, 8
@@ -45,7 +46,7 @@ class Game:
     def __init__(self, folder, *, slots=6, warm=False):
         self.folder = folder
         self.cube = SoftBodyAsset(BLOCK, SOFT, contact=Contact(friction=0.4), spare_vertices=40)
-        world = self.world = World(
+        world = self.world = bare_world(
             soft_contact=True,
             sleep_speed=0.3,
             collider_room=4,
@@ -108,7 +109,7 @@ class Game:
         assert self.sleeper.is_asleep
 
     def _meet_another_world(self):
-        self.other = World(retries=0)
+        self.other = bare_world(retries=0)
         self.foreign_body = self.other.add_body(BLOCK, SOFT, position=(0.0, 0.0, 2.0))
         self.foreign_frame = self.other.add_frame()
         self.foreign_mesh = self.foreign_body.render_mesh()
@@ -652,7 +653,8 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "restitution": or_none(number(0.0, 1.0, above=1.1)), "friction": number(0.0, 1.0, below=-1.0),
         "integrator": choice("leapfrog", **NAME_OF), "tolerance": number(1e-4, 0.1, zero=0.0, above=0.6),
         "most_iterations": choice(100, **NOT_COUNTS, zero=0), "schedule": choice("auto", **NAME_OF),
-        "soft_contact": ANY_FLAG, "sleep_speed": number(0.0, 1.0, below=-1.0), "collider_room": choice(2, **NOT_COUNTS),
+        "soft_contact": or_none(ANY_FLAG), "sleep_speed": or_none(number(0.0, 1.0, below=-1.0)),
+        "collider_room": or_none(choice(2, **NOT_COUNTS)),
         "sample_room": choice(8, **NOT_COUNTS), "retries": choice(0, **NOT_COUNTS),
         "max_substeps": or_none(choice(500, **NOT_COUNTS, zero=0)),
         "record": choice(2, **NOT_COUNTS), "record_to": choice("a", none=None, number=1, empty="", nul="\0"),

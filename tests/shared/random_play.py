@@ -27,10 +27,10 @@ from taichi_soft import (
     SoftBodyAsset,
     SphereShape,
     StateError,
-    World,
     box,
     init,
 )
+from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 60, 10
 SOFT = Material(young=3e4, poisson=0.3, density=500.0, damping=5.0)
@@ -47,7 +47,7 @@ def make_world(**options):
         plasticity=Plasticity(yield_strain=0.3, maximum=0.2),
         spare_vertices=12,
     )
-    world = World(soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000, **options)
+    world = bare_world(soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000, **options)
     world.add_collider(SphereShape(0.3), position=(0, 0, 0.1))
     world.add_collider(WAVES)
     world.reserve(cube, 4)

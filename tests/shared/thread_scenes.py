@@ -20,8 +20,9 @@ if __name__ == "__main__":
 # ruff: noqa: E402
 import random_play
 
-from taichi_soft import Contact, Material, SoftBodyAsset, SpringMaterial, World, box, cloth, init, sphere
+from taichi_soft import Contact, Material, SoftBodyAsset, SpringMaterial, box, cloth, init, sphere
 from taichi_soft.bodies.render_mesh import MIN_PARALLEL_VERTICES
+from taichi_soft.world.bare import bare_world
 
 CUBE = box(cells=(2, 2, 2))
 TOP = np.flatnonzero(CUBE.vertices[:, 2] > 0.49)
@@ -38,7 +39,7 @@ def motion(world):
 
 def thrown(recorded=True):
     """Twelve bodies thrown at each other: the world, what momentum each gains, and the events."""
-    world = World(gravity=(0, 0, 0), floor=None, soft_contact=True)
+    world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
     rng = np.random.default_rng(3)
     mesh, material = sphere(0.3, 2), Material(1e5, 0.2, 1000.0, 2.0)
     ways = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 0, 1)]) * 0.7
@@ -73,7 +74,7 @@ def crowd():
 
 def heap():
     """Six bodies, one of which touches itself too."""
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     for i in range(6):
         mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
         place = (0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4))
@@ -87,7 +88,7 @@ def heap():
 
 def inside():
     """Six bodies placed inside each other, which are moved apart."""
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     for i in range(6):
         place = (0.04 * i, 0.02 * i * i, 0.26 + 0.1 * (i % 2))
         world.add_body(box((0.5,) * 3, (2, 2, 2)), Material(2e5, 0.3, 1000.0, 40.0), position=place)
@@ -99,7 +100,7 @@ def inside():
 
 def joined(options):
     """Two stacks of three whose bodies are joined, one of them pulled aside; the last joint's force too."""
-    world = World(**options)
+    world = bare_world(**options)
     for i in range(6):
         world.add_body(CUBE, JELLY, position=(3 * (i // 3), 0, 0.6 + i % 3))
     world.build()
@@ -116,7 +117,7 @@ def joined(options):
 
 def fallen(schedule):
     """Three bodies onto the floor."""
-    world = World(schedule=schedule)
+    world = bare_world(schedule=schedule)
     for i in range(3):
         mesh = sphere(0.5, 3) if i else CUBE
         world.add_body(mesh, JELLY, position=(2 * i, 0, 0.51 + 0.02 * i))
@@ -128,7 +129,7 @@ def fallen(schedule):
 
 def torn():
     """Bodies so torn that their steps fail and are retried, and that have inverted tetrahedra to restore."""
-    world = World()
+    world = bare_world()
     for i in range(3):
         mesh = CUBE if i % 2 else sphere(0.5, 3)
         world.add_body(mesh, Material(3e5, 0.3, 500.0), position=(2 * i, 0, 1.0))
@@ -144,7 +145,7 @@ def torn():
 def drawn():
     """Vertices and normals of a large surface, which threads share."""
     mesh = cloth((1, 1), (50, 50), 0.1)
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     body = world.add_body(mesh, SpringMaterial(100.0, 0.1))
     world.build()
     shift = np.random.default_rng(2).normal(scale=0.1, size=mesh.vertices.shape)
@@ -164,7 +165,7 @@ def played():
 
 def hulled():
     """Balls that touch by their hulls, thrown into a corner, beside a box without a hull."""
-    world = World(soft_contact=True, collider_room=1)
+    world = bare_world(soft_contact=True, collider_room=1)
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
     asset = SoftBodyAsset.from_surface(ball, JELLY, cells=5, hull=200)
     for i in range(4):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, World, box, sphere
+from taichi_soft import Material, box, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, SLEEP = 1 / 60, 0.02
 JELLY = Material(5e4, 0.4, 1000)
@@ -25,7 +26,7 @@ def turning(positions, velocities, masses):
 def test_trembling_fades_within_a_second_with_all_momentum_kept_and_without_sleep_it_goes_on(mesh):
     left = []
     for sleep_speed in (SLEEP, 0.0):
-        world = World(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
+        world = bare_world(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
         body = world.add_body(mesh, JELLY)
         world.build()
         x = body.positions().astype(float)
@@ -47,7 +48,7 @@ def test_a_beam_that_sways_slowly_goes_on_as_if_nobody_slept():
     """Clamped at one end, its first mode (Euler and Bernoulli) is far below what is fast."""
     found = []
     for sleep_speed in (SLEEP, 0.0):
-        world = World(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
+        world = bare_world(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
         mesh = box((2.0, 0.2, 0.2), (20, 2, 2))
         body = world.add_body(mesh, Material(2e5, 0.3, 1000))
         along = mesh.vertices[:, 0] - mesh.vertices[:, 0].min()
@@ -73,7 +74,7 @@ def test_a_body_that_bends_slowly_to_and_fro_falls_asleep_when_it_is_slow_as_a_w
     bending = 0.067 * (along**2 - 1 / 3)  # 0.02 m/s in the root mean square
     worlds = []
     for sleep_speed in (SLEEP, 0.0):
-        world = World(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
+        world = bare_world(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
         body = world.add_body(mesh, Material(2e4, 0.3, 1000))
         world.build()
         worlds.append(world)
@@ -86,7 +87,7 @@ def test_a_body_that_bends_slowly_to_and_fro_falls_asleep_when_it_is_slow_as_a_w
 
 
 def test_a_block_that_slides_slowly_without_friction_keeps_its_speed_and_stays_awake():
-    world = World(floor=0.0, friction=0.0, sleep_speed=SLEEP)
+    world = bare_world(floor=0.0, friction=0.0, sleep_speed=SLEEP)
     block = world.add_body(
         box((0.4, 0.4, 0.4), (3, 3, 3)), JELLY, position=(0, 0, 0.2), velocity=(0.05, 0, 0)
     )

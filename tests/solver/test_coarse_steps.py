@@ -11,11 +11,11 @@ from taichi_soft import (
     SlowStepWarning,
     SpringMaterial,
     TetMesh,
-    World,
     box,
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 BALL = sphere(0.5, 3)
 JELLY = Material(1e5, 0.3, 1000.0)
@@ -23,7 +23,7 @@ JELLY = Material(1e5, 0.3, 1000.0)
 
 def left_by_a_coarse_step(retries, schedule, **options):
     """A body that shivers, after steps of a third of the substeps that it needs."""
-    world = World(gravity=(0, 0, 0), floor=None, retries=retries, schedule=schedule)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=retries, schedule=schedule)
     body = world.add_body(BALL, JELLY, **options)
     world.build()
     noise = 2.0 * np.random.default_rng(0).normal(size=BALL.vertices.shape)
@@ -55,7 +55,7 @@ def test_without_retries_it_freezes_at_once(schedule):
 def test_a_step_that_no_fineness_mends_is_braked_and_keeps_momentum_and_spin():
     """Ten times too coarse even after one retry: vibrations go, rigid motion stays."""
     mesh = sphere(0.5, 2)
-    world = World(gravity=(0, 0, 0), floor=None, retries=1)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=1)
     body = world.add_body(mesh, JELLY)
     world.build()
     rng = np.random.default_rng(2)
@@ -95,19 +95,19 @@ def test_a_world_of_many_substeps_says_when_built_which_slivers_or_which_damping
             "or a softer material",
         ),
     ):
-        world = World()
+        world = bare_world()
         world.add_body(mesh, material, position=(0, 0, 3))
         with pytest.warns(SlowStepWarning, match=named):
             world.build()
 
 
 def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
-    world = World(max_substeps=3)
+    world = bare_world(max_substeps=3)
     world.add_body(BALL, Material(1e7, 0.3, 1000.0), position=(0, 0, 3))
     with pytest.raises(OptionError, match=r"substeps.*max_substeps=3"):
         world.build()
     assert not world.is_built
-    small = World(max_substeps=20)
+    small = bare_world(max_substeps=20)
     body = small.add_body(BALL, JELLY, position=(0, 0, 3))
     small.build()
     before = body.positions()
@@ -124,7 +124,7 @@ def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
 
 @pytest.mark.soak
 def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
-    world = World(max_substeps=2, integrator="implicit_euler")
+    world = bare_world(max_substeps=2, integrator="implicit_euler")
     world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e9), law="springs", position=(0, 0, 3))
     world.build()
     world.step(1 / 60)
@@ -135,4 +135,4 @@ def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
 @pytest.mark.parametrize("value", [-1, 1.5, "many", 100])
 def test_what_is_no_number_of_retries_is_refused(value):
     with pytest.raises(OptionError, match="retries"):
-        World(retries=value)
+        bare_world(retries=value)

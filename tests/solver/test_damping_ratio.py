@@ -11,11 +11,12 @@ from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
 
 from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
-from taichi_soft import Material, SoftBodyAsset, TetMesh, World, beam, box, internal_forces, sphere
+from taichi_soft import Material, SoftBodyAsset, TetMesh, beam, box, internal_forces, sphere
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import element_model, fit_model
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -36,7 +37,7 @@ def measured_ratio(mesh, mass, omega, mode, periods=2.0, **options):
     """Of the first mode, from how its amplitude falls."""
     ratio = options.pop("damping_ratio", 0.05)
     integrator = options.pop("integrator", "leapfrog")
-    world = World(gravity=(0, 0, 0), floor=None, integrator=integrator)
+    world = bare_world(gravity=(0, 0, 0), floor=None, integrator=integrator)
     body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio), **options)
     world.build()
     size = float(np.ptp(mesh.vertices, axis=0).max())
@@ -129,7 +130,7 @@ def pudding_in_space():
     outline = np.array([(0, 0), (0.5, 0), (0.52, 0.05), (0.4, 0.45), (0.36, 0.52), (0.28, 0.55), (0, 0.55)])
     pudding = trimesh.creation.revolve(outline, sections=64)
     asset = SoftBodyAsset.from_surface(pudding, Material(344500.0, 0.4, 300.0, damping_ratio=0.0988), cells=9)
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     body = world.add_body(asset)
     world.build()
     return world, body
@@ -172,7 +173,7 @@ def test_damping_however_large_leaves_momentum_and_spin_and_gives_no_energy_by_t
     mesh = sphere(0.5, 2)
     found = {}
     for ratio in (0.0, 0.3, 1.0, 1000.0):
-        world = World(gravity=(0, 0, 0), floor=None, schedule=schedule, retries=0)
+        world = bare_world(gravity=(0, 0, 0), floor=None, schedule=schedule, retries=0)
         body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio))
         world.build()
         found[ratio] = world.stable_substeps(1 / 60)
@@ -229,7 +230,7 @@ def test_a_material_set_later_fades_as_if_the_body_had_been_made_of_it():
     stiffer = Material(4 * YOUNG, POISSON, DENSITY / 2, damping_ratio=0.1)
     left = []
     for first in (stiffer, Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)):
-        world = World(gravity=(0, 0, 0), floor=None)
+        world = bare_world(gravity=(0, 0, 0), floor=None)
         body = world.add_body(mesh, first)
         world.build()
         body.set_material(stiffer)
@@ -268,7 +269,7 @@ def test_a_ratio_is_not_zero_where_nothing_is_said():
 )
 def test_what_lies_still_is_not_moved_by_its_damping(options, ratio):
     """A pile, or two blocks beside each other: after they have come to rest nothing moves at all."""
-    world = World(**options)
+    world = bare_world(**options)
     is_pile = "soft_contact" in options
     for i in range(2):
         place = (0, 0, 0.255 + 0.51 * i) if is_pile else (i, 0, 0.255)

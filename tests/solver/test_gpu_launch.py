@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Device, FrozenBodyWarning, Material, World, box, sphere
+from taichi_soft import Device, FrozenBodyWarning, Material, box, sphere
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import choose_schedule, make_launch
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -24,7 +25,7 @@ def make_world(jelly):
     """Two bodies of different models that land on the floor."""
 
     def make(schedule):
-        world = World(schedule=schedule)
+        world = bare_world(schedule=schedule)
         world.add_body(box(cells=(2, 2, 2)), jelly, position=(0, 0, 0.55), velocity=(1, 0, -2))
         world.add_body(sphere(0.5, 2), jelly, law="face", flips="recover", position=(2, 0, 0.6))
         world.build()
@@ -52,7 +53,7 @@ def test_one_launch_per_substep_makes_the_same_motion(make_world):
 
 @pytest.mark.filterwarnings("ignore::taichi_soft.UnstableStepWarning")
 def test_a_body_that_breaks_is_frozen_and_the_other_goes_on():
-    world = World(schedule="flat", retries=0)
+    world = bare_world(schedule="flat", retries=0)
     for x, young in ((0, 1e12), (3, 1e4)):
         material = Material(young, 0.2, 1000.0, damping_ratio=0.0)
         world.add_body(box(cells=(1, 1, 1)), material, law="virial", position=(x, 0, 3))

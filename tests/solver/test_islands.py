@@ -5,9 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from taichi_soft import Material, SoftBodyAsset, World, box
+from taichi_soft import Material, SoftBodyAsset, box
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.islands import find_islands
+from taichi_soft.world.bare import bare_world
 
 COUNT, EMPTY = 24, 3
 DT = 1 / 60
@@ -25,7 +26,7 @@ def find(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 def crowd(**options):
     """A world of cubes far from each other, some slots empty between them."""
     cube = SoftBodyAsset(CUBE, JELLY)
-    world = World(floor=None, gravity=(0, 0, 0), **options)
+    world = bare_world(floor=None, gravity=(0, 0, 0), **options)
     world.reserve(cube, COUNT + EMPTY)
     world.build()
     for place in range(COUNT + EMPTY):
@@ -97,8 +98,8 @@ def test_islands_of_bodies_that_touch_are_their_connected_sets(touching, seed):
         shift = rng.uniform(-1.0, 1.0, 3) * (2, 1, 0.2)
         body.set_motion(CUBE.vertices + shift, np.zeros_like(CUBE.vertices))
     find(world._built.state, COUNT + EMPTY, DT)
-    contact, slots = world._built.state.contact, [body.index for body in world.bodies]
-    lower, upper = contact.body_lower.to_numpy(), contact.body_upper.to_numpy()
+    state, slots = world._built.state, [body.index for body in world.bodies]
+    lower, upper = state.body_bounds_lower.to_numpy(), state.body_bounds_upper.to_numpy()
     near = [
         (a, b)
         for a in slots

@@ -6,8 +6,9 @@ import threading
 import numpy as np
 import pytest
 
-from taichi_soft import Material, World, box, sphere
+from taichi_soft import Material, box, sphere
 from taichi_soft.solver import schedules
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -24,7 +25,7 @@ OPTIONS = {
 
 def fallen(options):
     """A heap, and a cube so torn that its steps fail and are retried."""
-    world = World(**options)
+    world = bare_world(**options)
     for i in range(3):
         world.add_body(CUBE if i % 2 else BALL, MATERIAL, position=(0.1 * i, 0.05 * i, 0.5 + 0.6 * i))
     torn = world.add_body(CUBE, MATERIAL, position=(3, 0, 1))
@@ -49,7 +50,7 @@ def test_a_step_in_pieces_is_the_step_bit_for_bit(name, stretch, monkeypatch):
 @pytest.mark.parametrize("name", ["alone", "flat", "contact"])
 def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
     """As Ctrl-C does it, by a signal that raises KeyboardInterrupt as soon as Python runs again."""
-    world = World(**OPTIONS[name])
+    world = bare_world(**OPTIONS[name])
     body = world.add_body(sphere(0.3, 6), MATERIAL, position=(0, 0, 0.5))
     hand = world.add_frame((0, 0, 1))
     world.build()
@@ -86,7 +87,7 @@ def test_ctrl_c_lets_a_short_step_end(monkeypatch):
     monkeypatch.setattr(schedules, "MAX_CALL_WORK", 10**9)
 
     def stepped():
-        world = World()
+        world = bare_world()
         world.add_body(sphere(0.3, 6), MATERIAL, position=(0, 0, 0.5))
         world.build()
         world.step(1 / 60)

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from lab.drop_test.robustness.foreign_meshes import sliver_lattice
-from taichi_soft import Material, SoftBodyAsset, SolverWarning, World, box, sphere
+from taichi_soft import Material, SoftBodyAsset, SolverWarning, box, sphere
+from taichi_soft.world.bare import bare_world
 
 BALL = sphere(1.0, 2)
 RNG = np.random.default_rng(4)
@@ -24,7 +25,7 @@ WRECKS = {
 @pytest.mark.parametrize("poisson", [0.2, 0.45])
 @pytest.mark.parametrize("strain", ["linear", pytest.param("exact", marks=pytest.mark.soak)])
 def test_a_wrecked_body_finds_its_shape_again(strain, poisson, wreck):
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     body = world.add_body(BALL, Material(1e5, poisson, 1000, 200), strain=strain, flips="recover")
     world.build()
     start = WRECKS[wreck] + RNG.normal(scale=1e-3, size=BALL.vertices.shape)
@@ -73,7 +74,7 @@ def test_by_default_any_wreck_finds_its_shape_on_the_floor_within_ten_seconds():
         "shrunk",
         "shrunk to a point",
     ]
-    world = World()
+    world = bare_world()
     bodies = [
         (world.add_body(mesh, Material(1e6, 0.3, 1000.0), position=(3 * i, 3 * j, 1.0)), wreck)
         for i, mesh in enumerate(meshes)
@@ -101,7 +102,7 @@ def test_by_default_any_wreck_finds_its_shape_on_the_floor_within_ten_seconds():
 def test_slivers_that_a_blow_turned_inside_out_do_not_tremble_on(seed):
     """Three metres of jelly, of tetrahedra a thousandth as thick as wide; they did so for 4 s and longer."""
     mesh = sliver_lattice(3.0, 5, 0.001, seed)
-    world = World()
+    world = bare_world()
     body = world.add_body(mesh, Material(1e6, 0.3, 1000), position=(0, 0, 2 - mesh.vertices[:, 2].min()))
     world.build()
     for _ in range(150):
@@ -132,7 +133,7 @@ def total_energy(body):
 def test_no_rescue_goes_below_the_floor_or_adds_energy_and_one_that_fails_is_reported_once():
     """Tables that fold under their own weight, and wrecks that lie on the floor, in a plain world."""
     rng, mesh = np.random.default_rng(0), sphere(0.5, 2)
-    world = World()
+    world = bare_world()
     tables = [
         world.add_body(
             SoftBodyAsset.from_surface(table(), Material(young, 0.4, 1000), cells=8), position=(x, 0, 1.3)
@@ -167,7 +168,7 @@ def test_no_rescue_goes_below_the_floor_or_adds_energy_and_one_that_fails_is_rep
 def test_what_folds_under_its_weight_comes_to_rest():
     """Faces stretched by a third make tetrahedra too stiff for the step of the rest shape, and some stay
     inside out. Vertices had up to 3 m/s for ever."""
-    world = World(sleep_speed=0.02)
+    world = bare_world(sleep_speed=0.02)
     for cells in (8, 10):
         asset = SoftBodyAsset.from_surface(table(), Material(5e4, 0.4, 1000), cells=cells)
         world.add_body(asset, position=(cells, 0, 1.3))

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from taichi_soft import BoxShape, Material, PlaneShape, World, box
+from taichi_soft import BoxShape, Material, PlaneShape, box
 from taichi_soft.core.math.rotations import matrix_of
+from taichi_soft.world.bare import bare_world
 
 DT, SPEED = 1 / 60, 47.0
 FOAM = Material(young=4e4, poisson=0.4, density=213.0, damping=6.0)  # sound: 14 m/s
@@ -13,7 +14,7 @@ POSES = np.random.default_rng(3).normal(size=(6, 4))
 
 def thrown():
     """Six cubes, each on its way to a floor and a wall of its own."""
-    world = World(floor=None, gravity=(0, 0, 0), collider_room=2)
+    world = bare_world(floor=None, gravity=(0, 0, 0), collider_room=2)
     world.add_collider(PlaneShape())
     world.add_collider(BoxShape((0.2, 40, 40)), position=(1.0, 0, 0))
     for number, pose in enumerate(POSES):

@@ -14,10 +14,10 @@ from taichi_soft import (
     SphereShape,
     StateError,
     Woke,
-    World,
     box,
 )
 from taichi_soft.render.replay import replay
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -41,7 +41,7 @@ def motion(body):
 @pytest.fixture(params=WORLDS.values(), ids=WORLDS)
 def thrown(request):
     """Two blocks above the floor that do not meet: both turn and fall."""
-    world = World(**request.param)
+    world = bare_world(**request.param)
     world.reserve(world.add_body(BLOCK, SOFT, position=(*FAR[:2], 0.5)).asset, 1)
     body = world.spawn(
         world.bodies[0].asset, position=(0, 0, 0.5), velocity=(1, 0, 0), angular_velocity=(1, 2, 3)
@@ -86,7 +86,7 @@ def test_it_is_drawn_where_it_stands_through_a_skipped_step(thrown):
 def built(tmp_path_factory):
     """A pile of two, a third far away in the air, in a world that records; and its snapshot."""
     path = tmp_path_factory.mktemp("skips") / "frozen.recording"
-    world = World(soft_contact=True, sleep_speed=0.05, collider_room=1, record=400, record_to=path)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=1, record=400, record_to=path)
     for place in ((0, 0, 0.25), (0, 0, 0.78), 2 * FAR + (0, 0, 3.0)):
         world.add_body(BLOCK, SOFT, position=place)
     world.build()
@@ -308,7 +308,7 @@ def test_a_removed_body_and_a_world_that_is_not_built_are_refused(pile):
     with pytest.raises(StateError, match="removed"):
         pile.skip_step([pile.bodies[0], gone])
     assert pile.state_hash() == name
-    world = World()
+    world = bare_world()
     body = world.add_body(BLOCK, SOFT, position=(0, 0, 1))
     with pytest.raises(StateError, match="not built"):
         world.skip_step([body])
@@ -317,7 +317,7 @@ def test_a_removed_body_and_a_world_that_is_not_built_are_refused(pile):
 
 
 def test_joined_bodies_are_an_island_without_contact_between_bodies():
-    world = World(collider_room=1)
+    world = bare_world(collider_room=1)
     bodies = [world.add_body(BLOCK, SOFT, position=(x, 0, 3.0)) for x in (0.0, EDGE, 9.0)]
     world.build()
     assert world.islands == [(body,) for body in bodies]
@@ -337,7 +337,7 @@ def test_joined_bodies_are_an_island_without_contact_between_bodies():
 @pytest.mark.parametrize(("is_beside", "moves"), [(True, True), (False, False)])
 def test_where_nobody_sleeps_a_skipper_that_is_teleported_is_looked_for_where_it_is(is_beside, moves):
     """A ball flies at the place where it is put, or at the one that it left."""
-    world = World(soft_contact=True, sleep_speed=0.0, collider_room=1, gravity=(0, 0, 0))
+    world = bare_world(soft_contact=True, sleep_speed=0.0, collider_room=1, gravity=(0, 0, 0))
     body = world.add_body(BLOCK, SOFT, position=(0, 0, 3))
     world.build()
     world.step(DT)

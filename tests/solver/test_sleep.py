@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft import BoxShape, Contact, Material, PlaneShape, SphereShape, World, box
+from taichi_soft import BoxShape, Contact, Material, PlaneShape, SphereShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 EDGE = 0.5
@@ -29,7 +30,7 @@ def asleep():
 
     Returns: the world, the shelf, and a snapshot.
     """
-    world = World(soft_contact=True, sleep_speed=0.05, collider_room=4)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=4)
     shelf = world.add_collider(BoxShape((2, 2, 0.4)), position=(2 * FAR, 0, 0.2))
     for place in ((0, 0, 0.25), (0, 0, 0.77), (FAR, 0, 0.3), (2 * FAR, 0, 0.7)):
         world.add_body(BLOCK, FIRM, position=place)
@@ -76,7 +77,7 @@ def test_who_sleeps_is_left_alone_bit_for_bit(piles):
 
 
 def test_nobody_sleeps_who_moves_or_where_sleep_is_off():
-    world = World(soft_contact=True, sleep_speed=0.05, collider_room=4)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=4)
     slider = world.add_body(BLOCK, FIRM, position=(0, 0, 0.25), velocity=(3.0, 0, 0))
     thrown = world.add_body(BLOCK, FIRM, position=(FAR, 0, 1.0), velocity=(0, 0, 9.0))
     world.build()
@@ -89,7 +90,7 @@ def test_nobody_sleeps_who_moves_or_where_sleep_is_off():
     assert slider.is_asleep
     assert thrown.is_asleep
     del world, slider, thrown
-    world = World(soft_contact=True, collider_room=4)
+    world = bare_world(soft_contact=True, collider_room=4)
     world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
     world.build()
     step(world, 4.0)
@@ -284,7 +285,7 @@ def test_who_is_put_into_the_air_just_before_it_would_sleep_falls(piles):
 
 def test_an_island_falls_asleep_together():
     """A block that rests long before its neighbour on top does stays awake as long as that moves."""
-    world = World(soft_contact=True, sleep_speed=0.05, collider_room=4)
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=4)
     world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
     world.add_body(BLOCK, FIRM, position=(0.05, 0, 0.8))
     world.add_body(BLOCK, FIRM, position=(FAR, 0, 0.26), contact=Contact(group=2, mask=2))

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, World, box
+from taichi_soft import Material, box
 from taichi_soft.persistence.kernels.packing import carried, owners
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import context_of_world
 
 CUBE = box((1, 1, 1), (4, 4, 4))
@@ -32,7 +33,7 @@ def subnormals(world):
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_bodies_that_come_to_rest_make_no_subnormal_numbers(name):
-    world = World(**WORLDS[name])
+    world = bare_world(**WORLDS[name])
     for number, law in enumerate(LAWS):
         world.add_body(CUBE, JELLY, position=(3 * number, 0, 0.6), law=law)
     world.build()

@@ -6,8 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from taichi_soft import Material, StateError, World, beam, box, sphere
+from taichi_soft import Material, StateError, beam, box, sphere
 from taichi_soft.bodies import fields as states
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -30,7 +31,7 @@ KINDS = {
 def fall(names, schedule="per_body", steps=60, floor=0.0):
     """Positions and velocities of each body after they fell and hit the floor."""
     gc.collect()
-    world = World(schedule=schedule, floor=floor)
+    world = bare_world(schedule=schedule, floor=floor)
     for name in names:
         mesh, material, options = KINDS[name]
         place = (3.0 * list(KINDS).index(name), 1.0, 0.9)
@@ -104,7 +105,7 @@ def test_a_state_is_reused_and_clean(jelly):
         return body.positions().tobytes()
 
     def small():
-        world = World()
+        world = bare_world()
         body = world.add_body(box(cells=(2, 2, 2)), jelly, position=(0, 0, 0.6), velocity=(0.5, 0, 0))
         world.build()
         return world, body
@@ -112,7 +113,7 @@ def test_a_state_is_reused_and_clean(jelly):
     first, body = small()
     expected = run(first, body)
 
-    previous = World(gravity=(0, 0, 5.0), floor=3.0, restitution=1.0, friction=0.0, retries=0)
+    previous = bare_world(gravity=(0, 0, 5.0), floor=3.0, restitution=1.0, friction=0.0, retries=0)
     broken = previous.add_body(box(cells=(3, 3, 3)), Material(1e9, 0.2, 1000.0, 20.0), position=(0, 0, 4))
     previous.add_body(box(cells=(3, 3, 3)), jelly, position=(2, 0, 4))
     previous.build()
@@ -134,7 +135,7 @@ def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
     """Without waiting for the garbage collector; its bodies say so."""
 
     def make():
-        world = World()
+        world = bare_world()
         body = world.add_body(cube, jelly, position=(0, 0, 5.0))
         world.build()
         return world._built.state, body
@@ -151,7 +152,7 @@ def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
 
 
 def test_bodies_come_in_the_order_of_adding(cube, jelly):
-    world = World()
+    world = bare_world()
     bodies = [world.add_body(cube, jelly, position=(2 * i, 0, 1)) for i in range(9)]
     assert list(world.bodies) == bodies
     assert [body.index for body in bodies] == list(range(9))

@@ -12,12 +12,12 @@ from taichi_soft import (
     SoftBodyAsset,
     Stiffness,
     TaichiSoftError,
-    World,
     box,
     cloth,
     sphere,
 )
 from taichi_soft.core import conflicts
+from taichi_soft.world.bare import bare_world
 
 RUBBER = Material(1e5, 0.3, 1000.0)
 WOOD = AnisotropicMaterial(Stiffness.isotropic(1e4, 0.3), 500.0)
@@ -25,7 +25,7 @@ CUBE, BALL = box(cells=(1, 1, 1)), sphere(0.5, 2)
 
 
 def build(asset, **options):
-    world = World(**options)
+    world = bare_world(**options)
     world.add_body(asset, position=(0, 0, 2))
     world.build()
 
@@ -40,7 +40,7 @@ def asset(material=RUBBER, **options):
 
 REFUSED = {
     conflicts.FLAT: lambda: build(asset(), schedule="flat", soft_contact=True),
-    conflicts.FLAT_SOLVES: lambda: World(schedule="flat", integrator="implicit_euler"),
+    conflicts.FLAT_SOLVES: lambda: bare_world(schedule="flat", integrator="implicit_euler"),
     conflicts.ONLY_FLAT: lambda: build(asset(), schedule="per_body", integrator="explicit_euler"),
     conflicts.SOLVED_HULLS: lambda: build(caged(hull=60), integrator="implicit_euler"),
     conflicts.HULL_CUTS: lambda: caged(hull=60, spare_vertices=10),

@@ -5,7 +5,8 @@ import pytest
 from reading import burst, leave, not_finite
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Event, Material, PlaneShape, World, box
+from taichi_soft import Event, Material, PlaneShape, box
+from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
@@ -22,7 +23,7 @@ pytestmark = [
 
 def held_world(**options):
     """Bodies on frames and in hands, and one that falls."""
-    world = World(**{"retries": 0, **options})
+    world = bare_world(**{"retries": 0, **options})
     for x in (0.0, 0.6, 3.0):
         world.add_body(BLOCK, JELLY, position=(x, 0.0, 1.0), law="virial")
     world.build()
@@ -61,7 +62,7 @@ def test_all_that_is_read_stays_finite_whichever_body_freezes(integrator):
 
 def test_the_load_on_a_collider_is_finite_where_a_solve_overflows():
     """A block torn to pieces on it: its forces are beyond what float32 holds, though it goes on."""
-    world = World(integrator="implicit_euler", floor=None)
+    world = bare_world(integrator="implicit_euler", floor=None)
     body = world.add_body(BLOCK, JELLY, position=(0, 0, 1))
     ground = world.add_collider(PlaneShape(), restitution=0.3)
     world.build()

@@ -20,10 +20,10 @@ from taichi_soft import (
     SphereShape,
     SpringMaterial,
     StateError,
-    World,
     box,
     rope,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -46,7 +46,9 @@ class Game:
         skinned = SoftBodyAsset(FINE, SOFT, skin=SKIN)
         self.crate = skinned.with_coarser(COARSE)
         self.rope = SoftBodyAsset(rope(1.0, 8, 0.5), SpringMaterial(2000.0, 2.0))
-        world = self.world = World(soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000)
+        world = self.world = bare_world(
+            soft_contact=True, sleep_speed=0.02, collider_room=2, sample_room=2000
+        )
         self.kept = [world]
         self.wrong = []
         self.kept += [world.add_collider(SphereShape(0.3), position=(0, 0, 0.1)), world.add_collider(WAVES)]
@@ -122,7 +124,7 @@ def test_every_readout_of_every_handle_gives_a_value_or_a_state_error():
 
 
 def test_a_collider_that_was_added_has_felt_nothing_whoever_had_its_place():
-    world = World(collider_room=2)
+    world = bare_world(collider_room=2)
     body = world.add_body(COARSE, SOFT, position=(0, 0, 0.5))
     world.build()
     data = world.snapshot()

@@ -18,13 +18,13 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     StateError,
-    World,
     box,
     sphere,
 )
 from taichi_soft.core.taichi_workarounds.known_kernels import FirstLaunches
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import make_launch
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -79,7 +79,7 @@ def broken(world, asset):
 
 def told_by_a_world_of_their_own(mode):
     """Bits of a resident and of a body that is pinned at a corner, from the start to the first contact on."""
-    world = World(**MODES[mode])
+    world = bare_world(**MODES[mode])
     resident = world.add_body(BALL, JELLY, position=(0, 0, 0.8))
     pinned = world.add_body(MESH, JELLY, pinned=[3], **WAY)
     build(world, mode)
@@ -95,7 +95,7 @@ def told_by_a_world_of_their_own(mode):
 def test_a_body_that_comes_later_moves_as_one_of_the_start_and_leaves_no_trace_on_others(mode):
     """Bit for bit: in a slot where one lay on the floor before, and where one broke."""
     told = told_by_a_world_of_their_own(mode)
-    world = World(**MODES[mode])
+    world = bare_world(**MODES[mode])
     kind, other = cube(pinned=[3]), SoftBodyAsset(BALL, JELLY)
     world.reserve(kind, 2)
     world.reserve(other, 2)
@@ -127,7 +127,7 @@ def test_a_body_that_comes_later_moves_as_one_of_the_start_and_leaves_no_trace_o
 @pytest.fixture(scope="module")
 def play():
     """A built world with two pools of three, in which all bodies fall freely."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     kinds = (cube(), ball())
     for kind in kinds:
         world.reserve(kind, 3)
@@ -201,7 +201,7 @@ def test_a_dead_handle_says_so_and_what_it_was_can_still_be_read(empty, name):
 
 
 def test_bodies_can_come_and_go_before_the_world_is_built():
-    world, kind = World(floor=None), cube()
+    world, kind = bare_world(floor=None), cube()
     world.reserve(kind, 3)
     first, second = (world.spawn(kind, position=(x, 0, 0)) for x in (1, 5))
     world.despawn(first)
@@ -215,7 +215,7 @@ def test_bodies_can_come_and_go_before_the_world_is_built():
 
 
 def test_a_body_that_was_added_can_go_and_come_again():
-    world = World(floor=None)
+    world = bare_world(floor=None)
     bodies = [world.add_body(MESH, JELLY, position=(x, 0, 0)) for x in (0, 5)]
     build(world)
     kind = bodies[0].asset
@@ -243,7 +243,7 @@ def test_a_spinning_body_has_the_momentum_and_the_spin_that_were_asked_for(empty
 
 def test_a_body_that_is_put_on_the_floor_touches_it_however_it_is_turned():
     """Added or spawned, from a mesh far from its origin, by the points of its hull; z is the gap below it."""
-    world, rng = World(floor=1.0, soft_contact=True), np.random.default_rng(5)
+    world, rng = bare_world(floor=1.0, soft_contact=True), np.random.default_rng(5)
     off_centre = SoftBodyAsset(MESH.translated((3.0, -2.0, 7.0)), JELLY)
     hulled = SoftBodyAsset(BALL, JELLY, skin=trimesh.creation.icosphere(subdivisions=3, radius=0.6), hull=100)
     for asset in (off_centre, hulled):
@@ -279,7 +279,7 @@ def test_a_body_that_is_put_on_the_floor_touches_it_however_it_is_turned():
 
 
 def test_pinned_vertices_stay_where_a_moving_body_was_put(empty):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     kind = cube(pinned=[0, 1])
     world.reserve(kind, 1)
     build(world)
@@ -310,7 +310,7 @@ def test_nothing_is_compiled_when_the_first_body_comes(monkeypatch):
 
     monkeypatch.setattr(FirstLaunches, "_prepare", noted)
     monkeypatch.setattr("taichi_soft.bodies.fields._free", [])  # none that another test has used
-    world, kinds = World(), (cube(), SoftBodyAsset(BALL, JELLY))
+    world, kinds = bare_world(), (cube(), SoftBodyAsset(BALL, JELLY))
     for kind in kinds:
         world.reserve(kind, 70)
     resident = world.spawn(kinds[0], position=(0, 0, 3))
@@ -352,7 +352,7 @@ def test_an_adapter_reads_who_comes_and_refuses_who_went(empty):
 
 
 def test_who_went_gives_colliders_no_impulse_and_no_query_finds_him():
-    world, kind = World(soft_contact=True), cube()
+    world, kind = bare_world(soft_contact=True), cube()
     world.reserve(kind, 3)
     build(world)
     guest = world.spawn(kind, position=(0, 0, 0.5))
@@ -393,7 +393,7 @@ CALLS = st.lists(
 
 @pytest.fixture(scope="module")
 def flat_play():
-    world = World(floor=None, schedule="flat")
+    world = bare_world(floor=None, schedule="flat")
     kinds = (cube(), ball())
     for kind in kinds:
         world.reserve(kind, 3)

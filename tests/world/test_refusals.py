@@ -14,8 +14,8 @@ from taichi_soft import (
     StateError,
     TaichiSoftError,
     UnstableStepWarning,
-    World,
 )
+from taichi_soft.world.bare import bare_world
 
 NAN, INF = float("nan"), float("inf")
 
@@ -83,7 +83,7 @@ def test_one_is_a_count_but_true_is_not(falling):
 
 
 def test_nothing_runs_before_build(cube, jelly):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     body = world.add_body(cube, jelly)
     zeros = np.zeros((27, 3))
     calls = [
@@ -108,7 +108,7 @@ def test_nothing_runs_before_build(cube, jelly):
 
 
 def test_an_empty_world_is_not_built():
-    world = World()
+    world = bare_world()
     for call in (world.build, lambda: world.stable_substeps(1 / 60)):
         with pytest.raises(StateError, match="add_body"):
             call()
@@ -155,7 +155,7 @@ def test_a_world_is_built_once_and_complete(falling, cube, jelly):
 )
 def test_worlds_that_cannot_be(name, value):
     with pytest.raises(OptionError, match=name):
-        World(**{name: value})
+        bare_world(**{name: value})
 
 
 @pytest.mark.parametrize("name", ["settings", "time", "step_count", "bodies", "is_built"])
@@ -175,7 +175,7 @@ def test_settings_stay_as_they_were_checked(falling, name):
 
 
 def test_settings_say_which_schedule_was_chosen(cube, jelly):
-    world = World(gravity=(0, 0, -1.6), floor=None, integrator="explicit_euler")
+    world = bare_world(gravity=(0, 0, -1.6), floor=None, integrator="explicit_euler")
     assert world.settings.schedule == "auto"
     world.add_body(cube, jelly)
     world.build()
@@ -219,7 +219,7 @@ MIRROR = np.diag([1.0, 1.0, -1.0])
     ],
 )
 def test_bodies_that_cannot_be(cube, jelly, name, value):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     with pytest.raises(OptionError, match=name.split("_")[0]):
         world.add_body(cube, jelly, **{name: value})
     assert world.bodies == ()
@@ -227,16 +227,16 @@ def test_bodies_that_cannot_be(cube, jelly, name, value):
 
 def test_unknown_names_are_answered_with_those_there_are(cube, jelly):
     with pytest.raises(OptionError, match=r"'virial'.*'face'|'face'.*'virial'"):
-        World(floor=None).add_body(cube, jelly, law="neo_hooke")
+        bare_world(floor=None).add_body(cube, jelly, law="neo_hooke")
     with pytest.raises(OptionError, match=r"'tolerant', 'recover', 'off'"):
-        World(floor=None).add_body(cube, jelly, flips="never")
+        bare_world(floor=None).add_body(cube, jelly, flips="never")
     with pytest.raises(OptionError, match=r"'auto', 'per_body', 'flat'"):
-        World(schedule="fast")
+        bare_world(schedule="fast")
 
 
 @pytest.mark.parametrize("material", [None, 1e5, "rubber", {"young": 1e5}, Material])
 def test_what_is_no_material(cube, material):
-    world = World(floor=None)
+    world = bare_world(floor=None)
     with pytest.raises(MaterialError, match=r"taichi_soft\.Material"):
         world.add_body(cube, material)
     assert world.bodies == ()
@@ -246,7 +246,7 @@ def test_what_is_no_material(cube, material):
 def test_an_array_of_another_length(cube, name):
     constants = {"young": 1e5, "poisson": 0.2, "density": 1000.0, "damping": 1.0}
     constants[name] = np.full(39, constants[name])
-    world = World(floor=None)
+    world = bare_world(floor=None)
     with pytest.raises(MaterialError, match="39 values for a mesh of 40"):
         world.add_body(cube, Material(**constants))
     assert world.bodies == ()
@@ -258,13 +258,13 @@ def test_an_array_of_another_length(cube, name):
 @pytest.mark.parametrize("mesh", [None, "cube", np.zeros((4, 3))])
 def test_what_is_no_mesh(jelly, mesh):
     with pytest.raises(MeshError, match="TetMesh"):
-        World(floor=None).add_body(mesh, jelly)
+        bare_world(floor=None).add_body(mesh, jelly)
 
 
 def test_particle_meshes_need_another_law(jelly):
     particles = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
     with pytest.raises(MeshError, match=r"ParticleMesh .*no tetrahedra"):
-        World(floor=None).add_body(particles, jelly)
+        bare_world(floor=None).add_body(particles, jelly)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def test_substeps_for_no_step(falling, dt):
 
 @pytest.mark.parametrize("name", ["position", "velocity"])
 def test_bodies_out_of_reach(cube, jelly, name):
-    world = World()
+    world = bare_world()
     with pytest.raises(TaichiSoftError, match=name):
         world.add_body(cube, jelly, **{name: (0, 0, 1e39)})
 
@@ -320,7 +320,7 @@ def test_bodies_out_of_reach(cube, jelly, name):
 @pytest.mark.parametrize("position", [(0, 0, 0), (5, 0, 0.4), (0, 0, -3), (0, 0, 0.498)])
 def test_bodies_that_start_below_the_floor(cube, jelly, position):
     """The floor would press them flat in one substep. The message says where they fit."""
-    world = World()
+    world = bare_world()
     with pytest.raises(OptionError, match=r"starts .* m below the floor: position=\(.*, 0\.5\) puts it on"):
         world.add_body(cube, jelly, position=position)
     assert world.bodies == ()
@@ -333,7 +333,7 @@ def test_bodies_that_start_below_the_floor(cube, jelly, position):
 )
 def test_bodies_of_a_size_that_float32_cannot_hold(cube, jelly, scale, error):
     with pytest.raises(TaichiSoftError, match=error):
-        World(floor=None).add_body(cube.scaled(scale), jelly)
+        bare_world(floor=None).add_body(cube.scaled(scale), jelly)
 
 
 @pytest.mark.parametrize("dt", [1e-50, 1e308, 1e5])
@@ -357,7 +357,7 @@ def test_a_step_refused_by_a_warning_made_an_error_is_refused_again(solo, cube):
 
 
 def test_explicit_euler_is_announced_as_unstable(cube, jelly):
-    world = World(integrator="explicit_euler")
+    world = bare_world(integrator="explicit_euler")
     world.add_body(cube, jelly, position=(0, 0, 1))
     with pytest.warns(UnstableStepWarning, match="explicit_euler gains energy"):
         world.build()
@@ -365,7 +365,7 @@ def test_explicit_euler_is_announced_as_unstable(cube, jelly):
 
 def test_gravity_out_of_reach():
     with pytest.raises(TaichiSoftError, match="gravity"):
-        World(gravity=(0, 0, -1e39))
+        bare_world(gravity=(0, 0, -1e39))
 
 
 def test_a_body_of_another_world(falling, solo, cube, jelly):

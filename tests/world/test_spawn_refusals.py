@@ -2,7 +2,8 @@
 
 import pytest
 
-from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, box, sphere
+from taichi_soft.world.bare import bare_world
 
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH = box(cells=(2, 2, 2))
@@ -15,7 +16,7 @@ def cube():
 @pytest.fixture(scope="module")
 def play():
     """A built world with two pools of three."""
-    world = World(floor=None)
+    world = bare_world(floor=None)
     kinds = (cube(), SoftBodyAsset(sphere(0.5, 2), JELLY))
     for kind in kinds:
         world.reserve(kind, 3)
@@ -63,7 +64,7 @@ def test_what_is_no_asset_is_refused(empty, value):
     with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
         world.spawn(value)
     with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
-        World().reserve(value, 1)
+        bare_world().reserve(value, 1)
     assert state_of(world) == before
 
 
@@ -87,7 +88,7 @@ def test_a_full_pool_an_unknown_asset_and_a_late_reserve_are_refused(empty):
 
 def test_only_bodies_that_live_here_can_be_removed(empty):
     world, (kind, _) = empty
-    elsewhere = World(floor=None)
+    elsewhere = bare_world(floor=None)
     stranger = elsewhere.add_body(MESH, JELLY)
     body = world.spawn(kind)
     gone = world.spawn(kind)
@@ -106,7 +107,7 @@ def test_only_bodies_that_live_here_can_be_removed(empty):
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, True, None, "3", 10**9])
 def test_a_count_that_is_none_is_refused_before_anything_is_reserved(count):
-    world, kind = World(floor=None), cube()
+    world, kind = bare_world(floor=None), cube()
     with pytest.raises(OptionError, match="count must be a whole number from 1"):
         world.reserve(kind, count)
     with pytest.raises(StateError, match="has no pool in this world"):
@@ -115,11 +116,11 @@ def test_a_count_that_is_none_is_refused_before_anything_is_reserved(count):
 
 def test_more_than_fits_into_a_world_is_refused():
     with pytest.raises(OptionError, match="the world would have 27,000,000 vertices, at most 10,000,000"):
-        World(floor=None).reserve(cube(), 1_000_000)
+        bare_world(floor=None).reserve(cube(), 1_000_000)
 
 
 def test_nothing_is_put_below_the_floor():
-    world, kind = World(floor=1.0), cube()
+    world, kind = bare_world(floor=1.0), cube()
     world.reserve(kind, 1)
     with pytest.raises(
         OptionError, match=r"1.5 m below the floor: position=\(2, 0, 1.5\) puts it on the floor"

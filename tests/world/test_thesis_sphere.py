@@ -7,14 +7,15 @@ import warnings
 import numpy as np
 import pytest
 
-from taichi_soft import PRESETS, FrozenBodyWarning, Material, UnstableStepWarning, World, preset, sphere
+from taichi_soft import PRESETS, FrozenBodyWarning, Material, UnstableStepWarning, preset, sphere
+from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 
 
 def drop(mesh, material, seconds, substeps=SUBSTEPS, **options):
     """World, body and the height of its centre every tenth of a second."""
-    world = World(retries=0)
+    world = bare_world(retries=0)
     body = world.add_body(mesh, material, position=(0, 0, 7.0), law="virial", **options)
     world.build()
     heights = []
@@ -71,7 +72,7 @@ def test_one_that_is_too_soft_stays_dented(thesis_mesh, young):
 
 @pytest.mark.parametrize("young", [1e7, 1e8])
 def test_one_that_is_too_stiff_is_warned_about_then_frozen(thesis_mesh, young):
-    world = World(retries=0)
+    world = bare_world(retries=0)
     body = world.add_body(
         thesis_mesh,
         Material(young, 0.1, 1000.0, 100.0, damping_ratio=0.0),
@@ -177,7 +178,7 @@ def test_the_others_go_on_bit_for_bit(thesis_mesh):
 
     def fall(materials):
         gc.collect()
-        world = World(retries=0)
+        world = bare_world(retries=0)
         for material in materials:
             place = (0, 0, 3.0) if material is soft else (5, 0, 3.0)
             world.add_body(thesis_mesh, material, position=place, law="virial")
@@ -228,7 +229,7 @@ def test_the_warning_comes_once_for_each_substep(solo, cube):
 def test_every_preset_survives_a_fall_of_two_metres_and_keeps_its_volume(name):
     """With substeps as chosen; gelatine as its description says. The thesis's law for all the others."""
     mesh = sphere(0.5, 3)
-    world = World()
+    world = bare_world()
     flips = "recover" if name == "gelatine" else "tolerant"
     body = world.add_body(mesh, preset(name), flips=flips, position=(0, 0, 2.5))
     world.build()

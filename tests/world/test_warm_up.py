@@ -24,6 +24,7 @@ from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.joints import MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
 from taichi_soft.core.compilation import BURST
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -70,7 +71,7 @@ def test_nothing_is_compiled_where_what_yields_tears(compiled):
         tearing=Tearing(3e4),
         spare_vertices=40,
     )
-    world = World(gravity=(0, 0, 0), floor=None)
+    world = bare_world(gravity=(0, 0, 0), floor=None)
     world.reserve(bar, 3)
     world.build()
     world.warm_up()

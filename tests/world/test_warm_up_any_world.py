@@ -11,12 +11,12 @@ from taichi_soft import (
     SoftBodyAsset,
     SpringMaterial,
     TetMesh,
-    World,
     box,
     cloth,
     rope,
 )
 from taichi_soft.core.compilation import BURST
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -120,7 +120,7 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
     compiled, begin = [], BURST.begin
     monkeypatch.setattr(BURST, "begin", lambda kernel: compiled.append(kernel) or begin(kernel))
     kinds, options = WORLDS[name]
-    world = World(**options)
+    world = bare_world(**options)
     for kind in kinds:
         world.reserve(KINDS[kind], 2)
     world.build()
@@ -146,7 +146,7 @@ def test_events_that_wait_are_kept():
     """A joint that a change of level has released."""
     fine, coarse = (box((0.3, 0.3, 0.3), (n, n, n)) for n in (2, 1))
     crate = SoftBodyAsset(fine, JELLY, coarser=(SoftBodyAsset(coarse, JELLY),))
-    world = World(soft_contact=True)
+    world = bare_world(soft_contact=True)
     other = world.add_body(fine, JELLY, position=(0, 0, 1))
     world.reserve(crate, 1)
     world.build()

@@ -2,7 +2,7 @@
 
 from taichi_soft import BoxShape, Material, SoftBodyAsset, World, sphere
 
-world = World(soft_contact=True)
+world = World()
 rubber = Material(young=6e4, poisson=0.4, density=1000, damping_ratio=0.1)
 ball = SoftBodyAsset(sphere(radius=0.3, resolution=4), rubber)
 world.reserve(ball, 6)

@@ -4,7 +4,7 @@ from taichi_soft import BoxShape, Contact, Material, World, box, sphere
 
 ROOM, WALL = 4.0, 0.2  # width of the arena and thickness of its walls [m]
 
-world = World(soft_contact=True, friction=0.3)
+world = World(friction=0.3)
 rubber = Material(young=2.5e4, poisson=0.3, density=300, damping_ratio=0.1)
 cube, ball, grip = box((0.6, 0.6, 0.6), (2, 2, 2)), sphere(radius=0.25, resolution=2), Contact(friction=0.3)
 players = [world.add_body(cube, rubber, position=(x, 0.0, 0.4), contact=grip) for x in (-1.2, 1.2)]

@@ -16,6 +16,7 @@ from lab.drop_test.robustness.wrecks import distance_from_rest, wrecked
 from taichi_soft import FrozenBodyWarning, Material, TetMesh, TooSoftWarning, World
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import TaichiSoftError
+from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 DROP, DROP_TIME = 2.0, 2.5
@@ -80,7 +81,7 @@ def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
     damping = DAMPINGS[cell["damping"]](mesh, cell)
     material = Material(cell["young"], cell["poisson"], cell["density"], **damping)
     named = {option: cell[option] for option in ("law", "flips") if cell[option] is not None}
-    world = World()
+    world = bare_world()
     height = DROP + float(np.ptp(mesh.vertices, axis=0).max())
     body = world.add_body(mesh, material, position=(0.0, 0.0, height), **named)
     world.build()

@@ -23,8 +23,9 @@ from lab.experiments.experiment import (
     Table,
 )
 from lab.experiments.judgement import judged_but_for
-from taichi_soft import Material, TetMesh, World, box
+from taichi_soft import Material, TetMesh, box
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def measure(point: Point) -> Numbers:
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     held = np.flatnonzero(mesh.vertices[:, 0] < -0.5 + 1e-9)
-    world = World(gravity=(0, 0, -GRAVITY), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, -GRAVITY), floor=None, retries=0)
     body = world.add_body(mesh, material, law=point["law"], pinned=held)
     world.build()
     dt = 2 * PART * body.stable_step.limit

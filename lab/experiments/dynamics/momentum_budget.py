@@ -20,7 +20,8 @@ from lab.experiments.experiment import (
     Table,
 )
 from lab.experiments.judgement import judged_but_for
-from taichi_soft import FrozenBodyWarning, Material, World, box
+from taichi_soft import FrozenBodyWarning, Material, box
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def measure(point: Point) -> Numbers:
     """Largest relative change of momentum and angular momentum; -1 if the body fails."""
     mesh = box(SIZE, CELLS)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, material, law=point["law"])
     world.build()
     start = mesh.vertices * (STRETCH, 1.0, 1.0) + SHEAR * mesh.vertices[:, [2, 0, 1]]

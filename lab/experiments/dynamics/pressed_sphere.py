@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft import Material, PlaneShape, TetMesh, World, internal_forces, sphere
+from taichi_soft import Material, PlaneShape, TetMesh, internal_forces, sphere
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def cap(mesh: TetMesh) -> NDArray[np.int64]:
 def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
     """Force that holds the cap after lowering it by each depth [N], from the positions in float64."""
     held, ground = cap(mesh), float(mesh.vertices[:, 2].min())
-    world = World(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=held)
     world.build()
     body.set_linear_damping(BRAKE)
@@ -64,7 +65,7 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
     """The same force with a plane that rises, from the impulse that it reports."""
     ground = float(mesh.vertices[:, 2].min())
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
     plane = world.add_collider(PlaneShape((0, 0, 1)), position=(0, 0, ground), friction=FRICTIONLESS)
     world.build()

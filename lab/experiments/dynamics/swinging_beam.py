@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from lab.experiments.dynamics.beam_theory import Beam, first_shape, timoshenko_frequency
 from lab.experiments.dynamics.compared_laws import WITHOUT_ENERGY
-from taichi_soft import FrozenBodyWarning, Material, TetMesh, World, box
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, box
 from taichi_soft.core.types import LawName
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ def theory(support: str) -> float:
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     """Frequency [Hz], and an amplitude over that one period before. Both are 0 if the beam fails."""
     shape, held = mode_shape(mesh, support)
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     material = replace(MATERIAL, damping=NEEDS_DAMPING.get(law, 0.0))
     body = world.add_body(mesh, material, law=law, pinned=held)
     world.build()

@@ -23,7 +23,8 @@ from lab.experiments.experiment import (
     Table,
 )
 from lab.experiments.judgement import judged_but_for
-from taichi_soft import Material, World, box
+from taichi_soft import Material, box
+from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def measure(point: Point) -> Numbers:
     """Speed of the pulse [m/s], deviation from a constant speed, and its shape at some times."""
     cells = point["cells"]
     mesh = box((LENGTH, THICKNESS, THICKNESS), (round(LENGTH / THICKNESS) * cells, cells, cells))
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(
         mesh, Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0), law=point["law"]
     )

@@ -14,13 +14,13 @@ from taichi_soft import (
     MeshShape,
     OptionError,
     SoftBodyAsset,
-    World,
     load_mesh,
     preset,
     rope,
     sphere,
     torus,
 )
+from taichi_soft.world.bare import bare_world
 
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1
@@ -215,9 +215,9 @@ def test_the_way_to_a_body_that_a_refused_surface_names_runs_as_it_stands(tmp_pa
 def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way(source):
     way = r"got (Trimesh|Scene): SoftBodyAsset\.from_surface\(mesh, material\) makes a body from it"
     with pytest.raises(MeshError, match=way):
-        World().add_body(source, preset("cork"))
+        bare_world().add_body(source, preset("cork"))
     with pytest.raises(MeshError, match=r"got int$"):
-        World().add_body(7, preset("cork"))
+        bare_world().add_body(7, preset("cork"))
 
 
 def test_a_scene_in_the_place_of_a_mesh_shape_is_told_the_way():

@@ -21,7 +21,7 @@ runtime.can_bind = lambda: False
 if sys.argv[5]:
     runtime.VERSION, kernel_digest.digest_of_sources = sys.argv[5], lambda: sys.argv[5]
 init("cpu", threads=threads)
-world = World(collider_room=room)
+world = World(soft_contact=False, sleep_speed=0, collider_room=room)
 for i in range(bodies):
     world.add_body(box(cells=(cells,) * 3), Material(2e5, 0.3, 1000), position=(3 * i, 0, 0.6), law="virial")
 world.build()

@@ -10,7 +10,6 @@ from taichi_soft import (
     AnisotropicMaterial,
     Material,
     Stiffness,
-    World,
     beam,
     box,
     force_gradient,
@@ -19,6 +18,7 @@ from taichi_soft import (
     stable_step,
 )
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
@@ -298,7 +298,7 @@ def test_implicit_euler_holds_a_hanging_bar_of_wood_at_the_length_of_its_modulus
     x0 = mesh.vertices
     held = np.flatnonzero(x0[:, 0] < x0[:, 0].min() + 1e-6)
     young, density, gravity = YOUNG[0], 500.0, 9.81
-    world = World(gravity=(gravity, 0, 0), floor=None, integrator="implicit_euler", tolerance=1e-5)
+    world = bare_world(gravity=(gravity, 0, 0), floor=None, integrator="implicit_euler", tolerance=1e-5)
     body = world.add_body(mesh, AnisotropicMaterial(WOOD, density, 20.0), law=law, pinned=held)
     world.build()
     for _ in range(300):
@@ -335,7 +335,7 @@ def test_only_the_law_with_an_energy_keeps_that_of_a_ringing_body_without_dampin
     mesh = sphere(0.5, 2)
     spreads = {}
     for law in ("st_venant_kirchhoff", "virial"):
-        world = World(gravity=(0, 0, 0), floor=None, retries=0)
+        world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
         body = world.add_body(mesh, AnisotropicMaterial(WOOD, 500.0, damping_ratio=0.0), law=law)
         world.build()
         body.set_motion(mesh.vertices * (1.1, 1, 0.9), np.zeros_like(mesh.vertices))
@@ -354,7 +354,7 @@ def test_only_the_law_with_an_energy_keeps_that_of_a_ringing_body_without_dampin
 def test_stretched_by_a_third_and_undamped_only_the_law_with_an_energy_holds(law, is_lost):
     """The README says so among the limits; the lost body is put back and frozen."""
     mesh = sphere(0.5, 2)
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, AnisotropicMaterial(WOOD, 500.0, damping_ratio=0.0), law=law)
     world.build()
     body.set_motion(mesh.vertices * (1.3, 1, 0.7), np.zeros_like(mesh.vertices))
@@ -367,7 +367,7 @@ def test_stretched_by_a_third_and_undamped_only_the_law_with_an_energy_holds(law
 def test_elastic_energy_and_stress_are_those_of_the_material():
     mesh = box((1, 1, 1), (2, 2, 2))
     stretch = np.diag([1.02, 0.99, 1.01])
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(
         mesh, AnisotropicMaterial(WOOD, 500.0, damping_ratio=0.0), law="st_venant_kirchhoff"
     )
@@ -385,7 +385,7 @@ def test_elastic_energy_and_stress_are_those_of_the_material():
 def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
     """Where directions differ eightfold."""
     mesh, rng = sphere(1.0, 2), np.random.default_rng(4)
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(
         mesh, AnisotropicMaterial(WOOD, 1000, 200, damping_ratio=0.0), strain=strain, flips="recover"
     )
@@ -429,7 +429,7 @@ def test_a_beam_of_oblique_fibres_twists_aside_as_it_is_pulled_down(law):
         ("slanted", slant, "leapfrog", None),
         ("implicit", slant, "implicit_euler", 1),
     ):
-        world = World(gravity=(2.0, 0, 0), floor=None, integrator=integrator, tolerance=1e-5, retries=0)
+        world = bare_world(gravity=(2.0, 0, 0), floor=None, integrator=integrator, tolerance=1e-5, retries=0)
         material = AnisotropicMaterial(reed, 500.0, 40.0, frame, damping_ratio=0.0)
         body = world.add_body(mesh, material, law=law, pinned=held)
         world.build()
@@ -447,7 +447,7 @@ def test_both_schedules_and_plain_bodies_beside_move_the_same():
     mesh = sphere(0.3, 1)
     ends = []
     for schedule in ("per_body", "flat"):
-        world = World(gravity=(0, 0, -9.81), schedule=schedule, retries=0)
+        world = bare_world(gravity=(0, 0, -9.81), schedule=schedule, retries=0)
         wood = world.add_body(
             mesh, AnisotropicMaterial(WOOD, 500.0, 5.0, damping_ratio=0.0), position=(0, 0, 0.5)
         )

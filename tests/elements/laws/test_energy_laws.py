@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from taichi_soft import Material, OptionError, World, internal_forces
+from taichi_soft import Material, OptionError, internal_forces
+from taichi_soft.world.bare import bare_world
 
 LAWS = ("st_venant_kirchhoff", "neo_hookean")
 EACH_LAW = pytest.mark.parametrize("law", LAWS)
@@ -219,7 +220,7 @@ def test_a_neo_hookean_tetrahedron_rolls_back_to_its_shape_from_any_pose(seed, n
 def test_a_ringing_body_keeps_its_energy_without_damping(law, schedule):
     """Ten seconds in free flight: leapfrog keeps the sum within 2 %, up and down, with no trend."""
     mesh = oracle.MESHES["box"]
-    world = World(gravity=(0, 0, 0), floor=None, schedule=schedule, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, schedule=schedule, retries=0)
     body = world.add_body(mesh, Material(1e5, 0.4, 1000.0, damping_ratio=0.0), law=law)
     world.build()
     body.set_motion(mesh.vertices * (1.2, 0.9, 1.0), np.zeros_like(mesh.vertices))
@@ -239,7 +240,7 @@ def test_the_energy_of_a_body_is_that_of_the_equations(law):
     mesh = oracle.MESHES["box"]
     rng = np.random.default_rng(5)
     material = oracle.uneven_material(mesh, rng)
-    world = World(floor=None, retries=0)
+    world = bare_world(floor=None, retries=0)
     body = world.add_body(mesh, material, law=law)
     world.build()
     assert body.elastic_energy() == pytest.approx(0, abs=1e-3)

@@ -13,12 +13,12 @@ from taichi_soft import (
     ParticleMesh,
     Stiffness,
     TetMesh,
-    World,
     box,
     frames_along,
     internal_forces,
 )
 from taichi_soft.core.serialisation import as_plain, from_plain
+from taichi_soft.world.bare import bare_world
 
 WOOD = Stiffness.orthotropic((10e9, 1e9, 0.6e9), (0.4, 0.35, 0.3), (0.1e9, 0.6e9, 0.7e9))
 CUBE = box((1, 1, 1), (1, 1, 1))
@@ -153,7 +153,7 @@ def test_constants_for_another_mesh_are_refused(material, message):
 
 @pytest.mark.parametrize("law", ["neo_hookean", "springs", "volume_springs", "cmpm2"])
 def test_laws_that_know_no_direction_refuse_it_and_name_those_that_do(law):
-    world = World()
+    world = bare_world()
     message = f"does not support law '{law}', .*'virial', 'face' or 'st_venant_kirchhoff'"
     with pytest.raises(MaterialError, match=message):
         world.add_body(CUBE, AnisotropicMaterial(WOOD, 500.0), law=law)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from taichi_soft import World
+from taichi_soft.world.bare import bare_world
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -16,7 +16,7 @@ def flight():
     """Builds a world of one body in a given motion. Returns both."""
 
     def build(mesh, material, x=None, v=None, integrator="leapfrog", gravity=(0, 0, 0), **options):
-        world = World(gravity=gravity, floor=None, integrator=integrator, retries=0)
+        world = bare_world(gravity=gravity, floor=None, integrator=integrator, retries=0)
         body = world.add_body(mesh, material, **options)
         world.build()
         x = mesh.vertices if x is None else x

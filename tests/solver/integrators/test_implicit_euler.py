@@ -13,7 +13,6 @@ from taichi_soft import (
     ParticleMesh,
     SolverWarning,
     SpringMaterial,
-    World,
     box,
     cloth,
     cloth_constants,
@@ -22,12 +21,13 @@ from taichi_soft import (
     rope,
     sphere,
 )
+from taichi_soft.world.bare import bare_world
 
 pytestmark = pytest.mark.soak
 
 
 def make_world(mesh, material, *, floor=None, integrator="implicit_euler", **options):
-    world = World(floor=floor, integrator=integrator, **options.pop("world", {}))
+    world = bare_world(floor=floor, integrator=integrator, **options.pop("world", {}))
     body = world.add_body(mesh, material, **options)
     world.build()
     return world, body
@@ -169,7 +169,7 @@ def test_a_step_in_one_piece_does_not_depend_on_how_others_fare(law, damping_mod
     noise = np.random.default_rng(1).normal(size=ball.vertices.shape)
     paths = []
     for places in ((0,), (0, -3, 3)):
-        world = World(integrator="implicit_euler")
+        world = bare_world(integrator="implicit_euler")
         options = {"law": law, "damping_model": damping_model}
         bodies = {  # from left to right, so that the calm one is neither the first nor the last
             x: world.add_body(ball, SOFT, position=(x, 0, 3 if x else 0.5), **options) for x in sorted(places)
@@ -340,7 +340,7 @@ def test_momentum_is_kept_in_flight_and_ringing_fades():
 def test_the_same_input_gives_the_same_bits(law):
     rows = []
     for _ in range(2):
-        world = World(integrator="implicit_euler")
+        world = bare_world(integrator="implicit_euler")
         for i in range(2):
             world.add_body(
                 sphere(0.5, 1),
@@ -462,7 +462,7 @@ def test_a_rope_swings_from_a_pin_and_falls_into_line_without_substeps():
 )
 def test_options_out_of_range_are_refused(options, text):
     with pytest.raises(OptionError, match=text):
-        World(integrator="implicit_euler", **options)
+        bare_world(integrator="implicit_euler", **options)
 
 
 def test_one_step_a_frame_is_what_it_needs():

@@ -10,7 +10,6 @@ from taichi_soft import (
     Material,
     TaichiSoftError,
     UnstableStepWarning,
-    World,
     beam,
     box,
     sphere,
@@ -18,6 +17,7 @@ from taichi_soft import (
     torus,
 )
 from taichi_soft.elements.laws import element_model
+from taichi_soft.world.bare import bare_world
 
 MESHES = {
     "box": box((1.0, 0.6, 0.8), (2, 1, 2)),
@@ -100,7 +100,7 @@ def test_the_stiffest_tetrahedron_is_the_one_to_blame():
 
 def amplitudes(mesh, material, h, steps, seed=0):
     """Largest displacement during the run, as a multiple of that at its start; inf if the body was frozen."""
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, material)
     world.build()
     noise = 1e-4 * np.random.default_rng(seed).normal(size=mesh.vertices.shape)
@@ -128,7 +128,7 @@ def test_a_world_is_stable_below_the_limit_and_blows_up_above_it(name, damping):
 
 def test_a_world_warns_of_a_substep_above_the_limit_and_keeps_to_it_by_itself():
     mesh = MESHES["sphere"]
-    world = World(gravity=(0, 0, 0), floor=None, retries=0)
+    world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, SOFT)
     world.build()
     limit = stable_step(mesh, SOFT, VIRIAL).limit
