@@ -11,6 +11,7 @@ from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_colli
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
+from taichi_soft.control.kernels.embedding import embed_points
 from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
@@ -69,6 +70,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)
     found["shape_patch"] = _example(shape_patch)
+    found["embed_points"] = _example(embed_points)
     found["forget_collider"] = _example(forget_collider, contact=state.contact)
     found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}

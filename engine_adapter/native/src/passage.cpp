@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "barycentric.hpp"
 #include "fitting.hpp"
 
 namespace taichi_soft {
@@ -38,6 +37,10 @@ double sum_of(const double* numbers, size_t count, size_t stride) {
 
 double sum_of(const Numbers& numbers) { return 0.0 + sum_of(numbers.data(), numbers.size(), 1); }
 
+Vector difference(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
 Vector plus(const Vector& a, const Vector& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Vector over(const Vector& a, double number) { return {a[0] / number, a[1] / number, a[2] / number}; }
 

@@ -265,7 +265,9 @@ class World {
   void hold_at(size_t number, const Vector& place);
   std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
   Vector vertex_place(int32_t slot, int32_t vertex) const;
-  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
+  std::vector<Holder> embedded(const std::vector<Vector>& points, const double* x, size_t count,
+                               const Archive::View<int32_t>& tets);
+  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other);
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
   double follow_speed(int32_t slot, std::vector<int32_t> held) const;
   size_t joint_of(ts_joint joint) const;  // index of a joint

@@ -1,9 +1,7 @@
 // Levels of detail, the same as taichi_soft/levels/level_change.py and reattaching.py.
 
 #include <algorithm>
-#include <limits>
 
-#include "barycentric.hpp"
 #include "error.hpp"
 #include "world.hpp"
 
@@ -268,23 +266,11 @@ Vector World::rest_point_of_grab(size_t g) const {
 void World::hold_at(size_t g, const Vector& place) {
   const int32_t slot = grab_body_(g) - 1;
   const Asset& asset = asset_of(slot);
-  const int32_t* corners = asset.tets.data;
-  std::array<double, 4> weights{};
-  double highest = -std::numeric_limits<double>::infinity();
-  for (size_t t = 0; t + 4 <= asset.tets.count; t += 4) {
-    Vector places[4];
-    for (size_t i = 0; i < 4; ++i) {
-      for (size_t k = 0; k < 3; ++k) places[i][k] = asset.vertices[3 * size_t(asset.tets[t + i]) + k];
-    }
-    const std::array<double, 4> shares = Coordinates(places).of(place);
-    const double least = *std::min_element(shares.begin(), shares.end());
-    if (!(least > highest)) continue;
-    highest = least, weights = shares, corners = asset.tets.data + t;
-  }
-  const Patch patch = patch_around(asset, corners, weights.data(), 4);
+  const Holder at = embedded({place}, asset.vertices.data, asset.vertex_count(), asset.tets)[0];
+  const Patch patch = patch_around(asset, at.vertices, at.weights, 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
-    grab_weights_(g, i) = as_float(weights[i]);
+    grab_corners_(g, i) = int32_t(particle(slot, size_t(at.vertices[i])));
+    grab_weights_(g, i) = as_float(at.weights[i]);
   }
   grab_limits_(g, 0) = std::min(grab_limits_(g, 1), as_float(patch.strength));
   write_patch(g, slot, patch);
