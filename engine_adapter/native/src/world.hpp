@@ -251,6 +251,8 @@ class World {
   void read_levels();
   bool are_held(int32_t slot, const std::vector<int32_t>& vertices) const;
   void write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status);
+  Motion mapped(const Motion& before, const Asset& source, const Asset& target, const Passage& over,
+                const std::vector<int32_t>& held);
   void write_kind(int32_t slot);
   void refill(int32_t slot, int32_t level);
   void require_change(int32_t slot, int32_t level, bool may_release) const;
@@ -274,7 +276,7 @@ class World {
   size_t joint_rows() const;              // number of particles of all joints
   void end_joint(size_t number);
   void joints_have_changed();
-  Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const;
+  Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
   std::vector<MotorRow> motors() const;
   void write_motors(const std::vector<MotorRow>& rows);
   void mark_driven();

@@ -1,6 +1,7 @@
 """Embedding of points in tetrahedra, in 64-bit floats."""
 
-from taichi_soft.control.kernels.grab_patch import dot, row_at
+from taichi_soft.control.kernels.grab_patch import dot
+from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
 
 
@@ -27,15 +28,15 @@ def embed_points(
             for k in ti.static(range(4)):
                 corners[i, k], weights[i, k] = 0, -1e30
         for t in range(tets.shape[0]):
-            start = row_at(x, tets[t, 0])
-            a, b, c = row_at(x, tets[t, 1]), row_at(x, tets[t, 2]), row_at(x, tets[t, 3])
+            start = row_at(x, tets[t, 0], 0)
+            a, b, c = row_at(x, tets[t, 1], 0), row_at(x, tets[t, 2], 0), row_at(x, tets[t, 3], 0)
             a, b, c = a - start, b - start, c - start
             bc, ca, ab = b.cross(c), c.cross(a), a.cross(b)
             volume6 = dot(a, bc)
             if ti.abs(volume6) > 1e-30:
                 bc, ca, ab = bc / volume6, ca / volume6, ab / volume6
                 for i in range(points.shape[0]):
-                    arm = row_at(points, i) - start
+                    arm = row_at(points, i, 0) - start
                     rest = ti.Vector([dot(bc, arm), dot(ca, arm), dot(ab, arm)])
                     found = ti.Vector([1.0 - (rest.x + rest.y + rest.z), rest.x, rest.y, rest.z])
                     least = ti.min(weights[i, 0], weights[i, 1], weights[i, 2], weights[i, 3])

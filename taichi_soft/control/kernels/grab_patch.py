@@ -1,13 +1,8 @@
 """The part of a body that a grab holds, in 64-bit floats."""
 
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
+from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
-
-
-@ti.func
-def row_at(rows: ti.template(), i):
-    """Row of an array (n, 3)."""
-    return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
 
 
 @ti.func
@@ -51,8 +46,8 @@ def _square_of_slope(x: ti.template(), elements: ti.template(), patch: ti.templa
             is_near = is_near or patch[elements[e, i + 1], 0] != 0.0
     square = rise.x * rise.x
     if elements.shape[1] == 4 and is_near:
-        start = row_at(x, first)
-        a, b, c = row_at(x, elements[e, 1]), row_at(x, elements[e, 2]), row_at(x, elements[e, 3])
+        start = row_at(x, first, 0)
+        a, b, c = row_at(x, elements[e, 1], 0), row_at(x, elements[e, 2], 0), row_at(x, elements[e, 3], 0)
         a, b, c = a - start, b - start, c - start
         bc, ca, ab = b.cross(c), c.cross(a), a.cross(b)
         slope = (rise.x * bc + rise.y * ca + rise.z * ab) / dot(a, bc)
@@ -91,12 +86,12 @@ def shape_patch(
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        point, lower, upper = ti.Vector.zero(ti.f64, 3), row_at(x, 0), row_at(x, 0)
+        point, lower, upper = ti.Vector.zero(ti.f64, 3), row_at(x, 0, 0), row_at(x, 0, 0)
         for i in range(corners.shape[0]):
-            point += weights[i] * row_at(x, corners[i])
+            point += weights[i] * row_at(x, corners[i], 0)
         for v in range(x.shape[0]):
-            lower, upper = ti.min(lower, row_at(x, v)), ti.max(upper, row_at(x, v))
-            arm = row_at(x, v) - point
+            lower, upper = ti.min(lower, row_at(x, v, 0)), ti.max(upper, row_at(x, v, 0))
+            arm = row_at(x, v, 0) - point
             patch[v, 0] = ti.sqrt(dot(arm, arm))
         farthest, size = ti.cast(0.0, ti.f64), upper - lower
         for i in range(corners.shape[0]):
