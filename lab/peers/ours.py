@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import Drop
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 from taichi_soft import Material, World
 
 
-def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate the drop."""
     material = Material(drop.young, drop.poisson, drop.density, damping=0.0, damping_ratio=0.0)
 

@@ -22,7 +22,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.fracture.kernels.topology import read_motion, write_body, write_kind, write_touching
-from taichi_soft.levels.map_motion import map_motion
+from taichi_soft.levels.kernels.map_motion import map_motion
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
@@ -73,8 +73,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found["shape_patch"] = _example(shape_patch)
     found["embed_points"] = _example(embed_points)
     found["find_rest_axis"] = _example(find_rest_axis)
-    found["forget_collider"] = _example(forget_collider, contact=state.contact)
-    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
+    found["forget_collider"] = _example(forget_collider, contact=state.colliders)
+    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.colliders)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)

@@ -4,7 +4,7 @@ import numpy as np
 
 from taichi_soft import Material, World, box, force_gradient, internal_forces
 from taichi_soft.profiling.implicit import measure_implicit
-from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.sparse import SparseBody
 
 MESH = box((1.0, 0.8, 0.6), (2, 2, 2))

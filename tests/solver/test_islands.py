@@ -58,12 +58,12 @@ def connected(slots, pairs):
 
 def listed(world):
     """The islands as the step finds them. Checks that each body knows its own."""
-    contact = world._built.state.contact
-    count = contact.island_count[None]
-    first, rows = contact.island_first.to_numpy()[: count + 1], contact.island_body.to_numpy()
+    fields = world._built.state.islands
+    count = fields.count[None]
+    first, rows = fields.first.to_numpy()[: count + 1], fields.body.to_numpy()
     assert first[0] == 0
     islands = [rows[start:end].tolist() for start, end in pairwise(first)]
-    number = contact.body_island.to_numpy()
+    number = fields.of_body.to_numpy()
     for island, bodies in enumerate(islands):
         assert (number[bodies] == island).all()
     return islands
