@@ -22,7 +22,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.fracture.kernels.topology import read_motion, write_body, write_kind, write_touching
-from taichi_soft.levels.kernels import map_motion
+from taichi_soft.levels.kernels.map_motion import map_motion
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands

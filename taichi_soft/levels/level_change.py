@@ -28,7 +28,7 @@ from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
-from taichi_soft.levels.kernels import INV_MASS, map_motion
+from taichi_soft.levels.kernels.map_motion import INV_MASS, map_motion
 from taichi_soft.levels.passage import Passage, passage
 from taichi_soft.levels.reattaching import Reattachments, reattachments_at, update_handles, write_targets
 

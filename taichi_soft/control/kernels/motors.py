@@ -19,7 +19,7 @@ import numpy as np
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.eigen import symmetric_eigen
-from taichi_soft.core.math.fitting import fitting_motion, kept
+from taichi_soft.core.math.rigid_fit import fitting_motion, kept
 from taichi_soft.core.math.rows import row_at, row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti

@@ -1,6 +1,6 @@
 """Kernel that maps the motion of a body to another level of detail, in 64-bit floats."""
 
-from taichi_soft.core.math.fitting import fitting_motion, kept
+from taichi_soft.core.math.rigid_fit import fitting_motion, kept
 from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
 

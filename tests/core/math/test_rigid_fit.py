@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_soft.core.math.fitting import fitting_motion
+from taichi_soft.core.math.rigid_fit import fitting_motion
 from taichi_soft.core.runtime import init, ti
 
 RNG = np.random.default_rng(4)
