@@ -47,9 +47,9 @@ class Clip:
 
     def add(self, positions: Floats32, normals: Floats32) -> None:
         """Append the next frame."""
-        if self.positions and np.array_equal(positions, self.positions[-1]):
-            if np.array_equal(normals, self.normals[-1]):
-                positions, normals = self.positions[-1], self.normals[-1]
+        is_same = self.positions and np.array_equal(positions, self.positions[-1])
+        if is_same and np.array_equal(normals, self.normals[-1]):
+            positions, normals = self.positions[-1], self.normals[-1]
         self.positions.append(positions)
         self.normals.append(normals)
 

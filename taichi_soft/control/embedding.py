@@ -1,4 +1,4 @@
-"""Embedded points, which follow the vertices of a tetrahedron. Numpy only."""
+"""Embedded points, which follow the vertices of a tetrahedron."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.control.kernels.embedding import embed_points
 from taichi_soft.core.errors import OptionError
-from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 
 Floats = NDArray[np.float64]
 
@@ -38,25 +38,22 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
             "vertices in onto"
         )
     positions = body.positions().astype(np.float64)
-    corners = positions[body.tets]
-    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
-    is_solid = np.abs((a * np.cross(b, c)).sum(axis=1)) > 1e-30
-    tets, starts, inverses = body.tets[is_solid], corners[is_solid, 0], edge_inverses(corners[is_solid])
-    weights = np.empty((len(points), 4))
-    chosen = np.zeros(len(points), dtype=np.int64)
-    for i, point in enumerate(points):
-        found = shares_by(inverses, point - starts)
-        least = found.min(axis=1) if len(found) else np.array([-np.inf])
-        chosen[i] = np.argmax(least)
-        if not least[chosen[i]] >= FARTHEST:
-            nearest = np.linalg.norm(positions - point, axis=1).min()
-            raise OptionError(
-                f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
-                "move the two together first, or give vertices in onto"
-            )
-        weights[i] = found[chosen[i]]
+    corners, weights = embedded(points, positions, body.tets)
+    for i in np.flatnonzero(weights.min(axis=1) < FARTHEST):
+        nearest = np.linalg.norm(positions - points[i], axis=1).min()
+        raise OptionError(
+            f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
+            "move the two together first, or give vertices in onto"
+        )
     weights[np.abs(weights) < 1e-4] = 0.0  # rounding must not involve other vertices
-    return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
+    return Places(corners, weights / weights.sum(axis=1, keepdims=True))
+
+
+def embedded(points: Floats, x: Floats, tets: NDArray[np.int32]) -> tuple[NDArray[np.int32], Floats]:
+    """Vertices and barycentric coordinates of points (k, 3) in tetrahedra: see `embed_points`."""
+    corners, weights = np.empty((len(points), 4), dtype=np.int32), np.empty((len(points), 4))
+    embed_points(points, x, tets, corners, weights)
+    return corners, weights
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:

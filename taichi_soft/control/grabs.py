@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of
 from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of
+from taichi_soft.control.embedding import embedded
 from taichi_soft.control.grab_patch import Patch, patch_around, point_between
 from taichi_soft.control.kernels.grabs import (
     ALL_GRABS,
@@ -32,7 +33,6 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
-from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, vector_of
 
@@ -119,6 +119,8 @@ class Grabs(Numbered[Grab]):
             grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)
             grab.move(grab.point)
             _ = grab.force
+            if len(body.tets):
+                hold_at(grab, place_of(grab))
             grab.release()
 
     def entries(self) -> list[list[Any]]:
@@ -216,7 +218,7 @@ def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
     Target, spring, largest force and the force of the last substep are kept.
     """
     body, (_, row) = grab.body, _read(grab)
-    corners, weights = _tetrahedron_at(body, place)
+    (corners,), (weights,) = embedded(place[None], body.mesh.vertices, body.tets)
     patch = patch_around(record_of(body).description, corners, weights)
     on_patch, strongest = LIMITS.start, LIMITS.start + 1
     row[PLACE], row[on_patch] = weights, min(row[strongest], patch.strength)
@@ -235,13 +237,3 @@ def _write(
 ) -> None:
     rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
     change(body, write_grab, number, body.index, rows_of(body, corners), row, rows, shares)
-
-
-def _tetrahedron_at(
-    body: SoftBody, place: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Corners and barycentric coordinates of a point of the rest shape, (4,) each. A point outside uses the
-    tetrahedron that it is least outside of."""
-    weights = barycentric(place, body.mesh.vertices[body.tets])
-    best = weights.min(axis=1).argmax()
-    return body.tets[best], weights[best]

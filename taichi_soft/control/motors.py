@@ -10,13 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.change import change, named_particles, numbers, require_per_body, rows_of
+from taichi_soft.control.change import (
+    change,
+    mass_of,
+    named_particles,
+    numbers,
+    require_per_body,
+    rows_of,
+)
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
     MOTOR_ROWS,
     USED_MOTORS,
+    find_rest_axis,
     forget_impulse,
     read_speed,
     write_drive,
@@ -28,7 +35,6 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.math.rotations import length_of
-from taichi_soft.core.residue import kept
 from taichi_soft.core.serialisation import below, indices_below, vector_of
 
 LARGEST_LIMIT = 1e12
@@ -171,6 +177,8 @@ class Motors(Numbered[Motor]):
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Add a motor to a body, and read its effort."""
+        with contextlib.suppress(OptionError):  # one particle has no width, but the kernel is compiled
+            _rest_axis(body, np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, 1.0]))
         with contextlib.suppress(StateError):  # all motors are in use, so the kernels are compiled
             motor = self.add(body, [0], (0.0, 0.0, 1.0), 0.0, None, 0.0, True, None)
             motor.set_speed(1.0)
@@ -281,12 +289,9 @@ class Motors(Numbered[Motor]):
             )
         place = None if point is None else as_vector(point, "point", "m")
         require_per_body(context, "motors")
-        positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
         drive = Drive(turns, stays, direction / length, place, wanted, limit)
         if not stays:
-            rest = body.mesh.vertices[vertices]
-            _require_width(rest, masses)
-            drive.axis = kept(best_fitting_pose(rest, positions, masses).rotation.T @ drive.axis)
+            drive.axis = _rest_axis(body, vertices, drive.axis)
         free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > MOTOR_ROWS:
@@ -312,11 +317,17 @@ def _as_limit(limit: Any, name: str) -> float:
     return as_number(limit, name, 0.0, LARGEST_LIMIT, f"a number from 0 to {LARGEST_LIMIT:g}")
 
 
-def _require_width(rest: NDArray[np.float64], masses: NDArray[np.float64]) -> None:
-    """Raise an OptionError if particles are on a line, so that their rotation about it is undefined."""
-    arms = (rest - masses @ rest / masses.sum()) * np.sqrt(masses)[:, None]
-    spreads = np.linalg.svd(arms, compute_uv=False)
-    if len(spreads) < 2 or not spreads[1] > THINNEST * spreads[0]:
+def _rest_axis(body: SoftBody, vertices: NDArray[np.int32], axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Axis in the rest state, of particles that have rotated since.
+
+    Raises: OptionError if particles are on a line, so that their rotation about it is undefined.
+    """
+    rest, now = body.mesh.vertices[vertices], body.positions()[vertices].astype(np.float64)
+    found = np.empty(4)
+    weights = body.masses[vertices] / mass_of(body, vertices)
+    find_rest_axis(rest, now, weights, axis, found)
+    if not found[3] > THINNEST:
         raise OptionError(
             "particles are on a line, so an axis cannot rotate with them: give more, or set is_fixed=True"
         )
+    return found[:3]

@@ -11,16 +11,18 @@ from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_colli
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
+from taichi_soft.control.kernels.embedding import embed_points
 from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
-from taichi_soft.control.kernels.motors import read_speed
+from taichi_soft.control.kernels.motors import find_rest_axis, read_speed
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
 from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.fracture.kernels.topology import read_motion, write_body, write_kind, write_touching
+from taichi_soft.levels.kernels.map_motion import map_motion
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
@@ -69,6 +71,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)
     found["shape_patch"] = _example(shape_patch)
+    found["embed_points"] = _example(embed_points)
+    found["find_rest_axis"] = _example(find_rest_axis)
     found["forget_collider"] = _example(forget_collider, contact=state.colliders)
     found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.colliders)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
@@ -80,6 +84,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found["wake_near"] = _example(wake_near, state=state)
     if any(asset.coarser for asset in context.slots.kinds):
         found |= {name: _example(kernel, state=state) for name, kernel in _OF_LEVELS.items()}
+        found["map_motion"] = _example(map_motion)
         if program.has_soft_contact:
             found["mark_placed"] = _example(mark_placed, state=state)
         if state.capacity.contact.hull:

@@ -26,22 +26,14 @@ from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.checks import as_count, as_flag
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle
-from taichi_soft.core.math.barycentric import edge_inverses, shares_by
-from taichi_soft.core.math.rotations import turned
-from taichi_soft.core.residue import kept, weighted_sum
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
+from taichi_soft.levels.kernels.map_motion import INV_MASS, map_motion
 from taichi_soft.levels.passage import Passage, passage
 from taichi_soft.levels.reattaching import Reattachments, reattachments_at, update_handles, write_targets
-from taichi_soft.levels.rigid_fit import fitting_motion, moments
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-POSITION, VELOCITY, EARLIER_POSITION, EARLIER_VELOCITY = (slice(k, k + 3) for k in (0, 3, 6, 9))
-INV_MASS, MASS, AIM = 12, 15, 16
-TARGET, PUSH = slice(17, 20), slice(20, 23)
-"""Columns of `read_motion`."""
 
 
 def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
@@ -145,71 +137,14 @@ def _reattach(
 
 def _mapped_rows(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:
     """Rows of `read_motion` for the vertices of the new level. Args: held: vertices that are pinned."""
-    old = motion[:, MASS]
-    rows = np.zeros((len(masses), MOTION_WIDTH))
-    rows[:, :INV_MASS] = over(motion[:, :INV_MASS])
-    rows[:, MASS], rows[:, INV_MASS] = masses, 1.0 / masses
+    is_pinned, nearest = motion[:, INV_MASS] == 0.0, np.full(len(masses), -1, dtype=np.int32)
     if len(held):
-        _pin(over, motion, rows, held)
-    else:  # the momentum of a held body is not conserved
-        for x, v in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
-            _preserve_momentum(motion[:, x], motion[:, v], old, rows[:, x], rows[:, v], masses)
-    center = weighted_sum(old, motion[:, POSITION]) / old.sum()
-    force = motion[:, PUSH]
-    torque = np.cross(motion[:, POSITION] - center, force).sum(axis=0)
-    rows[:, PUSH] = masses[:, None] * _rigid(rows[:, POSITION] - center, masses, force.sum(axis=0), torque)
+        sources = np.flatnonzero(is_pinned)
+        nearest[held] = sources[over.nearest_sources(held, sources)]
+    rows = np.empty((len(masses), MOTION_WIDTH))
+    weights = is_pinned / max(int(is_pinned.sum()), 1)
+    map_motion(motion, *over.rows.values(), masses, *over.vertices, weights, nearest, rows)
     return rows
-
-
-def _pin(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
-    """Pin vertices in the state of the nearest vertices that are pinned in the old level.
-
-    The pinned vertices follow the rigid motion that fits the old ones best, plus the deviation of the nearest
-    old one from it. So their arrangement does not drift over repeated changes of level.
-    """
-    sources = np.flatnonzero(motion[:, INV_MASS] == 0.0)
-    nearest = sources[over.nearest_sources(held, sources)]
-    before, after = over.vertices
-    for columns in (POSITION, EARLIER_POSITION):
-        rotation, translation = (
-            kept(each) for each in fitting_motion(before[sources], motion[sources, columns])
-        )
-        deviation = motion[nearest, columns] - (turned(before[nearest], rotation) + translation)
-        rows[held, columns] = turned(after[held], rotation) + translation + deviation
-    rows[held, INV_MASS] = 0.0
-    rows[held, VELOCITY] = motion[nearest, VELOCITY]
-    rows[held, AIM] = motion[nearest, AIM]
-    rows[held, TARGET] = motion[nearest, TARGET] + rows[held, POSITION] - motion[nearest, POSITION]
-
-
-def _preserve_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats, masses: Floats) -> None:
-    """Shift `new_x` and change `new_v` to the centre, momentum and angular momentum of `x` and `v`."""
-    center = weighted_sum(m, x) / m.sum()
-    new_x += center - weighted_sum(masses, new_x) / masses.sum()
-    offsets = new_x - center
-    momentum = weighted_sum(m, v) - weighted_sum(masses, new_v)
-    new_v += _rigid(
-        offsets,
-        masses,
-        momentum,
-        _angular_momentum(x - center, v, m) - _angular_momentum(offsets, new_v, masses),
-    )
-
-
-def _rigid(offsets: Floats, masses: Floats, momentum: Floats, angular_momentum: Floats) -> Floats:
-    """Velocities (n, 3) of the rigid motion with a momentum and an angular momentum about the centre of mass.
-
-    Or accelerations, from a force and a torque.
-
-    Args: offsets: positions of the particles about the centre of mass [m], (n, 3).
-    """
-    offsets = offsets - weighted_sum(masses, offsets) / masses.sum()
-    second_moments = moments(masses, offsets, offsets)
-    # The small increase keeps the inertia regular where all particles lie on one line.
-    inertia = np.trace(second_moments) * (1.0 + 1e-9) * np.eye(3) - second_moments
-    a, b, c = shares_by(edge_inverses(np.vstack([np.zeros(3), inertia])), angular_momentum)[1:]
-    cross_matrix = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # angular velocity x r = cross_matrix @ r
-    return np.asarray(momentum / masses.sum() + turned(offsets, cross_matrix))
 
 
 def _finest_held(body: SoftBody) -> Ints | None:
@@ -230,9 +165,3 @@ def _nearest_at(body: SoftBody, finest: Ints | None, level: int) -> Ints:
     if finest is None:
         return np.zeros(0, dtype=np.int64)
     return np.unique(finest if level == 0 else passage(body.asset, 0, level).nearest(finest))
-
-
-def _angular_momentum(offsets: Floats, v: Floats, masses: Floats) -> Floats:
-    """Sum of m r x v, (3,) [kg m^2/s]."""
-    products = moments(masses, offsets, v)
-    return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])

@@ -31,20 +31,13 @@ class Passage:
         corners = mesh.tets[tets]
         interpolated = (coordinates[:, :, None] * mesh.vertices[corners]).sum(axis=1)
         offsets = (2.0 * targets - interpolated)[:, None] - mesh.vertices[corners]
-        self._sources, self._begins, self._weights = _weights(mesh, corners, coordinates, 0.5 * offsets)
+        sources, begins, weights = _weights(mesh, corners, coordinates, 0.5 * offsets)
         self.vertices = source.mesh.vertices, targets  # of source and target, at rest [m]
-
-    def __call__(self, rows: Floats) -> Floats:
-        """Map rows of the source's vertices, for example positions, (n, q), to the target's, (k, q)."""
-        return np.add.reduceat(rows[self._sources] * self._weights[:, None], self._begins, axis=0)
-
-    @property
-    def rows(self) -> dict[str, NDArray[Any]]:
-        """The map as arrays: source vertices and weights; those of each target vertex start at `begins`."""
-        return {
-            "sources": self._sources.astype(np.int32),
-            "begins": self._begins.astype(np.int32),
-            "weights": self._weights,
+        # Source vertices and weights; those of each target vertex start at `begins`.
+        self.rows: dict[str, NDArray[Any]] = {
+            "sources": sources.astype(np.int32),
+            "begins": begins.astype(np.int32),
+            "weights": weights,
         }
 
     def nearest(self, vertices: Ints) -> Ints:

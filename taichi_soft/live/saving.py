@@ -16,7 +16,7 @@ import numpy as np
 from taichi_soft.core.errors import StateError
 from taichi_soft.live.drawn import Drawn
 from taichi_soft.live.frame_file import Frame
-from taichi_soft.live.scene import Scene, SceneSource
+from taichi_soft.live.scene import SceneSource
 
 _RESTORED = """\
 
@@ -91,7 +91,7 @@ class Recent:
         return list(self._rows)
 
 
-def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:
+def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn) -> None:
     """Write the input of `film_file`: meshes, and frames of their current version."""
     header, arrays = drawn.described()
     own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]

@@ -327,7 +327,7 @@ class Simulation:
         """Write the frames of the last seconds for a film."""
         path = self.folder / f"film{number}.npz"
         try:
-            film_frames(path, self.recent.rows(), self.drawn, self.scene)
+            film_frames(path, self.recent.rows(), self.drawn)
         except Exception:
             self.connection.send(("filmed", number, ""))
             raise

@@ -27,9 +27,8 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
     if "baseline" in found:
         table = _table("law", "element", "tetrahedra", "Taichi", "C++", "ratio least", "median", "most")
         for r in found["baseline"]:
-            ratios = [f"{x:.2f}" for x in (r.ratio.least, r.ratio.median, r.ratio.most)]
             times = f"{r.taichi.median:.1f}", f"{r.native.median:.1f}"
-            table.add_row(r.law, r.element, f"{r.tets:,}", *times, *ratios)
+            table.add_row(r.law, r.element, f"{r.tets:,}", *times, *_ratios(r.ratio))
         yield "Against plain C++ on one thread [ns per element and substep, median]", table
     if "crossover" in found:
         rows = [(r.tets, r.flat, r.per_body, r.ratio) for r in found["crossover"]]
@@ -41,8 +40,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         table = _table("substeps", "threads", "one thread", "all threads", "least", "speed-up", "most")
         for row in found["scaling"]:
             times = f"{row.single.median:.2f}", f"{row.parallel.median:.2f}"
-            gains = [f"{x:.2f}" for x in (row.speedup.least, row.speedup.median, row.speedup.most)]
-            table.add_row(str(row.substeps), str(row.threads), *times, *gains)
+            table.add_row(str(row.substeps), str(row.threads), *times, *_ratios(row.speedup))
         yield "64 spheres on several threads [ms]", table
     if "devices" in found:
         table = _table("bodies", "tetrahedra", "CPU", "GPU", "gain least", "median", "most")
@@ -55,8 +53,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         for row in found["implicit"]:
             steps = f"{row.step * 1e3:.3g}", f"{row.other_step * 1e3:.3g}"
             times = f"{row.implicit.median:.0f}", f"{row.other.median:.0f}"
-            gains = [f"{x:.1f}" for x in (row.gain.least, row.gain.median, row.gain.most)]
-            table.add_row(row.name, *steps, *times, *gains)
+            table.add_row(row.name, *steps, *times, *_ratios(row.gain, 1))
         yield "Implicit Euler, time to simulate one second", table
     if "startup" in found:
         table = _table("world", "kernel cache", "first frame", "all warm")
@@ -139,8 +136,8 @@ def _table(*columns: str) -> Table:
     return table
 
 
-def _ratios(spread: Spread) -> list[str]:
-    return [f"{x:.2f}" for x in (spread.least, spread.median, spread.most)]
+def _ratios(spread: Spread, digits: int = 2) -> list[str]:
+    return [f"{x:.{digits}f}" for x in (spread.least, spread.median, spread.most)]
 
 
 def _cells(spread: Spread, digits: int) -> list[str]:
@@ -203,6 +200,5 @@ def _late_cells(spread: Spread | None) -> str:
 def _ratio_table(names: tuple[str, str], rows: list[tuple[int, Spread, Spread, Spread]]) -> Table:
     table = _table("tetrahedra", *names, "ratio least", "ratio median", "ratio most")
     for tets, one, other, ratio in rows:
-        ratios = [f"{x:.2f}" for x in (ratio.least, ratio.median, ratio.most)]
-        table.add_row(f"{tets:,}", f"{one.median:.1f}", f"{other.median:.1f}", *ratios)
+        table.add_row(f"{tets:,}", f"{one.median:.1f}", f"{other.median:.1f}", *_ratios(ratio))
     return table

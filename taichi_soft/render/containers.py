@@ -103,7 +103,7 @@ class Stream(Container):
         self._ffmpeg.kill()
 
 
-class Gif(Container):
+class Gif(Stream):
     """.gif. Frames are stored losslessly on disk until the palette is known."""
 
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
@@ -115,25 +115,12 @@ class Gif(Container):
         self._path, self._list = folder / f"film{suffix}", folder / "list"
         self._ffmpeg = Ffmpeg([*_frames_of(fps, size), *LOSSLESS, self._frames])
 
-    @property
-    def files(self) -> list[Path]:
-        return [self._path]
-
-    def write(self, frame: Frame) -> None:
-        self._ffmpeg.write(frame)
-
     def finish(self) -> None:
-        self._ffmpeg.finish()
+        super().finish()
         look = ["-vf", "palettegen=reserve_transparent=0", "-update", "1"]
         run_ffmpeg(["-i", self._frames, *look, self._palette])
         draw = ["-lavfi", DITHER, "-fps_mode", "passthrough", "-loop", "0"]
         run_ffmpeg(["-i", self._frames, "-i", self._palette, *draw, self._path])
-
-    def measure(self) -> Found:
-        return count_frames(self._path, self._list)
-
-    def abandon(self) -> None:
-        self._ffmpeg.kill()
 
 
 class Pictures(Container):

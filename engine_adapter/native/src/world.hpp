@@ -227,6 +227,8 @@ class World {
   void read_levels();
   bool are_held(int32_t slot, const std::vector<int32_t>& vertices) const;
   void write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status);
+  Motion mapped(const Motion& before, const Asset& source, const Asset& target, const Passage& over,
+                const std::vector<int32_t>& held);
   void write_kind(int32_t slot);
   void refill(int32_t slot, int32_t level);
   void require_change(int32_t slot, int32_t level, bool may_release) const;
@@ -241,14 +243,16 @@ class World {
   void hold_at(size_t number, const Vector& place);
   std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
   Vector vertex_place(int32_t slot, int32_t vertex) const;
-  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
+  std::vector<Holder> embedded(const std::vector<Vector>& points, const double* x, size_t count,
+                               const Archive::View<int32_t>& tets);
+  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other);
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
   double follow_speed(int32_t slot, std::vector<int32_t> held) const;
   size_t joint_of(ts_joint joint) const;  // index of a joint
   size_t joint_rows() const;              // number of particles of all joints
   void end_joint(size_t number);
   void joints_have_changed();
-  Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const;
+  Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
   std::vector<MotorRow> motors() const;
   void write_motors(const std::vector<MotorRow>& rows);
   void mark_driven();

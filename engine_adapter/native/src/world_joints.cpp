@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "barycentric.hpp"
 #include "error.hpp"
 #include "world.hpp"
 
@@ -22,50 +20,50 @@ Vector World::vertex_place(int32_t slot, int32_t vertex) const {
   return {fields_.particle_position(p, 0), fields_.particle_position(p, 1), fields_.particle_position(p, 2)};
 }
 
+// Points in the tetrahedra of `count` vertices at `x`, each in the one that it is in or least outside of.
+std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, const double* x, size_t count,
+                                           const Archive::View<int32_t>& tets) {
+  const uint32_t k = uint32_t(points.size());
+  const int32_t* corners = machine_->rows.room<int32_t>(4 * k);
+  const double* weights = machine_->found.room<double>(4 * k);
+  machine_->launch("embed_points",
+                   {Machine::array(points.data(), k, 3), Machine::array(x, uint32_t(count), 3),
+                    Machine::array(tets.data, uint32_t(tets.count / 4), 4), Machine::array(machine_->rows, k, 4),
+                    Machine::array(machine_->found, k, 4)});
+  std::vector<Holder> holders(k);
+  for (size_t i = 0; i < k; ++i) {
+    std::copy(corners + 4 * i, corners + 4 * i + 4, holders[i].vertices);
+    std::copy(weights + 4 * i, weights + 4 * i + 4, holders[i].weights);
+  }
+  return holders;
+}
+
 // Positions of vertices of `slot` in the tetrahedra of `other`, in their current shapes.
-std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const {
+std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
     fail(TS_ERROR_ARGUMENT,
          "the body in slot %d has no tetrahedra: join it to the other body instead, or give vertices in onto",
          other);
   }
-  std::vector<Coordinates> solids;
-  std::vector<const int32_t*> corners;
-  for (size_t t = 0; t + 4 <= tets.count; t += 4) {
-    Vector places[4];
-    for (int i = 0; i < 4; ++i) places[i] = vertex_place(other, tets[t + size_t(i)]);
-    const Coordinates found(places);
-    if (!found.is_solid()) continue;
-    solids.push_back(found);
-    corners.push_back(tets.data + t);
-  }
-  std::vector<Holder> holders;
-  for (int32_t vertex : vertices) {
-    const Vector point = vertex_place(slot, vertex);
-    Holder best{};
-    double highest = -std::numeric_limits<double>::infinity();
-    for (size_t t = 0; t < solids.size(); ++t) {
-      const std::array<double, 4> weights = solids[t].of(point);
-      const double least = *std::min_element(weights.begin(), weights.end());
-      if (!(least > highest)) continue;
-      highest = least;
-      std::copy(corners[t], corners[t] + 4, best.vertices);
-      std::copy(weights.begin(), weights.end(), best.weights);
-    }
-    if (!(highest >= kFarthest)) {
+  std::vector<Vector> points, x;
+  for (int32_t vertex : vertices) points.push_back(vertex_place(slot, vertex));
+  for (size_t v = 0; v < asset_of(other).vertex_count(); ++v) x.push_back(vertex_place(other, int32_t(v)));
+  std::vector<Holder> holders = embedded(points, x[0].data(), x.size(), tets);
+  for (size_t i = 0; i < holders.size(); ++i) {
+    auto& weights = holders[i].weights;
+    if (*std::min_element(weights, weights + 4) < kFarthest) {
       fail(TS_ERROR_ARGUMENT,
            "vertex %d of the body in slot %d is too far from the one in slot %d: move the two together first, or give "
            "vertices in onto",
-           vertex, slot, other);
+           vertices[i], slot, other);
     }
     double sum = 0.0;
-    for (double& each : best.weights) {
+    for (double& each : weights) {
       if (std::fabs(each) < kLeastWeight) each = 0.0;  // rounding must not involve other vertices
       sum += each;
     }
-    for (double& each : best.weights) each = each / sum;
-    holders.push_back(best);
+    for (double& each : weights) each = each / sum;
   }
   return holders;
 }

@@ -1,9 +1,7 @@
 // Levels of detail, the same as taichi_soft/levels/level_change.py and reattaching.py.
 
 #include <algorithm>
-#include <limits>
 
-#include "barycentric.hpp"
 #include "error.hpp"
 #include "world.hpp"
 
@@ -267,26 +265,37 @@ Vector World::rest_point_of_grab(size_t g) const {
 void World::hold_at(size_t g, const Vector& place) {
   const int32_t slot = fields_.grabs.body(g) - 1;
   const Asset& asset = asset_of(slot);
-  const int32_t* corners = asset.tets.data;
-  std::array<double, 4> weights{};
-  double highest = -std::numeric_limits<double>::infinity();
-  for (size_t t = 0; t + 4 <= asset.tets.count; t += 4) {
-    Vector places[4];
-    for (size_t i = 0; i < 4; ++i) {
-      for (size_t k = 0; k < 3; ++k) places[i][k] = asset.vertices[3 * size_t(asset.tets[t + i]) + k];
-    }
-    const std::array<double, 4> shares = Coordinates(places).of(place);
-    const double least = *std::min_element(shares.begin(), shares.end());
-    if (!(least > highest)) continue;
-    highest = least, weights = shares, corners = asset.tets.data + t;
-  }
-  const Patch patch = patch_around(asset, corners, weights.data(), 4);
+  const Holder at = embedded({place}, asset.vertices.data, asset.vertex_count(), asset.tets)[0];
+  const Patch patch = patch_around(asset, at.vertices, at.weights, 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(corners[i])));
-    fields_.grabs.weights(g, i) = as_float(weights[i]);
+    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(at.vertices[i])));
+    fields_.grabs.weights(g, i) = as_float(at.weights[i]);
   }
   fields_.grabs.limits(g, 0) = std::min(fields_.grabs.limits(g, 1), as_float(patch.strength));
   write_patch(g, slot, patch);
+}
+
+// Motion of another level, in which the vertices `held` are pinned.
+Motion World::mapped(const Motion& before, const Asset& source, const Asset& target, const Passage& over,
+                     const std::vector<int32_t>& held) {
+  Motion after(target.vertex_count());
+  std::vector<int32_t> sources, nearest(after.count, -1);
+  for (size_t v = 0; v < before.count; ++v) {
+    if (before(v, Motion::kInvMass) == 0.0) sources.push_back(int32_t(v));
+  }
+  std::vector<double> weights(before.count, 0.0);
+  for (int32_t vertex : sources) weights[size_t(vertex)] = 1.0 / double(sources.size());
+  if (!held.empty()) {
+    const std::vector<int32_t> found = nearest_sources(source, sources, target, held);
+    for (size_t i = 0; i < held.size(); ++i) nearest[size_t(held[i])] = found[i];
+  }
+  const uint32_t n = uint32_t(before.count), m = uint32_t(after.count);
+  machine_->launch("map_motion",
+                   {Machine::array(before.numbers.data(), n, Motion::kWidth), array_of(over.sources),
+                    array_of(over.begins), array_of(over.weights), array_of(target.masses),
+                    array_of(source.vertices, 3), array_of(target.vertices, 3), Machine::array(weights.data(), n),
+                    Machine::array(nearest.data(), m), Machine::array(after.numbers.data(), m, Motion::kWidth)});
+  return after;
 }
 
 void World::set_level(int32_t slot, int32_t level, bool may_release) {
@@ -294,9 +303,9 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   const int32_t from = level_of(slot);
   if (level == from) return;
   const Asset &whole = whole_of(slot), &source = whole.level(size_t(from)), &target = whole.level(size_t(level));
-  Change change = {source, target, whole.passage(size_t(from), size_t(level)), {}};
+  std::vector<int32_t> held;
   std::map<int32_t, Hanging> attached;
-  make_room(slot, level, may_release, &change.held, &attached);
+  make_room(slot, level, may_release, &held, &attached);
   std::vector<std::pair<size_t, Vector>> grabbed;
   for (size_t g = 0; g < kMostGrabs; ++g) {
     if (fields_.grabs.body(g) == slot + 1) grabbed.push_back({g, rest_point_of_grab(g)});
@@ -305,7 +314,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   const float* found = machine_->rows.room<float>(before.numbers.size());
   machine_->launch("read_motion", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
   std::copy(found, found + before.numbers.size(), before.numbers.begin());
-  Motion after = passed(change, before);
+  Motion after = mapped(before, source, target, whole.passage(size_t(from), size_t(level)), held);
   attach_at_level(attached, before, &after);
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "error.hpp"
-#include "fitting.hpp"
 #include "world.hpp"
 
 namespace taichi_soft {
@@ -12,20 +11,6 @@ namespace taichi_soft {
 namespace {
 
 constexpr ts_motor kMotor = uint64_t(6) << 56;  // prefix of motor handles
-
-double sum_of(const std::vector<double>& numbers) {
-  double total = 0.0;
-  for (double each : numbers) total += each;
-  return total;
-}
-
-// True if all points are on a line, so that a rotation about it is undefined.
-bool is_thin(const std::vector<Vector>& rest, const std::vector<double>& shares) {
-  const std::vector<Vector> arms = beside(rest, weighted_sum(shares, rest));
-  std::array<double, 3> spreads = Eigen<3>(moments(shares, arms, arms)).values;
-  std::sort(spreads.begin(), spreads.end());
-  return !(spreads[1] > kThinnest * kThinnest * spreads[2]);
-}
 
 }  // namespace
 
@@ -40,25 +25,27 @@ void require_motor_limit(double limit) {
 }
 
 // Axis in the rest state, of particles that have rotated since.
-Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const {
+Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) {
   const Asset& asset = asset_of(slot);
   std::vector<Vector> rest, now;
-  std::vector<double> shares;
+  std::vector<double> masses;
   for (int32_t v : vertices) {
     const double* at = asset.vertices.data + 3 * size_t(v);
     rest.push_back({at[0], at[1], at[2]});
     now.push_back(vertex_place(slot, v));
-    shares.push_back(asset.masses[size_t(v)]);
+    masses.push_back(asset.masses[size_t(v)]);
   }
-  const double mass = sum_of(shares);
-  for (double& each : shares) each = each / mass;
-  if (is_thin(rest, shares)) {
+  const double mass = mass_of(slot, vertices);
+  for (double& each : masses) each = each / mass;
+  const uint32_t n = uint32_t(vertices.size());
+  const double* found = machine_->found.room<double>(4);
+  machine_->launch("find_rest_axis", {Machine::array(rest.data(), n, 3), Machine::array(now.data(), n, 3),
+                                      Machine::array(masses.data(), n), Machine::array(axis.data(), 3),
+                                      Machine::array(machine_->found, 4)});
+  if (!(found[3] > kThinnest)) {
     fail(TS_ERROR_ARGUMENT, "the vertices are on a line, so no axis can rotate with them: give more, or set is_fixed");
   }
-  const Matrix turn = fitting_motion(rest, now, shares).turn;
-  Vector found;
-  for (size_t k = 0; k < 3; ++k) found[k] = turn[0][k] * axis[0] + turn[1][k] * axis[1] + turn[2][k] * axis[2];
-  return kept(found);
+  return {found[0], found[1], found[2]};
 }
 
 std::vector<World::MotorRow> World::motors() const {

@@ -1,16 +1,13 @@
-"""The part of a body that a hand takes hold of, in 64-bit floats."""
+"""The part of a body that a grab holds, in 64-bit floats."""
 
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
+from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
 
 
 @ti.func
-def _row(rows: ti.template(), i):
-    return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
-
-
-@ti.func
-def _dot(a, b):
+def dot(a, b):
+    """Scalar product, summed in order."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
@@ -49,12 +46,12 @@ def _square_of_slope(x: ti.template(), elements: ti.template(), patch: ti.templa
             is_near = is_near or patch[elements[e, i + 1], 0] != 0.0
     square = rise.x * rise.x
     if elements.shape[1] == 4 and is_near:
-        start = _row(x, first)
-        a, b, c = _row(x, elements[e, 1]), _row(x, elements[e, 2]), _row(x, elements[e, 3])
+        start = row_at(x, first, 0)
+        a, b, c = row_at(x, elements[e, 1], 0), row_at(x, elements[e, 2], 0), row_at(x, elements[e, 3], 0)
         a, b, c = a - start, b - start, c - start
         bc, ca, ab = b.cross(c), c.cross(a), a.cross(b)
-        slope = (rise.x * bc + rise.y * ca + rise.z * ab) / _dot(a, bc)
-        square = _dot(slope, slope)
+        slope = (rise.x * bc + rise.y * ca + rise.z * ab) / dot(a, bc)
+        square = dot(slope, slope)
     return square
 
 
@@ -89,17 +86,17 @@ def shape_patch(
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        point, lower, upper = ti.Vector.zero(ti.f64, 3), _row(x, 0), _row(x, 0)
+        point, lower, upper = ti.Vector.zero(ti.f64, 3), row_at(x, 0, 0), row_at(x, 0, 0)
         for i in range(corners.shape[0]):
-            point += weights[i] * _row(x, corners[i])
+            point += weights[i] * row_at(x, corners[i], 0)
         for v in range(x.shape[0]):
-            lower, upper = ti.min(lower, _row(x, v)), ti.max(upper, _row(x, v))
-            arm = _row(x, v) - point
-            patch[v, 0] = ti.sqrt(_dot(arm, arm))
+            lower, upper = ti.min(lower, row_at(x, v, 0)), ti.max(upper, row_at(x, v, 0))
+            arm = row_at(x, v, 0) - point
+            patch[v, 0] = ti.sqrt(dot(arm, arm))
         farthest, size = ti.cast(0.0, ti.f64), upper - lower
         for i in range(corners.shape[0]):
             farthest = ti.max(farthest, patch[corners[i], 0])
-        radius = ti.max(limits[0] * ti.sqrt(_dot(size, size)), limits[1] * farthest)
+        radius = ti.max(limits[0] * ti.sqrt(dot(size, size)), limits[1] * farthest)
         if _count_within(patch, radius) > PATCH_ROWS:
             radius = _distance_of_last(patch, radius)
         total = ti.cast(0.0, ti.f64)

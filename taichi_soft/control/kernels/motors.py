@@ -16,7 +16,9 @@ Groups of fields: writes motors.
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
-from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.rigid_fit import fitting_motion, kept
+from taichi_soft.core.math.rows import row_at, row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import ti
 
@@ -230,3 +232,37 @@ def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
 def forget_impulse(state: ti.template(), number: ti.i32):
     """Clear the impulse of a motor before its index is reused."""
     state.motors.impulse[number] = 0.0
+
+
+@ti.kernel
+def find_rest_axis(
+    rest: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    now: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    weights: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    axis: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    """Find the axis in the rest state, of particles that have rotated since.
+
+    Args:
+        rest, now: positions of the particles, (n, 3) [m].
+        weights: their masses, with the sum 1.
+        axis: current direction, (3,).
+        found: (4,), gets the direction at rest, and the width of the particles over their length.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        center, a = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        b, c = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        for i in range(weights.shape[0]):
+            center += weights[i] * row_at(rest, i, 0)
+        for i in range(weights.shape[0]):
+            offset = row_at(rest, i, 0) - center
+            part = weights[i] * offset
+            a, b, c = a + part.x * offset, b + part.y * offset, c + part.z * offset
+        variances, _axes = symmetric_eigen((a, b, c))
+        rotation, _translation = fitting_motion(rest, now, 0, weights)
+        at_rest = kept(rotation.transpose() @ ti.Vector([axis[0], axis[1], axis[2]]))
+        for k in ti.static(range(3)):
+            found[k] = at_rest[k]
+        found[3] = ti.sqrt(ti.max(variances.y, 0.0) / ti.max(variances.x, 1e-30))

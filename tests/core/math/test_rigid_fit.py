@@ -1,10 +1,33 @@
-"""The rigid motion of held vertices, against closed forms."""
+"""The best-fitting rigid motion, against closed forms."""
 
 import numpy as np
 
-from taichi_soft.levels.rigid_fit import fitting_motion
+from taichi_soft.core.math.rigid_fit import fitting_motion
+from taichi_soft.core.runtime import init, ti
 
 RNG = np.random.default_rng(4)
+
+
+@ti.kernel
+def fit(
+    rest: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    now: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    weights: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=2),
+):
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        turn, origin = fitting_motion(rest, now, 0, weights)
+        for i, k in ti.static(ti.ndrange(3, 3)):
+            found[i, k], found[3, k] = turn[i, k], origin[k]
+
+
+def motion(rest, now):
+    """Rotation and place of the origin."""
+    init("cpu")
+    found = np.zeros((4, 3))
+    fit(rest, np.ascontiguousarray(now), np.full(len(rest), 1 / len(rest)), found)
+    return found[:3], found[3]
 
 
 def turn_about(axis, angle):
@@ -18,7 +41,7 @@ def test_places_that_were_moved_rigidly_give_that_motion():
     rest, axis = RNG.normal(size=(9, 3)), RNG.normal(size=3)
     for angle in (0.0, 1e-3, 2.0, np.pi):
         wanted, place = turn_about(axis, angle), RNG.normal(size=3)
-        turn, origin = fitting_motion(rest, rest @ wanted.T + place)
+        turn, origin = motion(rest, rest @ wanted.T + place)
         np.testing.assert_allclose(turn, wanted, atol=1e-12)
         np.testing.assert_allclose(origin, place, atol=1e-12)
 
@@ -27,8 +50,8 @@ def test_places_on_a_line_are_turned_as_little_as_possible_and_one_alone_is_not_
     rest = np.outer([0.0, 1.0, 3.0], [1.0, 2.0, -1.0]) + np.array([5.0, 0.0, 0.0])
     axis = np.cross([1.0, 2.0, -1.0], [0.3, 0.1, 1.0])  # across the line
     wanted = turn_about(axis, 0.8)
-    turn, origin = fitting_motion(rest, rest @ wanted.T + [1, 2, 3])
+    turn, origin = motion(rest, rest @ wanted.T + [1, 2, 3])
     np.testing.assert_allclose(turn, wanted, atol=1e-4)
-    turn, origin = fitting_motion(rest[:1], rest[:1] + np.array([1, 2, 3]))
+    turn, origin = motion(rest[:1], rest[:1] + np.array([1, 2, 3]))
     assert (turn == np.eye(3)).all()
     np.testing.assert_allclose(origin, [1, 2, 3])

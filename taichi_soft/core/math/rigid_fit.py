@@ -1,0 +1,89 @@
+"""Best-fitting rigid motion between two sets of vertices, in 64-bit floats.
+
+For vertices on one line round-off would decide the rotation, so a small weight prefers the smallest one.
+"""
+
+from taichi_soft.core.math.rows import row_at
+from taichi_soft.core.runtime import ti
+
+REGULARISATION = 1e-10
+"""Weight of the smallest rotation. It decides only rotations that the vertices leave undetermined."""
+
+SWEEPS = 30
+"""Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
+
+RESIDUE = 1e-12
+"""Fraction of the largest number below which a number counts as round-off."""
+
+
+@ti.func
+def kept(v):
+    """Round a vec3 to 32-bit floats without residue, the form that a world stores."""
+    size = ti.abs(v).max()
+    for k in ti.static(range(3)):
+        v[k] = ti.select(ti.abs(v[k]) > RESIDUE * size, ti.cast(ti.cast(v[k], ti.f32), ti.f64), 0.0)
+    return v
+
+
+@ti.func
+def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.template()):
+    """Rotation (3, 3) and translation [m] that map rows of `rest` closest to rows of `now`, from `column` on.
+
+    Args: weights: of the rows, with the sum 1.
+    """
+    rest_center, center = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+    for i in range(weights.shape[0]):
+        rest_center += weights[i] * row_at(rest, i, 0)
+        center += weights[i] * row_at(now, i, column)
+    covariance, spread = ti.Matrix.zero(ti.f64, 3, 3), ti.Vector.zero(ti.f64, 3)
+    for i in range(weights.shape[0]):
+        offset = row_at(rest, i, 0) - rest_center
+        covariance += (weights[i] * (row_at(now, i, column) - center)).outer_product(offset)
+        spread += weights[i] * offset * offset
+    for k in ti.static(range(3)):
+        covariance[k, k] += REGULARISATION * (spread.x + spread.y + spread.z)
+    rotation = _nearest_rotation(covariance)
+    return rotation, center - rotation @ rest_center
+
+
+@ti.func
+def _nearest_rotation(m):
+    """Rotation R with the largest trace of R^T m, by Horn 1987. The identity for zeros."""
+    a = ti.Matrix(
+        [
+            [m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
+            [m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
+            [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
+            [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], m[0, 0] + m[1, 1] + m[2, 2]],
+        ]
+    )
+    vectors = ti.Matrix.identity(ti.f64, 4)
+    for _ in range(SWEEPS):
+        for p, q in ti.static(((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))):
+            if a[p, q] != 0.0:  # rotate axes p and q so that this entry becomes zero up to round-off
+                slope = (a[q, q] - a[p, p]) / (2.0 * a[p, q])
+                t = ti.select(slope < 0.0, -1.0, 1.0) / (ti.abs(slope) + ti.sqrt(slope * slope + 1.0))
+                c = 1.0 / ti.sqrt(t * t + 1.0)
+                s = t * c
+                for k in ti.static(range(4)):
+                    x, y = a[k, p], a[k, q]
+                    a[k, p], a[k, q] = c * x - s * y, s * x + c * y
+                for k in ti.static(range(4)):
+                    x, y = a[p, k], a[q, k]
+                    a[p, k], a[q, k] = c * x - s * y, s * x + c * y
+                for k in ti.static(range(4)):
+                    x, y = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = c * x - s * y, s * x + c * y
+    best, largest = ti.Vector([vectors[k, 3] for k in ti.static(range(4))]), a[3, 3]
+    for i in ti.static(range(3)):
+        if a[i, i] > largest:
+            best, largest = ti.Vector([vectors[k, i] for k in ti.static(range(4))]), a[i, i]
+    best /= ti.sqrt(best.x * best.x + best.y * best.y + best.z * best.z + best.w * best.w)
+    x, y, z, w = best.x, best.y, best.z, best.w
+    return ti.Matrix(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )

@@ -1,0 +1,1 @@
+"""Kernel that changes the level of detail of a body."""
