@@ -73,8 +73,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found["shape_patch"] = _example(shape_patch)
     found["embed_points"] = _example(embed_points)
     found["find_rest_axis"] = _example(find_rest_axis)
-    found["forget_collider"] = _example(forget_collider, contact=state.colliders)
-    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.colliders)
+    found["forget_collider"] = _example(forget_collider, colliders=state.colliders)
+    found["sum_collider_impulses"] = _example(sum_collider_impulses, colliders=state.colliders)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)
