@@ -224,7 +224,7 @@ class EngineAdapter:
         """Restore a state as `World.restore` does. `alpha` becomes 0, and `rewind` cannot go back further.
 
         Args:
-            data: result of `snapshot`, from this world or one that was built equally.
+            data: result of `snapshot`, from this world or one that was built the same way.
         Raises: as `World.restore`, with nothing changed.
         """
         self._world.restore(data)

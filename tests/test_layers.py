@@ -153,7 +153,7 @@ def found_in(modules, rule):
 
 def test_there_is_something_to_check():
     assert {"taichi_soft.world.world", "taichi_soft.elements.laws", "engine_adapter.adapter"} <= set(FILES)
-    assert "taichi_soft.elements.laws.model" in IMPORTS["taichi_soft.elements.kernels.elastic"]
+    assert "taichi_soft.elements.laws.force_model" in IMPORTS["taichi_soft.elements.kernels.elastic"]
     assert "taichi_soft.bodies.law_program" in IMPORTS["taichi_soft.solver.program"]
 
 
@@ -256,7 +256,8 @@ def test_meshes_and_materials_need_no_taichi():
 
 def test_the_engine_adapter_knows_only_the_public_names():
     """And checks of arguments and callers, the error for a missing extra, and the warning for an old name."""
-    inner = {n for m in FILES if m.startswith("engine_adapter") for n in IMPORTS[m]}
+    tools = {"engine_adapter.native.write_fields"}  # only a checkout runs it
+    inner = {n for m in FILES if m.startswith("engine_adapter") and m not in tools for n in IMPORTS[m]}
     known = {name for name in inner if name.startswith("taichi_soft")}
     known_core = {"checks", "extras", "handles", "renamed", "threads"}
     assert known <= {"taichi_soft", *(f"taichi_soft.core.{name}" for name in known_core)}

@@ -239,7 +239,7 @@ export class Scene {
   /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
   nameOf(kind, number) {
     const found = this.#namesOf(kind)[number];
-    if (found === undefined) throw new SoftError(-1, `${kind} ${number} does not exist: there are ${this.names[kind].length}`);
+    if (found === undefined) throw new SoftError(-1, `${kind} ${number} does not exist (${this.names[kind].length} in all, numbered from 0)`);
     return found;
   }
 
@@ -260,7 +260,7 @@ export class Scene {
   /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const found = this.assets[this.find("asset", name)];
-    if (!found) throw new SoftError(-1, `asset ${name} does not exist: there are ${this.assets.length}`);
+    if (!found) throw new SoftError(-1, `asset ${name} does not exist (${this.assets.length} in all, numbered from 0)`);
     return found;
   }
 

@@ -59,5 +59,5 @@ def peers(
     if path is not None:
         say(f"wrote {escape(str(path))}: {frames} frames, {frames / fps:.1f} s")
     for entry in entries:
-        step = f"steps of 1/{1 / entry.course.step:.0f} s"
+        step = f"steps of 1/{1 / entry.trajectory.step:.0f} s"
         say(escape("; ".join([*captions(entry), step])))

@@ -42,9 +42,9 @@ class Solid:
 
     name: str
     shape: Shape
-    distance: Distance  # in its own frame; of floor, walls and lid all that lies beyond them is inside
+    distance: Distance  # in its own frame; everything beyond floor, walls and lid is inside
     tolerance: float  # depth [m] below which a point still counts as on its surface
-    is_room: bool  # whether nothing may get through it: floor, walls, lid
+    is_room: bool  # True for floor, walls and lid, which nothing may pass
     position: Floats
     rotation: Floats  # (3, 3)
     friction: float

@@ -12,14 +12,14 @@ class Outcome:
     """Measurements of a case."""
 
     case: Case
-    frozen_at: float | None  # [s], where something went non-finite
-    out: float  # how far a vertex of the surface was beyond floor, wall or lid at any time [m]
-    out_through: str | None  # which of them, where that was farther than it may be
-    inside: float  # how deep a vertex of the surface ended in another solid [m]
-    inside_of: str | None  # which, where that was deeper than it may be
-    rest_at: float | None  # [s], None where it never came to rest
+    frozen_at: float | None  # time of the first non-finite value [s]
+    out: float  # largest distance of a surface vertex beyond floor, wall or lid at any time [m]
+    out_through: str | None  # which of them, if that is too far
+    inside: float  # depth of a surface vertex in another solid at the end [m]
+    inside_of: str | None  # which solid, if that is too deep
+    rest_at: float | None  # [s]; None if it never came to rest
     speed: float  # root mean square over vertices at the end, in sizes per second
-    flipped: int  # tetrahedra inside out at the end
+    flipped: int  # inverted tetrahedra at the end
 
     @property
     def faults(self) -> tuple[str, ...]:

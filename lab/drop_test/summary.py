@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.drop_test.outcome import FAULTS, Outcome
-from lab.drop_test.trial import (
+from lab.drop_test.case_runs import (
     BRAKE,
     CALM_SPEED,
     CALM_TIME,
@@ -17,6 +16,7 @@ from lab.drop_test.trial import (
     LEAST_CALM_SPEED,
     PATIENCE,
 )
+from lab.drop_test.outcome import FAULTS, Outcome
 
 CRITERION = (
     f"at rest: slower than {CALM_SPEED:g} sizes per second or {LEAST_CALM_SPEED * 1000:g} mm/s (root mean "

@@ -10,16 +10,16 @@ from lab.experiments.irregular_block import irregular_block
 from taichi_soft.render import Camera, Renderer, Surface, colormap, draw_labels
 
 SIZE = (960, 540)
-"""Pixels."""
+"""Width and height of the picture [pixels]."""
 
 
 def bar_picture(
     length: float, cells: int, displacements: dict[str, ArrayLike], factor: float
 ) -> NDArray[np.uint8]:
-    """Bars one above the other, coloured by the displacement of each vertex over the largest.
+    """Draw bars one above the other, coloured by the displacement of each vertex over the largest.
 
     Args:
-        length, cells: of the bars, as in `irregular_block`.
+        length, cells: as in `irregular_block`.
         displacements: (n, 3) [m] by name.
         factor: exaggeration of the displacements.
     """
@@ -42,5 +42,5 @@ def bar_picture(
         centres.min(axis=0) - below, centres.max(axis=0) + room, azimuth=-80, aspect=SIZE[0] / SIZE[1]
     )
     image = Renderer(*SIZE, camera=camera, floor=None).render(surfaces)
-    above = centres + np.array([0.0, 0.0, 1.3 * WIDTH])  # captions hang from their places
+    above = centres + np.array([0.0, 0.0, 1.3 * WIDTH])  # captions are drawn below these points
     return draw_labels(image, list(displacements), camera.project(above, *SIZE))

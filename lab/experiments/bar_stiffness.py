@@ -13,7 +13,7 @@ from taichi_soft import Material
 
 YOUNG, POISSON, DENSITY, WIDTH = 1e6, 0.3, 1000.0, 1.0
 LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
-"""By scikit-fem, beside the names of laws."""
+"""Names of the finite elements of scikit-fem, used like names of laws."""
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
@@ -21,8 +21,8 @@ def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> 
 
     Args:
         point: "law" (or `LINEAR`, `QUADRATIC`), "strain", and "cells" across the bar.
-        length: of the bar [m].
-        loads: of `free_ends`.
+        length: length of the bar [m].
+        loads: some of `free_ends`.
     """
     mesh = irregular_block(length, WIDTH, point["cells"])
     material = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)

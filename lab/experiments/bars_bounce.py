@@ -1,7 +1,7 @@
 """A complex object of bars bounces (thesis figure 6.2): bars bend on impact, and vibrate after lift-off.
 
-Three crossed bars fall onto three of their six ends. What bends is measured against the crossing, what
-vibrates by the kinetic energy beyond that of a rigid body.
+Three crossed bars fall onto three of their six ends. Bending is measured relative to the crossing, vibration
+by the kinetic energy beyond that of a rigid body.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 MATERIAL = Material(young=1e7, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
-HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # of a bar, and below its lowest end [m]
+HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # length of a bar, and height of the lowest end [m]
 DT, SUBSTEPS, SECONDS = 0.01, 24, 1.7
 UPRIGHT = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
-"""Turns the diagonal of the three bars to the vertical."""
+"""Rotation that makes the diagonal of the three bars vertical."""
 SEEN, BENT, VIBRATES = 0.05, 3.0, 0.01
-"""Deflection over a bar's free length that can be seen; over its change of length that is bending; vibration
-in flight over the energy of the impact."""
+"""Visible deflection over a bar's free length; deflection over change of length that counts as bending;
+energy of vibration in flight over that of the impact."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -47,13 +47,13 @@ def points(effort: Effort) -> list[Point]:
 
 
 def bars_mesh() -> TetMesh:
-    """About its crossing, with ends at +-1.3 m of each axis."""
+    """Mesh of the bars about their crossing, with ends at +-1.3 m of each axis."""
     mesh = load_mesh(ASSETS / "bars.npz")
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
 
 def measure(point: Point) -> Numbers:
-    """Deflections, lengths and energies, a hundred times a second, and five poses."""
+    """Measure deflections, lengths and energies at 100 Hz, and five poses."""
     mesh = bars_mesh()
     world = bare_world(retries=0)
     material = Material(MATERIAL.young * point["stiffness"], 0.2, 1000.0, 20.0, damping_ratio=0.0)
@@ -84,7 +84,7 @@ def measure(point: Point) -> Numbers:
 def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
     """Largest deflection of an end across its bar [m], and largest change of length of half a bar [1].
 
-    Both against the crossing, as it has turned; lengths along the line through the sections' centres.
+    Both are relative to the crossing and its rotation. Lengths run through the centres of the sections.
     """
     rest = mesh.vertices
     hub = (np.abs(rest) < 0.6 * THICKNESS).all(axis=1)
@@ -106,7 +106,7 @@ def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
 
 
 def energies(body: Body) -> tuple[float, float]:
-    """Kinetic energy, and what of it a rigid body of the same momenta would not have [J]."""
+    """Kinetic energy, and its excess over that of a rigid body with the same momenta [J]."""
     masses, x, v = body.masses[:, None], body.positions().astype(np.float64), body.velocities().astype(float)
     total = masses.sum()
     x, mean = x - (masses * x).sum(axis=0) / total, (masses * v).sum(axis=0) / total
@@ -131,7 +131,7 @@ def flight_of(series: Numbers) -> tuple[int, int, int]:
 
 
 def frequency_of(energy: list[float]) -> float:
-    """Strongest frequency of a swing with this kinetic energy at each step: half of the energy's [Hz]."""
+    """Strongest frequency of a vibration with this kinetic energy at each step: half of the energy's [Hz]."""
     if len(energy) < 4:
         return 0.0
     spectrum = np.abs(np.fft.rfft(np.array(energy) - np.mean(energy), 4096))
@@ -139,7 +139,7 @@ def frequency_of(energy: list[float]) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Bending on the floor, vibration in flight."""
+    """Judge the bending on the floor and the vibration in flight."""
     numbers = results.one(stiffness=1.0)
     begin, lift, end = flight_of(numbers)
     impact = numbers["kinetic"][begin - 1]

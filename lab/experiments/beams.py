@@ -31,15 +31,16 @@ from lab.experiments.stiffness_dots import draw_stiffness_dots
 
 LENGTH = 4.0
 EXAGGERATION = 250.0
-"""Of the picture."""
+"""Exaggeration of displacements in the picture."""
 LOADS = ("tension", "shear", "torsion", "bending", "cantilever")
 EXACT = 1e-3
-"""Of tension and shear: linear tetrahedra hold a uniform stress exactly, so that only the strain's size is
-left."""
+"""Error of tension and shear: linear tetrahedra represent a uniform stress exactly, so that only the error of
+small strain remains."""
 SAME = 0.01
-"""Between laws on tetrahedra and linear finite elements on one mesh."""
+"""Difference between laws on tetrahedra and linear finite elements on one mesh."""
 LIMIT = 0.03
-"""Of what two meshes extrapolate to: that leaves a percent, and a cantilever's clamped root makes another."""
+"""Error of the extrapolation from two meshes: it leaves 1 %, and the clamped end of the cantilever
+another."""
 
 TEXT = (
     f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m (E = {YOUNG:g} Pa, nu = {POISSON:g}) is drawn out, "
@@ -57,7 +58,7 @@ TEXT = (
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every law and finite elements on one mesh, one law and linear ones on two finer meshes."""
+    """Points: every law and finite elements on one mesh; one law and linear elements on two finer meshes."""
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)
     finer = [{**laws[0], "cells": fine}, {**laws[0], "cells": middle, "drawn": True}]
@@ -67,12 +68,12 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness over that of theory, by load."""
+    """Measure stiffness over that of theory, by load."""
     return stiffness_over_theory(point, LENGTH, LOADS)
 
 
 def conclude(results: Results) -> Section:
-    """Tension is exact; torsion and bending are too stiff by what linear tetrahedra are, and converge."""
+    """Judge: tension is exact; torsion and bending are too stiff, as for linear elements, and converge."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     coarse = rows[0][0]["cells"]
     of_laws = [row for row in rows if row[0]["law"] not in (LINEAR, QUADRATIC)]
@@ -175,7 +176,7 @@ def conclude(results: Results) -> Section:
 
 
 def _extrapolated(coarse: float, fine: float, cells: tuple[int, int]) -> float:
-    """The limit of an error that falls with the square of a cell's size (Richardson)."""
+    """Limit of an error that falls with the square of a cell's size (Richardson)."""
     ratio = (cells[1] / cells[0]) ** 2
     return (ratio * fine - coarse) / (ratio - 1)
 
@@ -189,4 +190,4 @@ BEAMS = Experiment(
     measure,
     conclude,
 )
-"""Beams."""
+"""Bars under load."""

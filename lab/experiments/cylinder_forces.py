@@ -21,7 +21,7 @@ from lab.experiments.judgement import judged
 from taichi_soft import Material, TetMesh, cylinder, internal_forces
 
 YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # the thesis's
-POISSON = (0.0, 0.2, 0.4)  # it shows 0.2 and tells of others
+POISSON = (0.0, 0.2, 0.4)  # it shows 0.2 and mentions others
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
 COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about the thesis's, and 2592
 EXACT = 0.01

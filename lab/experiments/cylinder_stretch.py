@@ -22,7 +22,7 @@ from lab.experiments.judgement import judged, judged_but_for
 from taichi_soft import Material, cylinder, internal_forces
 
 RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # the thesis's
-POISSON = (0.4, 0.0, -0.4)  # of the negative one the thesis tells the sign alone
+POISSON = (0.4, 0.0, -0.4)  # of the negative one the thesis gives only the sign
 COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra, the thesis has 492; and 2592
 FURTHEST, MODERATE = 0.5, 0.25
 KEPT = 0.05

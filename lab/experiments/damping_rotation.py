@@ -1,7 +1,8 @@
-"""Damping against the mean velocity of a tetrahedron brakes rotation, edge damping does not (section 6.4).
+"""Damping relative to the mean velocity of a tetrahedron brakes rotation, edge damping does not (section
+6.4).
 
-A body spins freely. Of a stiff one the first kind takes angular momentum at the rate b S / I, with I its
-moment of inertia about the axis and S the sum of squared distances, across the axis, of all tetrahedra's
+A body rotates freely. From a stiff one, the first kind removes angular momentum at the rate b S / I, with I
+its moment of inertia about the axis and S the sum of squared distances, across the axis, of all tetrahedra's
 corners from their own centre.
 """
 

@@ -1,7 +1,7 @@
 """A body that grows denser to the right is dropped (thesis figure 6.3).
 
-Claimed: the heavy side is pressed most, and bounces latest and least. Beside it a body with the mean density
-everywhere, of which no side may differ from the other.
+Claim: the heavy side is compressed most, and bounces last and least. For comparison, a body with the mean
+density everywhere is dropped as well: its sides must not differ.
 """
 
 from __future__ import annotations
@@ -88,8 +88,9 @@ def measure(point: Point) -> Numbers:
 
 
 def side(numbers: Numbers, end: str) -> dict[str, float]:
-    """How far an end is pressed [1] in the first contact, when it leaves the floor for good [s], and how high
-    its bottom rises before the body touches down again [m]."""
+    """Compression of an end [1] in the first contact, time at which it leaves the floor for good [s], and
+    height that its bottom reaches before the body touches down again [m].
+    """
     height, thickness = np.array(numbers[f"{end}_height"]), np.array(numbers[f"{end}_thickness"])
     other = np.array(numbers["left_height" if end == "right" else "right_height"])
     touched = int(np.argmax(height < TOUCH))

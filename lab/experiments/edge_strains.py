@@ -1,7 +1,7 @@
-"""What a law of chapter 4 takes for the strain of one edge, read from how stiff the edge is.
+"""Read the strain that a law of chapter 4 computes for one edge from the stiffness of the edge.
 
-A vertex that moves changes the force at the other end of an edge by a E / l along the direction that the law
-takes for tension, and by a G / l across it: the eigenvectors of that matrix tell the direction.
+Moving a vertex changes the force at the other end of an edge: by a E / l along the law's direction of
+tension, and by a G / l across it. The eigenvectors of that matrix give the direction.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EdgeReading:
-    """Of one edge in a deformed body."""
+    """Reading of one edge in a deformed body."""
 
-    normal: Floats  # unit vector that the law takes for the direction of tension
+    normal: Floats  # the law's direction of tension, unit vector
     tension_stiffness: float  # a E / l [N/m]
     shear_stiffness: float  # a G / l [N/m]
 
 
 def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName) -> EdgeReading:
-    """Reading of the edge between vertices 0 and 1."""
+    """Read the edge between vertices 0 and 1."""
     block = force_gradient(mesh, material, positions, law=law)[0, :, 1, :]
     values, vectors = np.linalg.eigh((block + block.T) / 2)
     normal = vectors[:, 2]  # E is above G
@@ -37,19 +37,19 @@ def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName
 
 
 def strains(vector: Floats, normal: Floats) -> tuple[float, float]:
-    """Tensile and shear strain, eq. 4.3: of a vector that had length 1 and lay along the normal at rest."""
+    """Tensile and shear strain, eq. 4.3, of a vector of length 1 along the normal at rest."""
     stretch = float(normal @ vector)
     return stretch - 1, float(np.linalg.norm(vector - stretch * normal))
 
 
 def ringed_edge(count: int, radius: float = 1.0) -> TetMesh:
-    """An edge of length 1 along z between vertices 0 and 1, and vertices evenly round its middle."""
+    """An edge of length 1 along z between vertices 0 and 1, and vertices spread evenly around its centre."""
     turn = 2 * np.pi * np.arange(count) / count
     return edge_in_ring(radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1))
 
 
 def edge_in_ring(ring: Floats) -> TetMesh:
-    """The same edge and a ring of vertices (n, 3) round it, counterclockwise."""
+    """The same edge with a ring of vertices (n, 3) around it, counterclockwise."""
     count = len(ring)
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     tets = [[0, 1, 2 + i, 2 + (i + 1) % count] for i in range(count)]

@@ -1,7 +1,7 @@
-"""Loads on the ends of a bar along x: what is driven, and the work that belongs to it.
+"""Loads on the ends of a bar along x: driven coordinates or forces, and their work.
 
-All are of small strain, `STRAIN` at most within a uniform bar. Stiffness is defined by work: that of a drive
-by q is what its reactions do, over q^2; that of a force F is F^2 over what it does.
+All are of small strain, at most `STRAIN` within a uniform bar. Stiffness is defined by work: for a
+displacement q, the work of its reactions over q^2; for a force F, F^2 over its work.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class EndLoad:
     """A load on a bar.
 
     Args:
-        amplitude: q, the drive [m or rad], or F, the force [N].
-        traction: (3,) on the right end [Pa]; zero where the load is a drive.
+        amplitude: q, the displacement [m or rad], or F, the force [N].
+        traction: (3,) on the right end [Pa]; zero for a displacement.
     """
 
     loading: Loading
@@ -33,20 +33,20 @@ class EndLoad:
     traction: Floats
 
     def stiffness(self, settled: Equilibrium) -> float:
-        """N/m or N m, where a body has settled under the load."""
+        """Stiffness in equilibrium under the load [N/m or N m]."""
         work = float(((settled.reactions + self.loading.forces) * settled.displacement).sum())
         return self.amplitude**2 / work if self.traction.any() else work / self.amplitude**2
 
 
 def ends(mesh: TetMesh) -> tuple[Mask, Mask]:
-    """Which vertices lie in the left and the right end, (n,) each."""
+    """Masks of the vertices in the left and in the right end, (n,) each."""
     x = mesh.vertices[:, 0]
     reach = 1e-9 * (x.max() - x.min())
     return x - x.min() < reach, x.max() - x < reach
 
 
 def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Both ends held wholly, as if glued to rigid plates, of which the right or both move."""
+    """Loads on ends that are glued to rigid plates, of which the right one or both move."""
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
@@ -64,11 +64,11 @@ def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Loads of which theory knows the answer: ends that are free to contract, or to warp; and a cantilever.
+    """Loads with a known solution: on ends that are free to contract or to warp, and a cantilever.
 
-    Tension and bending drive the ends along x alone, torsion across x alone: with the stresses of a uniform
-    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends. In shear the
-    whole surface slides uniformly along z, as free sides would bulge.
+    Tension and bending displace the ends along x only, torsion across x only: with the stresses of a uniform
+    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends. In shear, the
+    whole surface slides uniformly along z, because free sides would bulge.
     """
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
@@ -78,7 +78,7 @@ def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
     along[left | right, 0] = True
     low = np.flatnonzero(left)[np.argsort(y[left] + z[left])[0]]
     next_to = np.flatnonzero(left)[np.argsort(z[left] - y[left])[0]]
-    along[low, 1:] = along[next_to, 2] = True  # holds the bar in y and z, and against turning about x
+    along[low, 1:] = along[next_to, 2] = True  # fixes the bar in y and z, and its rotation about x
     across = np.zeros(mesh.vertices.shape, bool)
     across[left | right, 1:] = True
     across[low, 0] = True
@@ -110,7 +110,7 @@ def end_forces(mesh: TetMesh, traction: Floats) -> Floats:
 
 
 def theory(young: float, poisson: float, length: float, width: float) -> dict[str, float]:
-    """Stiffness of `free_ends` on a bar of square section.
+    """Stiffness under `free_ends` of a bar of square section.
 
     E A / L; G A / L; G J / L with Saint-Venant's J; E I / L; and Timoshenko's cantilever, with Cowper's shear
     coefficient (1966) of a rectangle.

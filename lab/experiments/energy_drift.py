@@ -1,7 +1,7 @@
 """Undamped kinetic energy over time (thesis section 6.4): it accumulates, and very little damping stops it.
 
 The thesis's stress is not the derivative of an energy, except at nu = 1/4, where the virial law's is that of
-W = 1/2 lambda (J (tr b - 5) + 2), b = F F^T. There, and under a law with an energy, nothing may accumulate.
+W = 1/2 lambda (J (tr b - 5) + 2), b = F F^T. There, and under a law with an energy, it must not accumulate.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ DT = 1 / 60
 READ_EVERY = 3  # steps
 CONSERVATIVE = 0.25  # Poisson's ratio at which the linear virial stress has an energy
 LITTLE = 0.05
-"""Share of the critical damping of a cube's longest vibration that still is "very little"."""
+"""Fraction of the critical damping of a cube's longest vibration that counts as "very little"."""
 GROWS, STAYS = 1.15, 1.05
-"""Kinetic energy of the last quarter over that of the first, above which it accumulates or below stays."""
+"""Kinetic energy of the last quarter over that of the first, above which it grows and below which it
+stays."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Poisson's ratios of the thesis and 1/4, undamped and hardly damped, and the law with an energy."""
+    """Points: Poisson's ratios of the thesis and 1/4 with little or no damping; the law with an energy."""
     seconds = 20.0 if effort is Effort.QUICK else 60.0
     cases = [("virial", nu, b, 6) for nu in (0.1, 0.25, 0.4) for b in (0.0, 10.0)]
     cases.append(("st_venant_kirchhoff", 0.1, 0.0, 6))
@@ -53,7 +54,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Energies of a floating cube that is let go stretched and twisted."""
+    """Measure the energies of a floating cube that is released stretched and twisted."""
     mesh = box((EDGE, EDGE, EDGE), (3, 3, 3))
     world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, point["poisson"], DENSITY, point["damping"], damping_ratio=0.0)
@@ -80,7 +81,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _elastic_energy(body: Body, point: Point) -> float:
-    """Of the conservative laws [J]."""
+    """Elastic energy of the conservative laws [J]."""
     if point["law"] != "virial":
         return body.elastic_energy()
     F, now = body.deformations(), body.volumes()
@@ -90,14 +91,16 @@ def _elastic_energy(body: Body, point: Point) -> float:
 
 
 def growth(numbers: Numbers) -> float:
-    """Mean kinetic energy of the last quarter over that of the first; infinite where it ran away."""
+    """Mean kinetic energy of the last quarter over that of the first; infinite if the body failed."""
     kinetic = numbers["kinetic"]
     quarter = max(1, len(kinetic) // 4)
     return math.inf if numbers["frozen"] else float(np.mean(kinetic[-quarter:]) / np.mean(kinetic[:quarter]))
 
 
 def damping_ratio(numbers: Numbers) -> float:
-    """Share of critical damping: K fades with 2 zeta omega, omega that of waves over twice the edge."""
+    """Fraction of critical damping. K decays with 2 zeta omega; omega is that of waves twice as long as the
+    edge.
+    """
     time, kinetic = np.array(numbers["time"]), np.array(numbers["kinetic"])
     early = time < 5.0
     rate = -float(np.polyfit(time[early], np.log(kinetic[early]), 1)[0])
@@ -105,7 +108,7 @@ def damping_ratio(numbers: Numbers) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Whether energy accumulates where there is no energy, and only there."""
+    """Judge whether energy accumulates exactly where the stress has no energy."""
     undamped = {
         nu: results.one(law="virial", poisson=nu, damping=0.0, substeps=6) for nu in (0.1, CONSERVATIVE, 0.4)
     }
@@ -171,7 +174,7 @@ def conclude(results: Results) -> Section:
 
 
 def _least_damping(results: Results) -> float:
-    """The smallest that stops the growth at every Poisson's ratio; else the largest tried [N s/m]."""
+    """Smallest damping that stops the growth at every Poisson's ratio, or the largest tried [N s/m]."""
     damped = {p["damping"] for p, _ in results.where(law="virial") if p["damping"] > 0.0}
     stops = [b for b in damped if max(growth(n) for _, n in results.where(law="virial", damping=b)) < 1.0]
     return float(min(stops) if stops else max(damped))

@@ -1,6 +1,7 @@
-"""Bodies at rest between plates: vertices at both ends are driven, the others go where no force is left.
+"""Bodies at rest between plates: vertices at both ends are driven, the others move until they are free of
+force.
 
-What a damped body comes to in the end, found without waiting: Newton's method on its forces in float64.
+Newton's method on the forces in float64 finds the state in which a damped body would come to rest.
 """
 
 from __future__ import annotations
@@ -15,20 +16,20 @@ from lab.experiments.sparse_gradient import Floats, SparseGradient
 from taichi_soft.meshing import TetMesh
 
 Forces = Callable[[Floats], Floats]
-"""Positions (n, 3) [m] to forces (n, 3) [N]."""
+"""Function of positions (n, 3) [m] that returns forces (n, 3) [N]."""
 
 SMALLEST = 1e-9
-"""Largest force left on what is free, over the largest of all."""
+"""Largest remaining force on free coordinates, over the largest of all."""
 DIFFERENCE = 1e-6
-"""Way that vertices are moved to find a gradient, over the mean length of an edge."""
+"""Step of the finite differences, over the mean length of an edge."""
 
 
 class Plates:
-    """A body about the origin, its lowest and highest vertices on plates across z.
+    """A body about the origin with its lowest and highest vertices on plates across z.
 
     Args:
-        mesh: at rest, of the same cross-section at all heights.
-        slide: vertices on the plates move freely along them; else they keep their places there.
+        mesh: at rest, with the same cross-section at all heights.
+        slide: True if vertices on the plates can move along them; else they stay in place there.
     """
 
     def __init__(self, mesh: TetMesh, *, slide: bool = False) -> None:
@@ -41,7 +42,7 @@ class Plates:
         if slide:
             driven[:, :2] = False
             axis = np.hypot(*mesh.vertices[:, :2].T) + 1e9 * ~bottom
-            driven[axis.argmin(), :2] = True  # what the body could do as a whole
+            driven[axis.argmin(), :2] = True  # rigid motions of the body
             driven[np.where(bottom, mesh.vertices[:, 0], -np.inf).argmax(), 1] = True
         self.free: NDArray[np.int64] = np.flatnonzero(~driven)
         """Coordinates, 3 vertex + axis."""
@@ -49,20 +50,20 @@ class Plates:
 
     @property
     def area(self) -> float:
-        """Of the cross-section [m^2]."""
+        """Area of the cross-section [m^2]."""
         return self.mesh.volume / self.height
 
     def pull(self, forces: Floats) -> Floats:
-        """What drives the top, of the forces of the body there, (3,) [N]."""
+        """Force that drives the top plate, from the forces of the body there, (3,) [N]."""
         return np.asarray(-forces[self.top].sum(axis=0))
 
     def path(self, forces: Forces, direction: Sequence[float], shares: Sequence[float]) -> list[Floats]:
-        """States of rest while the top goes from its place in `direction`, the bottom held.
+        """States of rest while the top moves in `direction`, with the bottom fixed.
 
         Args:
-            shares: ways of the top over the height, ascending from above 0: steps small enough to keep to
-                the branch from rest.
-        Returns: one for each share, up to the first for which there is none.
+            shares: displacements of the top over the height, ascending from above 0, in steps small enough to
+                follow the branch from rest.
+        Returns: a state for each share, up to the first that has none.
         """
         z = self.mesh.vertices[:, 2:]
         x = self.mesh.vertices.copy()
@@ -77,7 +78,7 @@ class Plates:
         return states
 
     def rest(self, forces: Forces, start: Floats) -> Floats | None:
-        """Where the free coordinates come to rest from `start`; None where they do not."""
+        """Free coordinates at rest, found from `start`; None if the iteration fails."""
         from scipy.sparse.linalg import splu
 
         x, f = start, forces(start)
@@ -105,12 +106,12 @@ class Plates:
         return None
 
     def gradient(self, forces: Forces, x: Floats) -> Any:
-        """df/dx of the free coordinates there, a sparse matrix [N/m], by central differences."""
+        """df/dx of the free coordinates, a sparse matrix [N/m], by central differences."""
         return self._gradient.at(forces, x)[self.free][:, self.free].tocsc()
 
 
 def _neighbours(mesh: TetMesh) -> Any:
-    """Which vertices are the same or share an edge: sparse, symmetric (n, n)."""
+    """True for vertices that are the same or share an edge: sparse, symmetric (n, n)."""
     from scipy.sparse import csr_matrix
 
     every = np.arange(len(mesh.vertices))

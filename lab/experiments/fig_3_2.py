@@ -1,7 +1,7 @@
 """A standing wave by both Euler methods (thesis figure 3.2): the first mode of a row of springs.
 
-The row is the wave equation cut into pieces; its modes are known exactly, and so is what every step makes of
-their amplitude: explicit Euler multiplies it by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides.
+The row discretises the wave equation. Its modes and their change of amplitude per step are known exactly:
+explicit Euler multiplies it by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides by that.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from taichi_soft.world.bare import bare_world
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
-"""Particles between the fixed ones. With more, explicit Euler blows up round-off in higher modes first."""
+"""Particles between the fixed ones. With more, explicit Euler amplifies round-off in higher modes first."""
 
 PERIODS = 2
 AMPLITUDE = 0.05
-"""Of the middle particle [m]; the springs are 1 m long."""
+"""Amplitude of the middle particle [m]; the springs are 1 m long."""
 
 ANGLES = (0.05, 0.1)
-"""h w."""
+"""Values of h w."""
 
 DRAWN = 0.1
 STEADY = 0.02
@@ -44,7 +44,7 @@ STEADY = 0.02
 
 
 def points(_: Effort) -> list[Point]:
-    """Each method and step: so little that nothing is left out of a quick report."""
+    """Points: each method and step, also in a quick report."""
     return [{"integrator": name, "angle": angle} for name in INTEGRATORS for angle in ANGLES]
 
 
@@ -82,13 +82,13 @@ def measure(point: Point) -> Numbers:
 
 
 def per_step(integrator: IntegratorName, angle: float) -> float:
-    """What one step makes of the amplitude, in closed form."""
+    """Factor on the amplitude in one step, in closed form."""
     growth = float(np.hypot(1.0, angle))
     return {"explicit_euler": growth, "implicit_euler": 1 / growth}.get(integrator, 1.0)
 
 
 def conclude(results: Results) -> Section:
-    """Whether amplitudes grow or fade, and whether as they should."""
+    """Judge whether amplitudes grow or decay, and at the correct rate."""
     findings, rows = [], []
     for claim, name in (
         ("wave-explicit", INTEGRATORS[0]),

@@ -1,7 +1,7 @@
-"""Regions of stability (thesis figure 3.3), from the steps that damped oscillators make.
+"""Regions of stability (thesis figure 3.3), from steps of damped oscillators.
 
-m u'' = -k u - b u' has the eigenvalues lambda and its conjugate; h lambda is laid out on a grid. With b >= 0
-it lies in the left half of the plane, on the imaginary axis at most.
+m u'' = -k u - b u' has the eigenvalues lambda and its conjugate. h lambda takes the points of a grid. With b
+>= 0 it lies in the left half of the plane or on the imaginary axis.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from taichi_soft.core.types import IntegratorName
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler")
 LEFT, TOP = -3.0, 2.4
-"""Of the plane of h lambda; the lower half mirrors the upper."""
+"""Bounds of the plane of h lambda; its lower half mirrors the upper."""
 
 CLOSE = 1e-3
-"""Points of which the closed form lies nearer to 1 than this say nothing: float32 decides."""
+"""Distance of the closed form from 1 below which a point is not judged: rounding of float32 decides there."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each method on a grid of 31 x 16 or 76 x 40 points."""
+    """Points: each method on a grid of 31 x 16 or 76 x 40 values."""
     cells = 10 if effort is Effort.QUICK else 25
     return [{"integrator": name, "cells": cells} for name in INTEGRATORS]
 
@@ -62,7 +62,7 @@ def closed_form(integrator: IntegratorName, z: NDArray[np.complex128]) -> NDArra
 
 
 def conclude(results: Results) -> Section:
-    """Where the measured factor and the closed form lie on different sides of 1."""
+    """Judge where the measured factor and the closed form lie on different sides of 1."""
     rows, wrong_of, worst_of, maps = [], {}, {}, {}
     for name in INTEGRATORS:
         measured = np.array(results.one(integrator=name)["factor"])

@@ -1,4 +1,4 @@
-"""Strain of one edge whose body is stretched at an angle to it (thesis section 4.3, figure 4.3)."""
+"""Strain of an edge in a body that is stretched at an angle to it (thesis section 4.3, figure 4.3)."""
 
 from __future__ import annotations
 
@@ -24,24 +24,27 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 POISSONS = (0.0, 0.25)
 STRETCHES = (0.01, 0.3)
-"""Small, to compare with components of strain; and as large as a drawing shows."""
+"""Stretches: a small one, to compare with components of strain, and one as large as in a drawing."""
 
 THESIS_ANGLE = 30
-"""Of figure 4.3 (b) [degrees]."""
+"""Angle of figure 4.3 (b) [degrees]."""
 
 WRONG = 0.1
-"""Part of the stretch by which a reading must be off to be called wrong."""
+"""Error of a reading, over the stretch, from which it counts as wrong."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Angles between edge and stretch [degrees], and Poisson's ratios."""
+    """Points: angles between edge and stretch [degrees], and Poisson's ratios."""
     step = 30 if effort is Effort.QUICK else 5
     return [{"angle": angle, "poisson": nu} for nu in POISSONS for angle in range(0, 91, step)]
 
 
 def measure(point: Point) -> Numbers:
-    """Strains that CMPM reads in an edge whose body is stretched along z, by `STRETCHES`; and the stress of
-    its face [Pa], along and across the normal, in a bar that is pulled by the first and grows thinner.
+    """Strains that CMPM reads in an edge of a body stretched along z, by `STRETCHES`, and the stress of its
+    face [Pa].
+
+    The stress is given along and across the normal, in a bar that is stretched by the first and becomes
+    thinner.
     """
     turn = np.radians(point["angle"])
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
@@ -66,20 +69,20 @@ def measure(point: Point) -> Numbers:
 
 
 def components(angle: float, stretch: float) -> tuple[float, float]:
-    """Those of the strain tensor along the edge, and across it as an angle, for a small stretch."""
+    """Components of the strain tensor along the edge, and across it as an angle, for a small stretch."""
     turn = np.radians(angle)
     return float(stretch * np.cos(turn) ** 2), float(stretch * np.sin(2 * turn))
 
 
 def traction(angle: float, stretch: float) -> tuple[float, float]:
-    """Stress on the edge's face in a bar in tension, along and across its normal [Pa]: Hooke's law."""
+    """Stress on the edge's face in a bar in tension, along and across its normal [Pa], by Hooke's law."""
     turn = np.radians(angle)
     pull = float(YOUNG * stretch * np.cos(turn))
     return pull * float(np.cos(turn)), pull * float(np.sin(turn))
 
 
 def conclude(results: Results) -> Section:
-    """Readings beside the components of strain, and stresses beside Hooke's."""
+    """Compare readings with the components of strain, and stresses with Hooke's law."""
     s = STRETCHES[0]
     angles = sorted({int(point["angle"]) for point, _ in results.where(poisson=POISSONS[1])})
     at = {nu: {angle: results.one(angle=angle, poisson=nu) for angle in angles} for nu in POISSONS}

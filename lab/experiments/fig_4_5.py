@@ -1,4 +1,6 @@
-"""One element stretched along many axes (thesis figure 4.5): a regular tetrahedron for the triangle there."""
+"""One element stretched along many axes (thesis figure 4.5): a regular tetrahedron instead of the triangle
+there.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,7 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 LAWS = ("cmpm", "cmpm2", "virial")
 APART = "nu = 0.25, G = E / 20"
-"""A shear modulus of its own, which the laws of chapter 4 take."""
+"""An independent shear modulus, as the laws of chapter 4 allow."""
 
 PLAIN, JUDGED = "nu = 0", "nu = 0.25"
 MATERIALS = {
@@ -42,25 +44,27 @@ COMBINATIONS = [
     if law != "virial" or material.shear_modulus is None
 ]
 ANISOTROPIC = 0.01
-"""Spread of the stiffness over all directions beyond which it is no rounding: the virial law has 1e-9."""
+"""Spread of the stiffness over all directions above which it is not rounding: the virial law has 1e-9."""
 
 REGULAR = float(np.degrees(np.arctan(np.sqrt(0.5))))
 APEX_ANGLES = (25.0, 30.0, REGULAR, 45.0)
-"""Between the pull and the edges at the particle that is pulled [degrees]: of slender, regular and flat
-tetrahedra. The text does not tell the thesis's."""
+"""Angles between the pull and the edges at the pulled particle [degrees], of slender, regular and flat
+tetrahedra. The thesis gives no angle."""
 
 STRETCHES = (0.01, 0.3, 1.0)
-"""By which the body is pulled: small, and as far as a drawing shows. The text does not tell the thesis's."""
+"""Stretches of the body: a small one, and one as large as in a drawing. The thesis gives none."""
 
 MUCH = 2.0
-"""Shear strain over tensile strain from which on it is called much larger."""
+"""Shear strain over tensile strain above which it counts as much larger."""
 
 SMALL = 0.5
-"""Tensile strain over the stretch below which it is called small."""
+"""Tensile strain over the stretch below which it counts as small."""
 
 
 def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
-    """On a base with edges of 1 m. Three edges meet in vertex 1, on top, at `apex_angle` [degrees] to z."""
+    """A tetrahedron on a base with edges of 1 m. Three edges meet in vertex 1 at the top, at `apex_angle`
+    [degrees] to z.
+    """
     turn = 2 * np.pi * np.arange(3) / 3
     base = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) / np.sqrt(3)
     height = 1 / np.sqrt(3) / np.tan(np.radians(apex_angle))
@@ -69,7 +73,9 @@ def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each law and material, along 40 or 400 directions; and readings of tetrahedra of several heights."""
+    """Points: each law and material, along 40 or 400 directions; and readings of tetrahedra of several
+    heights.
+    """
     count = 40 if effort is Effort.QUICK else 400
     return [
         *({"law": law, "material": name, "directions": count} for law, name in COMBINATIONS),
@@ -78,8 +84,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness along every direction [Pa]; or what an edge to the top reads by CMPM2 when that is pulled up,
-    for each of `STRETCHES`."""
+    """Stiffness along every direction [Pa], or the reading by CMPM2 of an edge at a pulled top vertex for
+    `STRETCHES`.
+    """
     if "apex" in point:
         mesh, material = tetrahedron(point["apex"]), MATERIALS[JUDGED]
         rest = read_edge(mesh, material, mesh.vertices, "cmpm2").normal
@@ -92,7 +99,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _reading(results: Results) -> Finding:
-    """Whether an edge at the particle that is pulled reads little tension and much more shear."""
+    """Judge whether an edge at the pulled particle reads little tension and much more shear."""
     told, holds = [], []
     for angle in APEX_ANGLES:
         numbers = results.one(apex=angle)
@@ -117,7 +124,7 @@ def _reading(results: Results) -> Finding:
 
 
 def conclude(results: Results) -> Section:
-    """Spread of the stiffness of each law, and readings."""
+    """Judge the spread of the stiffness of each law, and the readings."""
     spreads = {
         (law, name): spread(results.one(law=law, material=name)["moduli"]) for law, name in COMBINATIONS
     }

@@ -30,18 +30,18 @@ from taichi_soft import Material, TetMesh
 YOUNG, DENSITY = 1e6, 1000.0
 LENGTH, WIDTH = 4.0, 1.0
 AGREEMENT = 0.01
-"""Of stiffness and displacement: strains of 1e-4 leave some hundredths of that."""
+"""Tolerance of stiffness and displacement: strains of 1e-4 cause errors of a few hundredths of it."""
 BEAM = ("tension", "shear", "torsion", "bending")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every law at nu = 0.3 on a coarse mesh; or at three ratios on a finer one."""
+    """Points: every law at nu = 0.3 on a coarse mesh, or at three ratios on a finer one."""
     cells, ratios = (2, (0.3,)) if effort is Effort.QUICK else (5, (0.0, 0.25, 0.4))
     return [{**variant, "poisson": nu, "cells": cells} for nu in ratios for variant in variants(effort)]
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness and displacement of beam and block, over those of linear finite elements on their mesh."""
+    """Stiffness and displacement of beam and block, over those of linear finite elements on the same mesh."""
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
     beam = irregular_block(LENGTH, WIDTH, point["cells"])
     block = irregular_block(WIDTH, WIDTH, point["cells"])
@@ -67,7 +67,7 @@ def _compared(mesh: TetMesh, loads: dict[str, EndLoad], material: Material, poin
 
 
 def conclude(results: Results) -> Section:
-    """Laws on tetrahedra agree, laws along edges do not."""
+    """Judge: laws on tetrahedra agree, laws along edges do not."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     solid = [(point, numbers) for point, numbers in rows if is_tetrahedral(point["law"])]
     bonds = [numbers for point, numbers in rows if not is_tetrahedral(point["law"])]
@@ -169,7 +169,7 @@ def _ratio(numbers: Numbers) -> float:
 
 
 def _why(solid: list[tuple[Point, Numbers]]) -> str:
-    """Which laws are furthest from finite elements: the mesh is the same, so it is the model."""
+    """Name the laws that differ most. The mesh is the same, so the model is the reason."""
     furthest = max(solid, key=lambda row: max(abs(_ratio(row[1][load]) - 1) for load in (*BEAM, "block")))
     return f"model: mesh and material are the same in both; {label(furthest[0])} is furthest away"
 
@@ -183,4 +183,4 @@ FINITE_ELEMENTS = Experiment(
     measure,
     conclude,
 )
-"""Against finite elements."""
+"""Comparison with finite elements."""

@@ -1,6 +1,7 @@
-"""Tetrahedra turned inside out by a hard impact (thesis section 6.6): they stay as dents.
+"""Tetrahedra inverted by a hard impact (thesis section 6.6): they stay as dents.
 
-The thesis's sphere is thrown at the floor; beside its treatment of flips, none, and driving them back.
+The thesis's sphere is thrown at the floor with its treatment of flips, with none, and with one that restores
+them.
 """
 
 from __future__ import annotations
@@ -35,18 +36,18 @@ STEP = 1 / 700  # the thesis's [s]
 SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
 MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
-"""Share of all tetrahedra that makes a dent; of those flipped at half-time that are so at the end; of these
-in the quarter that was pressed most (by chance 0.25); extent over that at rest of what runs away."""
+"""Fraction of all tetrahedra that makes a dent; of those inverted at half-time that are so at the end; of
+these in the most compressed quarter (0.25 by chance); extent over that at rest of a body that failed."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every treatment of flips at one speed, or at three."""
+    """Points: every treatment of flips at one speed, or at three."""
     speeds = (SPEED,) if effort is Effort.QUICK else (17.0, SPEED, 24.0)
     return [{"flips": flips, "speed": speed} for speed in speeds for flips in FLIPS]
 
 
 def measure(point: Point) -> Numbers:
-    """Which tetrahedra flip and where, over the impact and some seconds."""
+    """Measure which tetrahedra invert and where, over the impact and a few seconds."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     rest = mesh.vertices
     world = bare_world(retries=0)
@@ -98,7 +99,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Whether flips make dents in the pressed region that stay, and whether the rest is sound."""
+    """Judge whether flips leave dents in the compressed region, and whether the rest is intact."""
     by_flips = {flips: results.one(flips=flips, speed=SPEED) for flips in FLIPS}
     thesis = {point["speed"]: numbers for point, numbers in results.where(flips="tolerant")}
     dented = [speed for speed, numbers in thesis.items() if _is_dented(numbers)]
@@ -174,7 +175,7 @@ def _listed(values: Iterable[float]) -> str:
 
 
 def _is_dented(numbers: Numbers) -> bool:
-    """Whether flips stay, and where most was pressed."""
+    """True if flips stay, and are where the compression was largest."""
     return bool(numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS and numbers["in_pressed"] > PLACED)
 
 

@@ -1,6 +1,6 @@
-"""Orders of the integrators (thesis section 3.5), and how good lazy leapfrog is.
+"""Orders of the integrators (thesis section 3.5), and accuracy of lazy leapfrog.
 
-An oscillator is let go from rest and compared with the cosine.
+An oscillator is released from rest and compared with the cosine.
 """
 
 from __future__ import annotations
@@ -24,30 +24,31 @@ from lab.experiments.experiment import (
 from lab.experiments.oscillators import run_oscillators
 
 ORDERS = {"explicit_euler": 1, "lazy_leapfrog": 1, "leapfrog": 2, "implicit_euler": 1}
-"""In theory, of position and velocity at the same time; the thesis speaks of the three but the lazy one."""
+"""Theoretical orders, of position and velocity at the same time. The thesis states all but that of lazy
+leapfrog."""
 
 ORDER_TOLERANCE = 0.15
 START = 0.02
-"""Displacement at the start [m]; errors are reported over it."""
+"""Displacement at the start [m]; errors are divided by it."""
 
 STEPS = (32, 64, 128, 256)
-"""In one period; more would measure float32."""
+"""Steps in one period; with more, rounding of float32 dominates."""
 
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
 """h w and length of the long run."""
 
 NEARLY = 5.0
-"""Times leapfrog's error, in the long run."""
+"""Largest error over leapfrog's in the long run that counts as nearly as good."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each integrator over one period at four steps, and over ten periods at one step."""
+    """Points: each integrator over one period at four steps, and over ten periods at one step."""
     del effort  # both take a second
     return [{"integrator": name, "run": run} for name in ORDERS for run in ("period", "long")]
 
 
 def measure(point: Point) -> Numbers:
-    """Errors of one period, or displacements of the long run; there also from a changed first velocity."""
+    """Errors of one period, or displacements of the long run; these also from a changed first velocity."""
     name = point["integrator"]
     if point["run"] == "period":
         angles = 2 * np.pi / np.array(STEPS)
@@ -58,7 +59,7 @@ def measure(point: Point) -> Numbers:
         return {"errors": [float(gap[: n + 1, i].max()) for i, n in enumerate(STEPS)]}
     k = LONG_ANGLE**2
     steps = round(LONG_PERIODS * 2 * np.pi / LONG_ANGLE)
-    # Half a kick more: then leapfrog's first half step makes of it what lazy leapfrog's whole one does.
+    # Add half a kick, so that leapfrog's first half kick gives the velocity of lazy leapfrog's whole one.
     kicked = ((START, START), (0.0, -k * START / 2))
     u, _ = run_oscillators(name, (k, k), (0.0, 0.0), kicked, steps)
     return {
@@ -68,7 +69,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Slopes of the errors, and errors of the long run over leapfrog's."""
+    """Judge the slopes of the errors, and the errors of the long run over leapfrog's."""
     errors = {name: results.one(integrator=name, run="period")["errors"] for name in ORDERS}
     slopes = {name: float(np.log2(e[-3] / e[-1])) / 2 for name, e in errors.items()}
     long = {name: results.one(integrator=name, run="long") for name in ORDERS}

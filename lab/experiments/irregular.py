@@ -1,4 +1,4 @@
-"""Cubes of irregular tetrahedra, as a mesher makes them."""
+"""Cubes of irregular tetrahedra, like those of a mesher."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from taichi_soft import TetMesh, box, delaunay_mesh
 
 SHAKEN = 0.25
-"""Largest way of a vertex along an axis, over the edge of a cell."""
+"""Largest displacement of a vertex along an axis, over the edge of a cell."""
 
 
 def cube(cells: int, seed: int | None = None) -> TetMesh:
     """A cube of edge 1 m about the origin.
 
     Args:
-        cells: along each edge.
-        seed: of the ways by which vertices are moved, those on the surface along it, before they are
-            connected anew by Delaunay's rule; None leaves them in a regular grid.
+        cells: number along each edge.
+        seed: seed of the displacements. Vertices on the surface move along it. Delaunay's rule then connects
+            them anew. None leaves a regular grid.
     """
     regular = box((1.0, 1.0, 1.0), (cells, cells, cells))
     if seed is None:

@@ -1,4 +1,4 @@
-"""A block in tetrahedra of many shapes and directions, which no law finds easier than another mesh."""
+"""A block of tetrahedra of many shapes and directions, which favours no law."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 from taichi_soft import TetMesh
 
 JITTER = 0.12
-"""How far vertices are moved at random, over the edge of a cell."""
+"""Largest random displacement of vertices, over the edge of a cell."""
 FLAT = 1e-6
-"""Volume over that of a cell, of what Delaunay makes of four points in one face of the block."""
+"""Volume over that of a cell, below which a tetrahedron consists of four points in one face of the block."""
 
 
 def irregular_block(length: float, width: float, cells: int) -> TetMesh:
-    """A block of square section about the origin, its axis along x; the same for the same numbers.
+    """A block of square section about the origin, its axis along x; deterministic.
 
-    A body-centred lattice, moved at random within the block's faces and edges, and connected so that all
-    circumspheres are empty. Corners, edges and faces of the block stay exactly where they are.
+    A body-centred lattice, with vertices moved at random within the block's faces and edges, and connected so
+    that all circumspheres are empty. Corners, edges and faces of the block stay exactly in place.
     Args:
-        length, width: edges along x, and along y and z [m]; length should be whole cells.
-        cells: across the width.
+        length, width: edges along x, and along y and z [m]; length should be a whole number of cells.
+        cells: number across the width.
     """
     from scipy.spatial import Delaunay
 

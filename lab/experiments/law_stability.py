@@ -1,4 +1,4 @@
-"""How stable a body is under a law: by its vibrations at rest, and by running it."""
+"""Stability of a body under a law: from its vibrations at rest, and by running it."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from taichi_soft.world.bare import bare_world
 
 STEPS = 200
 GROWTH = 3.0
-"""Of a small random displacement within `STEPS` that counts as unstable."""
+"""Growth of a small random displacement within `STEPS` that counts as unstable."""
 
 SHORTEST, LONGEST, HALVINGS = 0.25, 1.4, 7
-"""Bounds of the search for the largest step, over a guess, and how often the gap is halved: to 1 %."""
+"""Bounds of the search for the largest step, over a guess, and number of halvings: to 1 %."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Vibration:
     """Small motion about the rest shape, without damping."""
 
     frequency: float  # highest [1/s]
-    growth_rate: float  # largest [1/s]: forces without an energy may feed a vibration, whatever the step
+    growth_rate: float  # largest [1/s]: forces without an energy can feed a vibration at any step
 
 
 def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
-    """From all eigenvalues of M^-1 K, with K from differences of the forces."""
+    """Compute all eigenvalues of M^-1 K, with K from differences of the forces."""
     count = mesh.vertices.size
     nudge = 1e-6 * float(mesh.edge_lengths.min())
     stiffness = np.empty((count, count))
@@ -48,10 +48,10 @@ def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
 
 
 class ShakenBody:
-    """A body that is shaken a little, again and again."""
+    """A body that is displaced slightly at random, again and again."""
 
     def __init__(self, mesh: TetMesh, material: Material, law: LawName) -> None:
-        """Float in no gravity."""
+        """Build a world without gravity."""
         self.world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
         self.body = self.world.add_body(mesh, material, law=law)
         self.world.build()
@@ -60,7 +60,7 @@ class ShakenBody:
         self.noise = size * np.random.default_rng(0).normal(size=self.rest.shape)
 
     def stays(self, h: float) -> bool:
-        """Whether it stays near its shape over `STEPS` of leapfrog of h [s]."""
+        """True if it stays near its shape over `STEPS` of leapfrog of h [s]."""
         far = GROWTH * np.abs(self.noise).max()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UnstableStepWarning)
@@ -73,7 +73,7 @@ class ShakenBody:
         return True
 
     def largest_step(self) -> float:
-        """Largest step with which it stays [s], 0 where it does not at `SHORTEST` either."""
+        """Largest step with which it stays [s]; 0 if it fails at `SHORTEST` too."""
         guess = self.body.stable_step.limit
         low, high = SHORTEST * guess, LONGEST * guess
         if not self.stays(low):

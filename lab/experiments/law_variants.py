@@ -1,4 +1,4 @@
-"""Laws with the strains that they take, as points of experiments name them."""
+"""Laws and their strains, by the names that points of experiments use."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from taichi_soft.elements.laws import BondLaw
 
 
 def variants(effort: Effort) -> list[Point]:
-    """{"law": name, "strain": name or None}, those on tetrahedra first; when it must be quick, without the
-    exact strain by the faces, whose forces are those of the virial theorem."""
+    """{"law": name, "strain": name or None}, those on tetrahedra first. A quick report omits the exact strain
+    by faces, whose forces are those of the virial theorem.
+    """
     every = [
         {"law": law.name, "strain": strain and strain.value}
         for law in LAWS.values()
@@ -22,10 +23,10 @@ def variants(effort: Effort) -> list[Point]:
 
 
 def is_tetrahedral(law: LawName) -> bool:
-    """Whether it turns the stress of tetrahedra into forces; others act along edges."""
+    """True if the law computes forces from the stress of tetrahedra; other laws act along edges."""
     return not isinstance(LAWS[law], BondLaw)
 
 
 def label(point: Point) -> str:
-    """For rows of tables."""
+    """Label for rows of tables."""
     return str(point["law"]) + (f", {point['strain']} strain" if point["strain"] else "")

@@ -1,7 +1,7 @@
-"""Leapfrog runs backwards (thesis section 3.5.2): with all velocities turned round a body goes back.
+"""Leapfrog is reversible (thesis section 3.5.2): with all velocities reversed, a body returns.
 
-Between steps a World's positions and velocities are of one time, so that a run may be turned round after any
-step; what is left then is round-off, and what the integrator forgets.
+Between steps, a World's positions and velocities belong to one time, so a run can be reversed after any step.
+The remaining error is round-off, and information that the integrator loses.
 """
 
 from __future__ import annotations
@@ -31,17 +31,18 @@ MATERIAL = Material(
 )  # undamped: damping has a direction in time
 STRETCH, DT, SUBSTEPS = 1.1, 1 / 60, 8
 REVERSIBLE = 1e-4
-"""Way left, over the way out: round-off leaves a few millionths, other integrators more than a hundredth."""
+"""Distance left over the distance travelled: a few millionths for round-off, more than a hundredth for other
+integrators."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Explicit integrators over a tenth of a second, or all over half a second."""
+    """Points: explicit integrators over 0.1 s, or all over 0.5 s."""
     steps, names = (6, INTEGRATORS[:3]) if effort is Effort.QUICK else (30, INTEGRATORS)
     return [{"integrator": name, "steps": steps} for name in names]
 
 
 def measure(point: Point) -> Numbers:
-    """How far from its start a stretched cube ends, after as many steps back as out."""
+    """Distance of a stretched cube from its start, after as many steps back as forth."""
     cube = box(cells=(2, 2, 2))
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")
@@ -59,7 +60,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Leapfrog alone comes back."""
+    """Judge: only leapfrog returns."""
     shares = {}
     for row in results.rows:
         numbers = results.one(**row.point)

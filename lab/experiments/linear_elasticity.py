@@ -13,10 +13,10 @@ from taichi_soft import Material, TetMesh
 
 
 class FiniteElements:
-    """Tetrahedra of the same mesh with linear or quadratic displacements."""
+    """Finite elements on the tetrahedra of the same mesh, with linear or quadratic displacements."""
 
     def __init__(self, mesh: TetMesh, material: Material, *, quadratic: bool = False) -> None:
-        """Assemble the stiffness; `quadratic`: ten nodes to a tetrahedron instead of four."""
+        """Assemble the stiffness; `quadratic`: ten nodes per tetrahedron instead of four."""
         from skfem import Basis, ElementTetP1, ElementTetP2, ElementVector, MeshTet
         from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -30,7 +30,7 @@ class FiniteElements:
         self._solvers: dict[bytes, Any] = {}
 
     def solve(self, load: EndLoad) -> tuple[float, Floats]:
-        """Stiffness as `EndLoad.stiffness` has it, and displacements of the vertices, (n, 3) [m]."""
+        """Stiffness as in `EndLoad.stiffness`, and displacements of the vertices, (n, 3) [m]."""
         held, u = self._held(load)
         pull = self._pull(load)
         free = ~held
@@ -43,12 +43,12 @@ class FiniteElements:
         return stiffness, np.asarray(u[self._basis.nodal_dofs].T)
 
     def _held(self, load: EndLoad) -> tuple[Mask, Floats]:
-        """Which degrees of freedom are driven, and where to."""
+        """Driven degrees of freedom, and their displacements."""
         held, u = np.zeros(self._basis.N, bool), np.zeros(self._basis.N)
         driven, nodal = load.loading.driven, self._basis.nodal_dofs.T
         held[nodal] = driven
         u[nodal] = np.where(driven, load.loading.displacement, 0.0)
-        if self._quadratic:  # nodes in the middle of edges whose ends are both driven follow them
+        if self._quadratic:  # nodes at midpoints of edges with two driven ends follow these
             first, second = self._skfem_mesh.edges
             middle = self._basis.edge_dofs.T
             held[middle] = driven[first] & driven[second]
@@ -56,7 +56,7 @@ class FiniteElements:
         return held, u
 
     def _pull(self, load: EndLoad) -> Floats:
-        """The traction on the right end, as forces on degrees of freedom."""
+        """Traction on the right end as forces on degrees of freedom."""
         from skfem import FacetBasis, LinearForm
 
         if not load.traction.any():

@@ -31,7 +31,7 @@ CLOSE = 0.1
 
 
 def points(effort: Effort) -> list[Point]:
-    """Strains up to 100 %, each way."""
+    """Points: strains up to 100 % of each deformation."""
     steps = 100 if effort is Effort.FULL else 20
     return [{"kind": kind, "steps": steps} for kind in KINDS]
 
@@ -39,8 +39,9 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Strain from the forces on a tetrahedron, linearised and exact, and in closed form.
 
-    Where nu is 0 stress is E times the strain, and the force on a vertex is the stress times a third of the
-    area vector of the face opposite to it. Told is the strain along the stretch, or the largest entry across.
+    For nu = 0 the stress is E times the strain. The force on a vertex is the stress times a third of the area
+    vector of the opposite face. The result is the strain along the stretch, or its largest off-diagonal
+    entry.
     """
     amounts = [(k + 1) / point["steps"] for k in range(point["steps"])]
     told = {name: [_told(point["kind"], e, name) for e in amounts] for name in ("linear", "exact")}
@@ -74,7 +75,7 @@ def _linear(kind: str, e: float) -> float:
 
 
 def _exact(kind: str, e: float) -> float:
-    """sqrt(F F^T) - I; of a shear, the root of [[1 + e^2, e], [e, 1]] by its trace and determinant 1."""
+    """sqrt(F F^T) - I; for a shear, the root of [[1 + e^2, e], [e, 1]] by its trace and determinant 1."""
     return e if kind == "stretch" else float(e / np.sqrt(4 + e**2))
 
 

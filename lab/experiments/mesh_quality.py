@@ -1,7 +1,7 @@
-"""Small angles destabilise, and so does a high Poisson's ratio (thesis section 6.6).
+"""Small angles reduce stability, and so does a high Poisson's ratio (thesis section 6.6).
 
-A cube is spoilt on purpose, by flattening one inner tetrahedron or one layer of cells, and the largest stable
-step is estimated at rest, and found by running with longer and longer steps.
+A cube is degraded by flattening one inner tetrahedron or one layer of cells. Its largest stable step is
+estimated at rest, and measured with longer and longer steps.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ HALVED = 0.8
 
 
 def points(effort: Effort) -> list[Point]:
-    """Poisson's ratios; the cubes are all in one world."""
+    """Points: Poisson's ratios; the cubes share one world."""
     ratios = (0.1, 0.4) if effort is Effort.QUICK else (0.0, 0.1, 0.2, 0.3, 0.4, 0.45)
     return [{"poisson": nu} for nu in ratios]
 
 
 def spoilt_cube(kind: str, share: float) -> TetMesh:
-    """A cube of 1 m and 3 cells a side, with a tetrahedron or a layer that has this share of its height."""
+    """A cube of 1 m and 3 cells per side, with a tetrahedron or a layer flattened to this fraction of its
+    height.
+    """
     mesh = box((1.0, 1.0, 1.0), (3, 3, 3))
     x = mesh.vertices.copy()
     if kind == "layer":
@@ -67,7 +69,7 @@ def cubes() -> list[tuple[str, float, TetMesh]]:
 
 
 def measure(point: Point) -> Numbers:
-    """Smallest dihedral angle, largest stable step as estimated, and the steps that held and broke."""
+    """Smallest dihedral angle, estimated largest stable step, and the steps that were stable or not."""
     meshes = [mesh for _, _, mesh in cubes()]
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
     world = bare_world(gravity=(0, 0, 0), retries=0)

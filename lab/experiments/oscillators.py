@@ -1,6 +1,6 @@
-"""Particles of 1 kg, each on a spring of its own to a pinned one: u'' = -k u - b u'.
+"""Particles of 1 kg, each on its own spring to a pinned one: u'' = -k u - b u'.
 
-What chapter 3 says about test equations is so measured on the integrators of a world themselves. All
+So the statements of chapter 3 about test equations are measured with the integrators of a world. All
 particles move along their springs, where these are linear.
 """
 
@@ -18,10 +18,10 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 LENGTH = 1.0
-"""Of the springs [m]: displacements are to be far below."""
+"""Length of the springs [m]; displacements must be far smaller."""
 
 SLACK = 1e-9
-"""Stiffness [N/m] of a spring that is there for its damping only: springs need some."""
+"""Stiffness [N/m] of a spring that is used for its damping only: springs need one."""
 
 
 def run_oscillators(
@@ -33,7 +33,7 @@ def run_oscillators(
 ) -> tuple[Floats, Floats]:
     """Displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m) each.
 
-    Steps of 1 s: k is (h w)^2 and b is h times the damping per mass.
+    Because steps are 1 s, k is (h w)^2 and b is h times the damping per mass.
     Args:
         stiffness: k [N/m], (m,).
         damping: b [N s/m], (m,).
@@ -42,7 +42,7 @@ def run_oscillators(
     k, b, u, v = (np.atleast_1d(np.asarray(rows, float)) for rows in (stiffness, damping, *start))
     count = len(k)
     rest = np.zeros((2 * count, 3))
-    rest[0::2, 0] = -LENGTH  # the free ends at 0, where float32 is fine
+    rest[0::2, 0] = -LENGTH  # free ends at 0, where float32 is most precise
     rest[:, 1] = np.repeat(np.arange(count), 2)
     mesh = ParticleMesh(rest, np.arange(2 * count).reshape(-1, 2), np.ones(2 * count))
     with warnings.catch_warnings():
@@ -61,10 +61,10 @@ def run_oscillators(
 
 
 def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
-    """Largest modulus of the eigenvalues of a step of each oscillator, (m,): above 1 it grows.
+    """Largest modulus of the eigenvalues of a step of each oscillator, (m,); it grows above 1.
 
-    From what is left of two different starts after two steps and after three. For methods whose state is
-    position and velocity of one time.
+    Computed from two different starts after two and three steps, for methods whose state is position and
+    velocity at the same time.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     amount = np.full(len(k), 1e-2 * LENGTH)

@@ -28,11 +28,12 @@ STRAINS = (1e-4, 1e-3, 1e-2)  # the largest entry of the strain
 SMALL = 1e-3
 """Error at the smallest strain, over the largest force, of a law that passes."""
 FALLS = 0.02
-"""The same over that at the largest strain, a hundredth if what is left is of second order in the strain."""
+"""Error at the smallest strain over that at the largest: a hundredth for an error of second order in the
+strain."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each law on one irregular mesh, or three, and several strains at random."""
+    """Points: each law on one irregular mesh, or three, with random strains."""
     is_full = effort is Effort.FULL
     seeds, strains = (range(1, 4), 12) if is_full else (range(1, 2), 4)
     laws = (*TETRAHEDRAL, *(ALONG_EDGES if is_full else ALONG_EDGES[:2]))
@@ -40,10 +41,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Errors of forces, worst over strains at random, for each amount of strain.
+    """Largest errors of the forces over random strains, for each size of strain.
 
-    `surface`: distance from the forces that the stress of Hooke's law puts on the surface of the body at
-    rest, over the largest of these. `inside`: the largest force on a vertex inside, where none should be.
+    `surface`: distance from the forces that the stress of Hooke's law exerts on the surface of the body at
+    rest, over the largest of these. `inside`: the largest force on an inner vertex, where it should be zero.
     """
     mesh, rng = cube(3, point["seed"]), np.random.default_rng(point["seed"])
     material = Material(YOUNG, POISSON, 1000.0, damping_ratio=0.0)

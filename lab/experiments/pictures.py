@@ -1,4 +1,4 @@
-"""Pictures of bodies for a section, drawn from positions that were measured."""
+"""Pictures of bodies for a section, drawn from measured positions."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ def picture(
     azimuth: float = -60.0,
     elevation: float = 18.0,
 ) -> NDArray[np.uint8]:
-    """Bodies as a camera sees them that is just far enough to have all of them in the picture.
+    """Draw bodies with a camera just far enough away to show all of them.
 
     Args:
         bodies: meshes and the positions of all their vertices, (n, 3) [m], finite.
-        floor: whether they stand over a floor: at z = 0, as that of a `World`, or under the lowest vertex
-            where one is lower; without, they hang in the air.
+        floor: True to draw a floor: at z = 0, as that of a `World`, or below the lowest vertex if that is
+            lower.
         size: width and height [pixels].
-        values: for each body a number per vertex, (n,), that colours it from violet (low) to yellow (high).
-        limits: the numbers of violet and yellow; None takes the least and the largest.
-        quantity: what the values are, with the unit: "strain [1]"; it is written into the picture together
-            with the limits.
+        values: for each body a number per vertex, (n,), coloured from violet (low) to yellow (high).
+        limits: the numbers of violet and yellow; None: the smallest and the largest.
+        quantity: name of the values with the unit, such as "strain [1]"; it is written into the picture
+            together with the limits.
         labels: one per body, below it, plain ASCII.
-        azimuth, elevation: where the camera stands, see `Camera.framing` [degrees].
+        azimuth, elevation: direction of the camera, see `Camera.framing` [degrees].
     Returns: sRGB, uint8 (height, width, 3), red first.
     Raises: OptionError for positions that are not finite, and for values or labels of other bodies.
     """
     if not bodies:
-        raise OptionError("a picture needs one body at least")
+        raise OptionError("a picture needs at least one body")
     places = [as_array(positions, "positions", (len(mesh.vertices), 3), "m") for mesh, positions in bodies]
     surfaces = [Surface.of(mesh, color=PALETTE[k % len(PALETTE)]) for k, (mesh, _) in enumerate(bodies)]
     for surface, rows in zip(surfaces, places, strict=True):
@@ -85,7 +85,7 @@ def picture(
 def _colour(
     surfaces: Sequence[Surface], values: Sequence[ArrayLike] | None, limits: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Give each surface the colours of its values, all of one scale. Returns its ends."""
+    """Colour each surface by its values, all on one scale. Returns the ends of the scale."""
     if values is None:
         return 0.0, 0.0
     if len(values) != len(surfaces):
@@ -95,7 +95,7 @@ def _colour(
         for surface, numbers in zip(surfaces, values, strict=True)
     ]
     low, high = limits or (min(float(row.min()) for row in rows), max(float(row.max()) for row in rows))
-    top = high if high > low else low + max(abs(low), 1.0)  # all are alike: all are violet
+    top = high if high > low else low + max(abs(low), 1.0)  # all values are equal: all are violet
     for surface, row in zip(surfaces, rows, strict=True):
         surface.color = colormap(row, low, top)
     return low, high

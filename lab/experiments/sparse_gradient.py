@@ -1,5 +1,6 @@
-"""How forces change as vertices move, also by laws whose gradients are known in part only: by central
-differences, moving many vertices at once where no force depends on two of them.
+"""Gradients of forces by central differences, also for laws without complete gradients.
+
+Many vertices are moved at once if no force depends on two of them.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ Floats = NDArray[np.float64]
 
 
 class SparseGradient:
-    """The gradient of some forces.
+    """The gradient of forces.
 
     Args:
-        reads: sparse, symmetric (n, n), not zero where the force on one vertex depends on where the other is.
-        step: by which vertices are moved [m].
+        reads: sparse, symmetric (n, n), non-zero if the force on one vertex depends on the position of the
+            other.
+        step: step of the differences [m].
     """
 
     def __init__(self, reads: Any, step: float) -> None:
@@ -27,7 +29,7 @@ class SparseGradient:
         self._step = step
 
     def at(self, forces: Callable[[Floats], Floats], positions: Floats) -> Any:
-        """df/dx of forces (n, 3) [N] of positions (n, 3) [m], a sparse matrix (3n, 3n) [N/m]."""
+        """df/dx of forces (n, 3) [N] with respect to positions (n, 3) [m], a sparse matrix (3n, 3n) [N/m]."""
         from scipy.sparse import csr_matrix
 
         blocks = np.empty((len(self._touched), 3, 3))  # axis of the force, axis of the move
@@ -47,7 +49,7 @@ class SparseGradient:
 
 
 def _colours(reads: Any) -> NDArray[np.int64]:
-    """A number for every vertex, such that no force depends on two vertices of the same one."""
+    """Assign colours to vertices so that no force depends on two vertices of the same colour."""
     near = (reads @ reads).tocsr()
     colours = np.full(near.shape[0], -1)
     for vertex in range(len(colours)):

@@ -1,6 +1,7 @@
-"""Equilibria of a body by any law, without time stepping: some coordinates driven, forces on the others.
+"""Equilibria of a body by any law, without time stepping: some coordinates are driven, forces act on the
+others.
 
-Newton's method in float64, its stiffness from central differences of the forces.
+Newton's method in float64, with the stiffness from central differences of the forces.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ from taichi_soft.elements.laws.bonds import Ring
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
-"""Of the differences, over the shortest edge: truncation and rounding err by about 1e-10 of the stiffness."""
+"""Step of the differences over the shortest edge: truncation and rounding cause errors of about 1e-10 of the
+stiffness."""
 SLOW = 0.5
-"""Where a step leaves more of the residual than this, the stiffness is taken anew, and steps are halved."""
+"""If a step leaves more of the residual than this, the stiffness is computed again, and steps are halved."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
-"""First displacement, over the size of the body, beyond which nothing holds it."""
+"""First displacement, over the size of the body, above which nothing fixes it."""
 
 
 class NoEquilibriumError(TaichiSoftError):
@@ -64,12 +66,12 @@ class Equilibrium:
 
 
 class StaticBody:
-    """One mesh, material and law. What was factorised for one loading serves others of the same `driven`."""
+    """One mesh, material and law. The factorisation for one loading serves others with the same `driven`."""
 
     def __init__(
         self, mesh: TetMesh, material: Material, law: LawName, strain: StrainName | None = None
     ) -> None:
-        """At rest, where the mesh is."""
+        """Start at rest."""
         self.mesh, self.material = mesh, material
         self._law, self._strain = law, strain
         self._gradient = SparseGradient(
@@ -86,7 +88,7 @@ class StaticBody:
         )
 
     def stiffness(self, displacement: Floats | None = None) -> Any:
-        """-df/dx there, or at rest, a sparse matrix (3n, 3n) [N/m]."""
+        """-df/dx at these positions, or at rest, a sparse matrix (3n, 3n) [N/m]."""
         if displacement is not None:
             return -self._gradient.at(self.forces, displacement)
         if self._at_rest is None:

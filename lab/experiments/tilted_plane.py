@@ -54,7 +54,7 @@ def mesh_of(ring: str) -> TetMesh:
 def measure(point: Point) -> Numbers:
     """How far the plane turns about the axis of the shear, and across it, for each of `ANGLES` [rad].
 
-    Sheared along the edge, what lies across it turns by the angle, and the edge itself stays.
+    In a shear along the edge, lines across it turn by the angle, and the edge itself stays.
     """
     mesh = mesh_of(point["ring"])
     found = []

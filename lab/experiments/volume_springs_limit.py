@@ -24,7 +24,7 @@ from lab.experiments.judgement import Span
 from taichi_soft import Material, TetMesh, internal_forces
 from taichi_soft.meshing.arrays import FloatArray
 
-YOUNG, DENSITY = 3e6, 4e3  # the thesis's; it tells neither damping nor step
+YOUNG, DENSITY = 3e6, 4e3  # the thesis's, which gives neither damping nor step
 CELLS = 3
 STEADY = 0.1
 """Growth rate [1/s] up to which a motion counts as steady: a tenth in a second, or round-off."""
@@ -41,9 +41,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """How fast the fastest growing small motion of the cube between held plates grows, for each nu [1/s].
+    """Growth rate of the fastest growing small motion of the cube between fixed plates, for each nu [1/s].
 
-    `step`: the largest of leapfrog without damping, 2 over the highest frequency [s].
+    `step`: largest step of leapfrog without damping, 2 over the highest frequency [s].
     """
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
@@ -70,7 +70,7 @@ def _gradient(plates: Plates, nu: float) -> FloatArray:
 
 
 def _edge_matrix(mesh: TetMesh) -> FloatArray:
-    """What brakes velocities along edges, with b = 1 (eq. 3.9), (3 n, 3 n)."""
+    """Damping matrix of velocities along edges, with b = 1 (eq. 3.9), (3 n, 3 n)."""
     total = np.zeros((3 * len(mesh.vertices),) * 2)
     for p, q in mesh.edges:
         n = mesh.vertices[q] - mesh.vertices[p]

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import GRAVITY, Drop
 from lab.peers.silence import silenced
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 2
 """Steps in 1 / RATE s: Bullet's default of 1/240 s."""
@@ -28,7 +28,7 @@ FLOOR = 5.0
 """Half the height of the box, and a sixth of its width [m]."""
 
 
-def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate the drop."""
     with silenced():
         import pybullet

@@ -9,11 +9,11 @@ import numpy as np
 
 from lab.extras import missing_packages
 from lab.peers import ours
-from lab.peers.course import Course, Progress
 from lab.peers.drop import Drop
-from lab.peers.measures import Outcome, measure
+from lab.peers.drop_measures import Outcome, measure
 from lab.peers.reference import simulate_reference
 from lab.peers.registry import PEERS
+from lab.peers.trajectory import Progress, Trajectory
 
 OURS, REFERENCE = "taichi-soft", "reference"
 
@@ -23,7 +23,7 @@ class Entry:
     """Result of one engine, or of the reference."""
 
     name: str
-    course: Course
+    trajectory: Trajectory
     outcome: Outcome
     reference: Outcome
 
@@ -35,7 +35,7 @@ class Entry:
     @property
     def cost(self) -> float:
         """Median time of simulating 1/60 s [s]."""
-        return float(np.median(self.course.frame_times))
+        return float(np.median(self.trajectory.frame_times))
 
     @property
     def squash_error(self) -> float:
@@ -68,9 +68,12 @@ def compare(
         REFERENCE: simulate_reference,
         **{peer.name: peer.simulate for peer in there},
     }
-    courses = {name: simulate(drop, _telling(name, on_frame)) for name, simulate in runs.items()}
-    outcomes = {name: measure(drop, course) for name, course in courses.items()}
-    return [Entry(name, course, outcomes[name], outcomes[REFERENCE]) for name, course in courses.items()]
+    trajectories = {name: simulate(drop, _telling(name, on_frame)) for name, simulate in runs.items()}
+    outcomes = {name: measure(drop, trajectory) for name, trajectory in trajectories.items()}
+    return [
+        Entry(name, trajectory, outcomes[name], outcomes[REFERENCE])
+        for name, trajectory in trajectories.items()
+    ]
 
 
 def _telling(name: str, on_frame: Callable[[str, int, int], object] | None) -> Progress | None:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import GRAVITY, Drop
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 4
 """Steps in 1 / RATE s: about 2 ms each, which is MuJoCo's default."""
@@ -35,17 +35,17 @@ MODEL = """
 CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 
-def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate with the integrator that MuJoCo recommends for flexes: implicit, together with contact."""
     return _simulate(drop, "discrete", on_frame)
 
 
-def simulate_euler(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate_euler(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate with its explicit integrator, which is faster for soft materials."""
     return _simulate(drop, "Euler", on_frame)
 
 
-def _simulate(drop: Drop, integrator: str, on_frame: Progress | None) -> Course:
+def _simulate(drop: Drop, integrator: str, on_frame: Progress | None) -> Trajectory:
     """Simulate without the file of warnings that MuJoCo writes into the current folder."""
     import mujoco
 

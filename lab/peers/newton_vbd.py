@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import Drop
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 5
 """Steps in 1 / RATE s: 1/600 s each, as in Newton's examples of soft bodies."""
@@ -22,7 +22,7 @@ CONTACT, RADIUS = 1e7, 1e-3
 """Stiffness [N/m] and radius [m] of a vertex in contact."""
 
 
-def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate the drop."""
     import warp
 

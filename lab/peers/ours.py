@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import Drop
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 from taichi_soft import Material
 from taichi_soft.world.bare import bare_world
 
 
-def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate the drop."""
     material = Material(drop.young, drop.poisson, drop.density, damping=0.0, damping_ratio=0.0)
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.peers.course import RATE, Course, Progress, Simulation, record
 from lab.peers.drop import GRAVITY, Drop
+from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Reference:
         return F
 
 
-def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Course:
+def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
     """Simulate the drop that is the reference of the engines."""
 
     def make(steps: int) -> Simulation:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lab.peers import bullet, mujoco_flex, newton_vbd
-from lab.peers.course import Course, Progress
 from lab.peers.drop import Drop
+from lab.peers.trajectory import Progress, Trajectory
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Peer:
 
     name: str
     module: str  # of Python, as in the extra `peers`
-    simulate: Callable[[Drop, Progress | None], Course]
+    simulate: Callable[[Drop, Progress | None], Trajectory]
 
 
 PEERS = (

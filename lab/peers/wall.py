@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.peers.comparison import Entry
-from lab.peers.course import Progress
 from lab.peers.drop import Drop
+from lab.peers.trajectory import Progress
 from taichi_soft.core.checks import LARGEST_COUNT, as_positive
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_text
@@ -34,10 +34,10 @@ def film_wall(
     seconds: float,
     on_frame: Progress | None = None,
 ) -> int:
-    """Film courses side by side, each from its beginning to its end, and return the number of frames.
+    """Film trajectories side by side, each from its beginning to its end, and return the number of frames.
 
     Args:
-        drop: the drop of the courses.
+        drop: the drop of the trajectories.
         entries: results of `compare`.
         writer: of the film.
         seconds: length of the film: what lasts shorter is shown slowed down.
@@ -93,7 +93,7 @@ class _Wall:
         picture = np.full((self.size[1], self.size[0], 3), DARK, dtype=np.uint8)
         width, height = self.renderer.width, self.renderer.height
         for i, (entry, surface) in enumerate(zip(self.entries, self.surfaces, strict=True)):
-            surface.positions = entry.course.at(time)
+            surface.positions = entry.trajectory.at(time)
             panel = self.renderer.render([surface])
             row = self._height_of_reference(time)
             panel[row : row + 2] = MARK
@@ -110,7 +110,7 @@ class _Wall:
     def _height_of_reference(self, time: float) -> int:
         """Row of pixels of the reference's top."""
         reference = next(entry for entry in self.entries if entry.is_reference)
-        top = [(0.0, 0.0, reference.course.at(time)[:, 2].max())]
+        top = [(0.0, 0.0, reference.trajectory.at(time)[:, 2].max())]
         row = self.renderer.camera.project(top, self.renderer.width, self.renderer.height)[0, 1]
         return int(np.clip(row, 0, self.renderer.height - 1))
 

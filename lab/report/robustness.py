@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from lab.drop_test.robustness import GROUPS, Verdict, run_cell
+from lab.drop_test.robustness.cell_run import CALM_TIME, DROP, DROP_TIME, MOST_WORK, RECOVERY_TIME
 from lab.drop_test.robustness.cells import Cell
-from lab.drop_test.robustness.trial import CALM_TIME, DROP, DROP_TIME, MOST_WORK, RECOVERY_TIME
 from lab.drop_test.robustness.verdict import MOST_SUBSTEPS, SHAPE_TOLERANCE, SPEED_TOLERANCE
 from lab.experiments import Effort, Experiment, Result, Section
 from lab.report.machine import machine_facts

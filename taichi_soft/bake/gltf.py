@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bake.axes import y_up
 from taichi_soft.bake.clip import Clip, Take
-from taichi_soft.bake.materials import visual_of
+from taichi_soft.bake.clip_materials import visual_of
 
 Interpolation = Literal["linear", "step"]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft.bake.clip import Clip, Take
-from taichi_soft.bake.materials import visual_of
+from taichi_soft.bake.clip_materials import visual_of
 
 
 def write_usd(take: Take, path: Path) -> None:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.bound_hull import BoundHull, bind
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, Contact
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
-from taichi_soft.bodies.hull import BoundHull, bind
 from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.short_steps import warn_of_short_steps

@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.constants import LANES
+from taichi_soft.core.field_table import BLOCK, BODY, EDGE, OUTER, PARTICLE, RING, TRIANGLE, WORLD
 
 ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 """Numbers of a `Capacity` that can be larger than needed without any effect."""
@@ -68,6 +69,30 @@ class BodyCapacity:
     def rooms(self) -> list[int]:
         """Capacities in the order of `ROOMS`."""
         return [getattr(self, name) for name in ROOMS]
+
+    @property
+    def solves_bonds(self) -> bool:
+        """Whether implicit integration solves for edges that carry elastic forces."""
+        return self.implicit and self.rings > 0
+
+    @property
+    def names_edges(self) -> bool:
+        """Whether tetrahedra know their edges."""
+        return self.implicit or self.rings > 0
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of rows, by what `declare` names."""
+        return {
+            WORLD: 1,
+            PARTICLE: self.particles,
+            EDGE: self.edges,
+            BLOCK: self.blocks,
+            BODY: self.bodies,
+            TRIANGLE: self.triangles,
+            OUTER: self.outer,
+            RING: self.rings,
+        }
 
     def has_room_for(self, other: "BodyCapacity") -> bool:
         """True if a state of this capacity has the fields of one of `other`, none of them shorter."""

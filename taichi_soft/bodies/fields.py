@@ -15,15 +15,33 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
-from taichi_soft.bodies.status import ABSENT
-from taichi_soft.core.constants import LANES
+from taichi_soft.bodies.status import ABSENT, CLEAR, WITH_FRAME
+from taichi_soft.core.constants import LANES, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.field_loader import Loader
-from taichi_soft.core.runtime import holds_fields, make_fields, ti
+from taichi_soft.core.field_table import (
+    BLOCK,
+    BODY,
+    COLLIDER,
+    EDGE,
+    FINITE,
+    FRAME,
+    LOADED,
+    OUTER,
+    PARTICLE,
+    REAL,
+    RING,
+    SHAPE,
+    TRIANGLE,
+    WORLD,
+    Below,
+    FieldGroup,
+    declare,
+)
+from taichi_soft.core.runtime import make_fields, ti
 from taichi_soft.core.threads import in_turn
 
 
-@holds_fields
-class BodyFields:
+class BodyFields(FieldGroup):
     """Particles, edges, tetrahedra and bodies, with one field for each quantity.
 
     Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
@@ -31,131 +49,178 @@ class BodyFields:
     constant index with loads at a computed one in fields of several dimensions.
     """
 
+    particle_position = declare(
+        PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=POSITION_LIMIT, native=True
+    )
+    particle_velocity = declare(  # see body_velocity_lag
+        PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
+    )
+    # Zero between steps. It has a fourth component because four floats load and store at once.
+    particle_force = declare(PARTICLE, REAL, 4, unit="N", start=0)
+    particle_mass = declare(PARTICLE, REAL, unit="kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True)
+    particle_inv_mass = declare(  # 0 if pinned
+        PARTICLE, REAL, unit="1/kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True
+    )
+    particle_body = declare(PARTICLE, ti.i32, start=LOADED)
+    particle_of_vertex = declare(PARTICLE, ti.i32, start=LOADED)  # particle of each of the caller's vertices
+    # Before the last fixed step.
+    prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
+    prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
+    rest_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED)
+    # Target of a pinned particle, see `control.kernels.pins`, and its position in world or frame axes.
+    particle_aim = declare(
+        PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(FRAME, WITH_FRAME), native=True
+    )
+    particle_target = declare(PARTICLE, REAL, 3, unit="m", keep=PARTICLE, most=FINITE, native=True)
+    # External force, if the body is `PUSHED`.
+    particle_push = declare(PARTICLE, REAL, 3, unit="N", keep=PARTICLE, most=FINITE)
+    # Reaction on its constraint, in the last step and before the step.
+    particle_reaction = declare(PARTICLE, REAL, 3, unit="N s", keep=PARTICLE, native=True)
+    prev_reaction = declare(PARTICLE, REAL, 3, unit="N s")
+
+    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if held in the last substep
+    # Relative to the velocity that its island shares, before contact.
+    particle_speed = declare(PARTICLE, REAL, unit="m/s")
+
+    tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
+    tet_rest_inverse = declare(  # column by column; it changes only if a body can flow
+        BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
+    )
+    tet_original_inverse = declare(  # before any plastic flow
+        BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, when="plastic"
+    )
+    body_plasticity = declare(BODY, REAL, 4, start=LOADED, when="plastic")  # see `Plasticity.row`
+    tet_lame = declare(BLOCK, REAL, unit="Pa", each=2 * LANES, start=LOADED)
+    tet_stiffness = declare(  # upper triangle row by row
+        BLOCK, REAL, unit="Pa", each=21 * LANES, start=LOADED, when="anisotropic"
+    )
+    tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)  # by the mean velocity
+
+    edge_vertices = declare(EDGE, ti.i32, 2, start=LOADED, layout=ti.Layout.SOA)
+    edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row and number of each block
+    edge_damping = declare(EDGE, REAL, unit="N s/m", start=LOADED)
+    edge_bond = declare(  # see `laws.bonds.Bonds`
+        EDGE, REAL, 4, start=LOADED, when="rings", layout=ti.Layout.SOA
+    )
+    edge_ring = declare(EDGE, ti.i32, 2, start=LOADED, when="rings")  # range in the rings
+    ring_members = declare(  # particles, or slots of tetrahedra
+        RING, ti.i32, 4, start=LOADED, when="rings"
+    )
+    ring_weights = declare(RING, REAL, 4, start=LOADED, when="rings")
+    tet_inverse_volume6 = declare(  # 1 / (6 V0)
+        BLOCK, REAL, unit="1/m^3", each=LANES, start=LOADED, when="rings"
+    )
+    tet_expansion_modulus = declare(  # E nu
+        BLOCK, REAL, unit="Pa", each=LANES, start=LOADED, when="rings"
+    )
+    tet_pressure = declare(BLOCK, REAL, unit="Pa", each=LANES, when="rings")  # E nu dV / V0
+    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # of all tetrahedra around it
+    tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
+
+    # Implicit integration: blocks of the system, on the diagonal and in the row of an edge's first end and
+    # the column of its second.
+    particle_block = declare(PARTICLE, REAL, (3, 3), when="implicit")
+    particle_block_inverse = declare(PARTICLE, REAL, (3, 3), when="implicit")
+    particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass, and inertia of grabs
+    edge_block = declare(EDGE, REAL, (3, 3), when="implicit")
+    edge_normal = declare(EDGE, REAL, 3, when="solves_bonds")  # from the last evaluation of forces
+    edge_compared = declare(EDGE, REAL, 3, unit="m", when="solves_bonds")
+    # Prepared by `rigid_rotation`: K W by particle, W^T K W, and the centre relative to the first particle.
+    particle_turning = declare(PARTICLE, REAL, (3, 3), when="implicit")
+    body_turning = declare(BODY, REAL, (3, 3), when="implicit")
+    body_inverse_inertia = declare(BODY, REAL, (3, 3), unit="1/(kg m^2)", when="implicit")
+    body_center = declare(BODY, REAL, 3, unit="m", when="implicit")
+    solution = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")  # change of velocity
+    residual = declare(PARTICLE, REAL, 3, when="implicit")
+    direction = declare(PARTICLE, REAL, 3, when="implicit")
+    image = declare(PARTICLE, REAL, 3, when="implicit")
+    # 1 if the floor holds it, or the number of a collider plus 1; and before part of a step that can be
+    # undone.
+    particle_contact = declare(
+        PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(COLLIDER, 1), native=True, when="implicit"
+    )
+    prev_contact = declare(PARTICLE, ti.i32, when="implicit")
+    # Of constrained particles, see `held_particles`: the normal and 1 if they stick, velocity of the surface,
+    # friction on sliding particles.
+    particle_hold = declare(PARTICLE, REAL, 4, when="implicit")
+    hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
+    hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
+    # Largest of the last step, relative to the load.
+    body_residual = declare(BODY, REAL, keep=BODY, when="implicit")
+    solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, largest number of iterations
+
+    # Schedule `flat`.
+    corner_force = declare(  # corner by corner in each block
+        BLOCK, REAL, 4, unit="N", each=4 * LANES, when="parallel"
+    )
+    edge_force = declare(EDGE, REAL, 3, unit="N", when="parallel")
+    particle_corners = declare(PARTICLE, ti.i32, 2, start=LOADED, when="parallel")  # range in corner_slot
+    corner_slot = declare(  # row of each corner in corner_force
+        BLOCK, ti.i32, each=4 * LANES, start=LOADED, when="parallel"
+    )
+    particle_edges = declare(PARTICLE, ti.i32, 2, start=LOADED, when="parallel")  # range in incident_edge
+    incident_edge = declare(  # e as first end, -1 - e as second
+        EDGE, ti.i32, each=2, start=LOADED, when="parallel"
+    )
+    barrier = declare(1, ti.i32, when="parallel")
+
+    triangle_vertices = declare(TRIANGLE, ti.i32, 3, start=LOADED)  # outward
+    outer_particle = declare(OUTER, ti.i32, start=LOADED)  # particles of the surface, body by body
+
+    # Ranges of rows.
+    body_particles = declare(BODY, ti.i32, 2, start=LOADED)
+    body_triangles = declare(BODY, ti.i32, 2, start=LOADED)
+    body_outer = declare(BODY, ti.i32, 2, start=LOADED)
+    body_edges = declare(BODY, ti.i32, 2, start=LOADED)
+    body_edge_blocks = declare(BODY, ti.i32, 2, start=LOADED)
+    body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
+    body_model = declare(BODY, ti.i32, start=LOADED)
+    body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
+    # Substep by half of which leapfrog lags.
+    body_velocity_lag = declare(BODY, REAL, unit="s", start=0, keep=BODY, most=FINITE, native=True)
+    # Bounding box at the last query that used it.
+    body_lower = declare(BODY, REAL, 3, unit="m")
+    body_upper = declare(BODY, REAL, 3, unit="m")
+    body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
+    # With others, in a world in which bodies touch each other: CLEAR, JUST_PLACED or OVERLAPPING.
+    body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
+    # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
+    body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
+    body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
+    body_calm_time = declare(BODY, REAL, unit="s", keep=BODY)  # since it was faster than `sleep_speed`
+    body_drives = declare(BODY, ti.i32, start=0, keep=BODY, native=True)  # bits, see `bodies.status`
+    body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, most=FINITE, native=True)
+    # Rate of damping of velocities relative to the world.
+    body_damping = declare(BODY, REAL, unit="1/s", start=0, keep=BODY, most=FINITE, native=True)
+    body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY)  # decay rate of vibrations
+    body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY)  # longest between dampings
+    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
+    body_patience = declare(BODY, ti.i32, start=0, keep=BODY)  # steps with inverted tetrahedra: `untangling`
+    body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was too coarse
+    # Substeps that its shape needs, over those at rest.
+    body_refinement = declare(BODY, REAL, start=1, keep=BODY, most=FINITE)
+    body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge of its surface
+    # Distance of sound in the longest stable substep at rest.
+    body_stride = declare(BODY, REAL, unit="m", start=LOADED)
+    body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, most=FINITE)
+    # Largest number of retries of a failed step, each twice as fine.
+    retries = declare(WORLD, ti.i32)
+    block_model = declare(BLOCK, ti.i32, start=LOADED)
+
+    sleep_speed = declare(WORLD, REAL, unit="m/s", start=LOADED)  # below which bodies fall asleep; 0: never
+    gravity = declare(WORLD, REAL, 3, unit="m/s^2", native=True)
+    wind = declare(  # velocity [m/s], density times drag coefficient [kg/m^3]
+        WORLD, REAL, 4, start=0, keep=WORLD, most=FINITE, native=True
+    )
+    floor = declare(WORLD, REAL, 3, native=True)  # height [m], restitution, friction
+
     def __init__(self, capacity: BodyCapacity) -> None:
         """Allocate fields of `capacity`; contents are zero until `load`."""
         self.capacity = capacity
         self.programs: set[Program] = set()  # programs that used these fields
         self.loader = Loader()
-        n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
-        real = self.real = ti.f64 if capacity.double else ti.f32
-        self.particle_position = ti.Vector.field(3, real, n)  # [m]
-        self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
-        # [N], zero between steps; with a fourth component, because four floats load and store at once.
-        self.particle_force = ti.Vector.field(4, real, n)
-        self.particle_mass = ti.field(real, n)  # [kg]
-        self.particle_inv_mass = ti.field(real, n)  # [1/kg], 0 where pinned
-        self.particle_body = ti.field(ti.i32, n)
-        self.particle_of_vertex = ti.field(ti.i32, n)  # particle of each of the caller's vertices
-        self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
-        self.prev_velocity = ti.Vector.field(3, real, n)
-        self.rest_position = ti.Vector.field(3, real, n)  # [m]
-        self.particle_aim = ti.field(ti.i32, n)  # target of a pinned particle: see `control.kernels.pins`
-        self.particle_target = ti.Vector.field(
-            3, real, n
-        )  # position of the target [m], in world or frame axes
-        self.particle_push = ti.Vector.field(3, real, n)  # external force [N], if the body is `PUSHED`
-        self.particle_reaction = ti.Vector.field(
-            3, real, n
-        )  # [N s], reaction on its constraint in the last step
-        self.prev_reaction = ti.Vector.field(3, real, n)  # the same before the step
-
-        self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
-        self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
-        if capacity.plastic:
-            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # [1/m], before any plastic flow
-            self.body_plasticity = ti.Vector.field(4, real, bodies)  # see `Plasticity.row`
-        self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
-        if capacity.anisotropic:
-            self.tet_stiffness = ti.field(real, b * 21 * LANES)  # [Pa], upper triangle row by row
-        self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
-
-        self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
-        self.edge_blocks = ti.Vector.field(2, ti.i32, k)  # first row and number of each block
-        self.edge_damping = ti.field(real, k)  # [N s/m]
-        if capacity.rings:
-            self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
-            self.edge_ring = ti.Vector.field(2, ti.i32, k)  # range in the rings
-            self.ring_members = ti.Vector.field(
-                4, ti.i32, capacity.rings
-            )  # particles, or slots of tetrahedra
-            self.ring_weights = ti.Vector.field(4, real, capacity.rings)
-            self.tet_inverse_volume6 = ti.field(real, b * LANES)  # 1 / (6 V0) [1/m^3]
-            self.tet_expansion_modulus = ti.field(real, b * LANES)  # E nu [Pa]
-            self.tet_pressure = ti.field(real, b * LANES)  # E nu dV / V0 [Pa]
-            self.edge_pressure = ti.field(real, k)  # [Pa], of all tetrahedra around an edge
-        if capacity.rings or capacity.implicit:
-            self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
-        if capacity.implicit:
-            self.particle_block = ti.Matrix.field(3, 3, real, n)  # diagonal blocks of the system
-            self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
-            self.particle_inertia = ti.field(real, n)  # [kg]: mass, plus the inertia of grabs
-            self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
-            if capacity.rings:  # from the last evaluation of forces
-                self.edge_normal = ti.Vector.field(3, real, k)
-                self.edge_compared = ti.Vector.field(3, real, k)  # [m]
-            # Prepared by `rigid_rotation`: K W by particle, W^T K W, and the centre relative to the first
-            # particle.
-            self.particle_turning = ti.Matrix.field(3, 3, real, n)
-            self.body_turning = ti.Matrix.field(3, 3, real, bodies)
-            self.body_inverse_inertia = ti.Matrix.field(3, 3, real, bodies)  # [1/(kg m^2)]
-            self.body_center = ti.Vector.field(3, real, bodies)  # [m]
-            self.solution = ti.Vector.field(3, real, n)  # change of velocity [m/s]
-            self.residual = ti.Vector.field(3, real, n)
-            self.direction = ti.Vector.field(3, real, n)
-            self.image = ti.Vector.field(3, real, n)
-            # 1 if the floor holds it, or the number of a collider plus 1.
-            self.particle_contact = ti.field(ti.i32, n)
-            self.prev_contact = ti.field(ti.i32, n)  # before part of a step that can be undone
-            # For constrained particles, see `held_particles`: the normal and 1 if they stick, velocity of the
-            # surface [m/s], friction on sliding particles [N s].
-            self.particle_hold = ti.Vector.field(4, real, n)
-            self.hold_velocity = ti.Vector.field(3, real, n)
-            self.hold_friction = ti.Vector.field(3, real, n)
-            self.body_residual = ti.field(real, bodies)  # largest of the last step, relative to the load
-            self.solver = ti.Vector.field(2, real, ())  # tolerance, largest number of iterations
-        if capacity.parallel:
-            self.corner_force = ti.Vector.field(4, real, b * 4 * LANES)  # [N], corner by corner in each block
-            self.edge_force = ti.Vector.field(3, real, k)
-            self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
-            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # row of each corner in corner_force
-            self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
-            self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
-            self.barrier = ti.field(ti.i32, 1)
-
-        self.triangle_vertices = ti.Vector.field(3, ti.i32, capacity.triangles)  # outward
-        self.outer_particle = ti.field(ti.i32, capacity.outer)  # particles of the surface, body by body
-
-        self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
-        self.body_triangles = ti.Vector.field(2, ti.i32, bodies)
-        self.body_outer = ti.Vector.field(2, ti.i32, bodies)
-        self.body_edges = ti.Vector.field(2, ti.i32, bodies)
-        self.body_edge_blocks = ti.Vector.field(2, ti.i32, bodies)
-        self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
-        self.body_model = ti.field(ti.i32, bodies)
-        self.body_status = ti.field(ti.i32, bodies)
-        self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
-        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], bounding box at the last query that used it
-        self.body_upper = ti.Vector.field(3, real, bodies)
-        self.body_drives = ti.field(ti.i32, bodies)  # bits of control, see `bodies.status`
-        self.body_gravity_scale = ti.field(real, bodies)
-        self.body_damping = ti.field(real, bodies)  # rate for velocities relative to the world [1/s]
-        self.body_fading = ti.field(real, bodies)  # decay rate of vibrations [1/s]
-        self.body_fading_interval = ti.field(real, bodies)  # longest interval of damping vibrations [s]
-        self.body_is_braked = ti.field(ti.i32, bodies)  # 1 during the last retry of a step
-        self.body_patience = ti.field(ti.i32, bodies)  # steps with inverted tetrahedra; see `untangling`
-        self.body_jolted = ti.field(ti.i32, bodies)  # 1 if a step was too coarse
-        self.body_refinement = ti.field(real, bodies)  # substeps that its shape needs, over those at rest
-        self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
-        self.body_stride = ti.field(
-            real, bodies
-        )  # distance of sound in the longest stable substep at rest [m]
-        self.body_sound_speed = ti.field(real, bodies)  # [m/s]
-        self.retries = ti.field(ti.i32, ())  # largest number of retries of a failed step, each twice as fine
-        self.block_model = ti.field(ti.i32, b)
-
-        self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
-        self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
-        self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
+        self.real = ti.f64 if capacity.double else ti.f32
+        super().__init__(capacity, self.real)
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, except those for which `loader` already has rows.
@@ -170,15 +235,11 @@ class BodyFields:
         position = _laid_out(scene, "particles", lambda b: b.rest_position)
         fill(self.particle_position, position)
         fill(self.prev_position, position)
-        fill(self.particle_velocity, np.zeros((0, 3)))
-        fill(self.prev_velocity, np.zeros((0, 3)))
-        fill(self.particle_force, np.zeros((0, 4)))
         fill(self.particle_mass, _laid_out(scene, "particles", lambda b: b.mass))
         inv_mass = _laid_out(scene, "particles", lambda b: 1.0 / b.mass)
         for body, place in zip(bodies, ranges, strict=True):
             inv_mass[body.pinned + place.particles[0]] = 0.0
         fill(self.particle_inv_mass, inv_mass)
-        fill(self.particle_aim, np.zeros(0))
         fill(self.particle_body, np.repeat(np.arange(len(bodies)), [np.diff(r.particles)[0] for r in ranges]))
         fill(self.particle_of_vertex, _laid_out(scene, "particles", lambda b: b.rank, "particles"))
 
@@ -203,8 +264,6 @@ class BodyFields:
             # Padding lanes of a last block act on the body's first edge without pressure.
             rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
             fill(self.tet_edges, np.concatenate(rows))
-        if self.capacity.implicit:
-            fill(self.particle_contact, np.zeros(0))
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
@@ -217,14 +276,6 @@ class BodyFields:
         fill(self.body_edge_blocks, _used(scene, "edge_blocks", lambda b: b.edge_blocks))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))
         fill(self.body_model, np.array(models))
-        fill(self.body_status, np.full(len(bodies), ABSENT))
-        fill(self.body_velocity_lag, np.zeros(0))
-        fill(self.body_drives, np.zeros(0))
-        fill(self.body_damping, np.zeros(0))
-        fill(self.body_is_braked, np.zeros(0))
-        fill(self.body_jolted, np.zeros(0))
-        fill(self.body_patience, np.zeros(0))
-        fill(self.body_refinement, np.ones(self.capacity.bodies))
         fill(self.rest_position, position)
         own = np.zeros((len(bodies), 5)) if kinds is None else kinds
         fill(self.body_edge, own[:, 0])
@@ -232,9 +283,8 @@ class BodyFields:
         fill(self.body_sound_speed, own[:, 2])
         fill(self.body_fading, own[:, 3])
         fill(self.body_fading_interval, own[:, 4])
-        fill(self.wind, np.zeros((0, 4)))
-        fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+        self.fill_starts(self.loader)
         self.loader.write()
 
     def tet_constants(self, body: BodyArrays) -> list[tuple[Any, NDArray[np.float64]]]:
@@ -270,7 +320,6 @@ class BodyFields:
         fill(self.ring_members, np.concatenate(members))
         fill(self.ring_weights, np.concatenate(weights))
         fill(self.tet_inverse_volume6, _blocks(bodies, lambda b: np.linalg.det(b.rest_inverse), 1))
-        fill(self.edge_pressure, np.zeros(0))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """List the corner and edge forces that act on each particle, in a fixed order."""

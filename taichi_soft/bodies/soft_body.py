@@ -178,9 +178,9 @@ class Slice:
         """Numbers of the handles that have a row: the first entry of each row."""
         return [row[0] for row in entries]
 
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Number of rows in use, by `entries`, in each group of its fields `carried`."""
-        return []
+    def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
+        """Number of rows in use, by `entries`, in each group of its fields that a snapshot keeps."""
+        return {}
 
     def read(self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]) -> Any:
         """Read `entries`, checked against the bodies in each slot; 0 vertices for an empty slot.
@@ -188,6 +188,10 @@ class Slice:
         Args: earlier: results of the slices before this one, by name.
         Raises: ValueError, or what Python raises, if they are invalid.
         """
+
+    def things(self, read: Any) -> dict[str, int]:
+        """Numbers of things that fields may name: see `field_table.Below`."""
+        return {}
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
         """Check the rows of its fields. Raises: ValueError if they are invalid or do not match `read`."""

@@ -15,3 +15,7 @@ PLACED = -1000
 CLEAR, JUST_PLACED, OVERLAPPING = range(3)
 """Overlap of a body with others, in a world with soft contact: none; unknown until the next step, since the
 body was placed; found, and being resolved."""
+
+STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
+"""`particle_aim`: motion of a pinned particle in the next step: none; to its target; none after it has
+reached its target, with its velocity still to clear; with a frame, whose number is added."""

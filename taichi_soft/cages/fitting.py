@@ -26,8 +26,8 @@ FLAT = 0.25
 """Volume left with the vertices on the surface, relative to before, below which a tetrahedron is removed."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
-"""Search radii around a vertex's voxel, in voxels, in the order of the search. A point that is nearer than
-the radius less the diagonal of a voxel is the nearest of all."""
+"""Search radii around a vertex's voxel, in voxels, in the order of the search. The nearest point found is
+final if its distance is at most the radius minus the diagonal of a voxel."""
 
 CHUNK = 1 << 20
 """Pairs of vertices and voxels that are processed at once."""

@@ -57,7 +57,7 @@ def info(
 
 def __say_laws(names: list[str], as_json: bool) -> None:
     from taichi_soft.profiling import measure_laws
-    from taichi_soft.profiling.report import law_rows, law_table
+    from taichi_soft.profiling.profile_tables import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
         costs = measure_laws(cast(list[LawName], names))  # checks the names

@@ -57,7 +57,7 @@ def profile(
     """Measure the cost of a frame, and how many bodies fit a frame at 60 Hz and 120 Hz."""
     device = init(arch, threads, _cores_of(cores))
     from taichi_soft import profiling
-    from taichi_soft.profiling import report
+    from taichi_soft.profiling import profile_tables
 
     library = profiling.compile_baseline() if baseline else None
     with errors.status("measuring frames") as status:
@@ -95,7 +95,7 @@ def profile(
         return
     where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
     say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
-    for title, table in report.tables(found):
+    for title, table in profile_tables.tables(found):
         say(f"\n[bold]{escape(title)}[/]")  # a table wraps its own title at the table's width
         console.print(table)
 

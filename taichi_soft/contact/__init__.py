@@ -1,1 +1,1 @@
-"""What bodies touch: colliders, and each other."""
+"""Contact of bodies with colliders and with each other."""

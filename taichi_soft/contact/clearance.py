@@ -1,4 +1,4 @@
-"""Where a body may begin: not inside a collider, which would crush it."""
+"""Check that a body does not start inside a collider, which would crush it."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from taichi_soft.core.errors import OptionError
 if TYPE_CHECKING:
     from taichi_soft.bodies.asset import SoftBodyAsset
 
-BEARABLE = 0.25
-"""Depth over the mean edge of the surface, or over the least side of the body, from which vertices that are
-put outside at once may come too near the next ones."""
+MAX_DEPTH = 0.25
+"""Depth at which a start is refused, over the mean edge of the surface or the smallest side of the body.
+Contact moves vertices out at once; deeper ones could end too close to their neighbours."""
 
 
 def require_clear(
     colliders: Sequence[Collider], asset: SoftBodyAsset, points: NDArray[np.float64], name: str
 ) -> None:
-    """See that a body begins outside of all colliders that it touches, or not too deep in one.
+    """Check that a body starts outside of all colliders that it touches, or only slightly inside.
 
     Args:
-        points: its vertices that are not held, (n, 3) [m].
-        name: of the body, for the message.
+        points: its vertices that are not pinned, (n, 3) [m].
+        name: name of the body for the message.
     Raises: OptionError with the deepest collider and the depth.
     """
     if not len(points):
@@ -36,24 +36,27 @@ def require_clear(
     for collider in colliders:
         contact, shape = asset.contact, collider.shape
         if contact.group & collider.mask and collider.group & contact.mask:
-            # From world to collider: times its axes as columns, from the right.
+            # Row vectors times the matrix of its axes: from the world frame to the collider's.
             depths = shape.depths((points - collider.position) @ collider.rotation)
             depth = float(depths.max()) + collider.thickness
             if depth > deepest:
                 deepest, which = depth, collider
     side = float(np.ptp(asset.mesh.vertices, axis=0).min())
     edge = asset.surface_row[2]
-    bearable = BEARABLE * (min(edge, side) if side > 0.0 else edge)
-    if which is not None and deepest > bearable:
+    allowed = MAX_DEPTH * (min(edge, side) if side > 0.0 else edge)
+    if which is not None and deepest > allowed:
         raise OptionError(
-            f"{name} starts {deepest:.4g} m inside collider {which.index}, {which.shape!r}, and bears "
-            f"{bearable:.3g} m: place it outside, or keep the two apart by group and mask"
+            f"{name} starts {deepest:.4g} m inside collider {which.index}, {which.shape!r}; at most "
+            f"{allowed:.3g} m is allowed: place it outside, or keep the two apart by group and mask"
         )
 
 
 def free_points(asset: SoftBodyAsset, rows: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Outer vertices, or points of its hull, that are not pinned, (n, 3) [m], of a body that begins as `rows`
-    (n, 8) say."""
+    """Return the outer vertices, or hull points, that are not pinned, (n, 3) [m].
+
+    Args:
+        rows: initial state of the body, (n, 8), see `SoftBodyAsset.placed`.
+    """
     hull = asset.bound_hull
     if hull is not None:
         moves = (rows[hull.vertices, 6] > 0.0).any(axis=1)

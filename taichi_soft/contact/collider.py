@@ -1,4 +1,4 @@
-"""What bodies hit: a solid shape that stands still, or moves as the engine says."""
+"""A collider: a solid shape that bodies hit. It stands still, or moves as the engine says."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ FASTEST_SPIN = 1e4
 
 @dataclass(eq=False)
 class ColliderRow:
-    """One collider: what it is, where it is, and how it moves through the next step."""
+    """Shape, surface, pose and motion of one collider."""
 
     shape: Shape
     friction: float
-    restitution: float  # -1 for that of the bodies
+    restitution: float  # -1: the bodies' own elasticity
     thickness: float
     group: int
     mask: int
@@ -37,23 +37,23 @@ class ColliderRow:
     rotation: Floats  # quaternion
     velocity: Floats
     spin: Floats
-    offset: int  # of its samples, from `World.build` on
+    offset: int  # first row of its samples, from `World.build` on
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
 
     @property
     def skin(self) -> float:
-        """How far outside of the shape its surface is felt [m]."""
+        """Distance outside the shape at which bodies touch it [m]."""
         return self.thickness + self.shape.seam
 
     @property
     def box(self) -> tuple[Floats, Floats]:
-        """Corners of a box round it where it is, (3,) [m] each."""
-        lower, upper, _ = self.way(0.0)
+        """Corners of its present bounding box, (3,) [m] each."""
+        lower, upper, _ = self.swept_box(0.0)
         return lower, upper
 
-    def way(self, dt: float) -> tuple[Floats, Floats, Floats]:
-        """Corners of a box round its way through `dt` [s], (3,) [m] each; its highest speed, (1,) [m/s]."""
+    def swept_box(self, dt: float) -> tuple[Floats, Floats, Floats]:
+        """Return corners of the box swept in `dt` [s], (3,) [m] each, and the highest speed, (1,) [m/s]."""
         lower, upper = self.shape.bounds
         speed, spin = length_of(self.velocity), length_of(self.spin)
         if not np.isfinite([lower, upper]).all():
@@ -74,31 +74,31 @@ class ColliderRow:
 
     @property
     def constants(self) -> tuple[Any, ...]:
-        """All that does not move."""
+        """Everything except pose and motion."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
         return (id(self.shape), self.offset, self.is_alive, *surface)
 
 
 class ColliderSet(Protocol):
-    """All colliders of a world, as far as one of them asks."""
+    """The part of `Colliders` that a handle uses."""
 
     on_jump: Callable[[Floats, Floats], None]
 
     def impulses(self) -> Floats:
-        """Of the last step on each, (n, 6) [N s, N m s]."""
+        """Return the impulses of the last step on each collider, (n, 6) [N s, N m s]."""
 
     def moved(self, row: ColliderRow) -> None:
-        """Note that a collider is elsewhere, or moves differently, from the next step on."""
+        """Record that the pose or the motion of a collider changed."""
 
     def write(self, index: int) -> None:
-        """Bring the fields up to date after a row was added or removed."""
+        """Update the fields after a row was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Bring fields and settings up to date after a row was given another friction."""
+        """Update fields and settings after the friction of a row changed."""
 
 
 class Collider(Handle):
-    """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
+    """Handle of one collider."""
 
     def __init__(self, colliders: ColliderSet, index: int, row: ColliderRow) -> None:
         """Use `World.add_collider` instead."""
@@ -110,7 +110,7 @@ class Collider(Handle):
         return f"Collider({self.index}, {self.shape!r}{'' if self.is_alive else ', removed'})"
 
     def _colliders(self) -> ColliderSet:
-        """The set it belongs to. Raises: StateError where it, or its world, is gone."""
+        """Return the set that it belongs to. Raises: StateError if it was removed, or its world is gone."""
         colliders = self._set()
         if colliders is None:
             raise StateError(f"the world of collider {self.index} is gone: keep a reference to it")
@@ -120,17 +120,17 @@ class Collider(Handle):
 
     @property
     def is_alive(self) -> bool:
-        """False once it was removed."""
+        """False once the collider was removed."""
         return self._row.is_alive
 
     @property
     def shape(self) -> Shape:
-        """What it is."""
+        """Its shape."""
         return self._row.shape
 
     @property
     def position(self) -> Floats:
-        """Of its origin, (3,) [m]."""
+        """Position of its origin, (3,) [m]."""
         return np.array(self._row.position)
 
     @property
@@ -141,60 +141,60 @@ class Collider(Handle):
 
     @property
     def velocity(self) -> Floats:
-        """Of its origin from the coming step on, (3,) [m/s]; zero where `move_to` takes it somewhere."""
+        """Velocity of its origin from the coming step on, (3,) [m/s]; zero if `move_to` moves it."""
         return np.array(self._row.velocity)
 
     @property
     def angular_velocity(self) -> Floats:
-        """The same of its rotation, (3,) [rad/s]."""
+        """Angular velocity from the coming step on, (3,) [rad/s]."""
         return np.array(self._row.spin)
 
     @property
     def friction(self) -> float:
-        """Coulomb's coefficient."""
+        """Coulomb's friction coefficient."""
         return self._row.friction
 
     @property
     def restitution(self) -> float | None:
-        """Of whole bodies; None for their own elasticity."""
+        """Coefficient of restitution of the bodies' centres of mass; None for the bodies' own elasticity."""
         return None if self._row.restitution < 0.0 else self._row.restitution
 
     @property
     def thickness(self) -> float:
-        """How far outside of its shape bodies meet it [m]."""
+        """Distance outside the shape at which bodies touch it [m]."""
         return self._row.thickness
 
     @property
     def group(self) -> int:
-        """Bits that bodies' masks are compared with."""
+        """Its groups, as bits."""
         return self._row.group
 
     @property
     def mask(self) -> int:
-        """Bits of the groups of bodies that it touches."""
+        """Groups of bodies that it touches, as bits."""
         return self._row.mask
 
     @property
     def impulse(self) -> Floats:
-        """What bodies gave it in the last step, (3,) [N s]: apply it to the engine's rigid body.
+        """Impulse of all bodies on it in the last step, (3,) [N s]. Apply it to the engine's rigid body.
 
-        To that body's velocity for the coming step add half of it beforehand: it is about what that step
-        will bring, and comes too late otherwise.
+        It arrives one step late. The impulse of the coming step is about the same: add half of its effect to
+        that body's velocity before the step.
         """
         return self._colliders().impulses()[self.index, :3]
 
     @property
     def angular_impulse(self) -> Floats:
-        """The same about its position, (3,) [N m s]."""
+        """Angular impulse of all bodies on it in the last step, about its position, (3,) [N m s]."""
         return self._colliders().impulses()[self.index, 3:]
 
     @recorded
     def set_friction(self, friction: float) -> None:
-        """Change Coulomb's coefficient, from the next step on; bodies that sleep near it wake.
+        """Change the friction coefficient from the next step on. Wakes bodies that sleep near it.
 
         Args:
             friction: Coulomb's coefficient, 0 or more.
-        Raises: OptionError for a number out of range; StateError once it was removed.
+        Raises: OptionError for a number out of range; StateError if it was removed.
         """
         colliders, coefficient = self._colliders(), as_friction(friction)
         if coefficient != self._row.friction:
@@ -203,9 +203,9 @@ class Collider(Handle):
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Be there at the end of the next step, on a straight way and an even turn; then stand still.
+        """Move there over the next step, in a straight line and with constant rotation, then stop.
 
-        Bodies in the way are pushed with the velocity that this takes.
+        Bodies in its path are pushed with the velocity that this requires.
         Args:
             position: (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
@@ -217,11 +217,11 @@ class Collider(Handle):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position.
+        """Keep moving with this velocity until the next call.
 
         Args:
             linear: velocity of its origin, (3,) [m/s].
-            angular: turn about its origin, (3,) [rad/s]; zero by default.
+            angular: angular velocity about its origin, (3,) [rad/s]; zero by default.
         """
         colliders, row = self._colliders(), self._row
         velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
@@ -231,10 +231,10 @@ class Collider(Handle):
 
     @recorded
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Be there at once, without pushing anything on the way; what it then covers is pressed out.
+        """Move there at once, without pushing bodies in between. Bodies that it covers there are moved out.
 
         Args:
-            position: where its origin goes, (3,) [m].
+            position: new position of its origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
         """
         colliders, row = self._colliders(), self._row
@@ -251,17 +251,17 @@ class Collider(Handle):
 
     @recorded
     def remove(self) -> None:
-        """Take it out of the world; its place is free for another."""
+        """Remove it from the world. Another collider can use its place."""
         colliders = self._colliders()
         self._row.is_alive = False
         colliders.write(self.index)
 
 
 def row_of(collider: Collider) -> ColliderRow:
-    """What there is of it."""
+    """Return the row of a collider."""
     return collider._row
 
 
 def rebind(collider: Collider, index: int, row: ColliderRow) -> None:
-    """Let a handle stand for another row."""
+    """Point a handle to another row."""
     collider.index, collider._row = index, row

@@ -1,4 +1,4 @@
-"""What a snapshot says of a collider, as plain data and back."""
+"""A collider as plain data for snapshots, and back."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vect
 
 
 def entry_of(collider: Collider) -> list[Any]:
-    """Number of handle, what its row is and how it moves. A shape without a grid is there in full."""
+    """Return handle number, row and motion of a collider. A shape without a grid is in it in full."""
     row = row_of(collider)
     target = None if row.target is None else [each.tolist() for each in row.target]
     motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
@@ -27,9 +27,12 @@ def entry_of(collider: Collider) -> list[Any]:
 
 
 def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderRow:
-    """The row of an entry, with `shapes` by digest and room for so many samples.
+    """Read the row of an entry.
 
-    Raises: ValueError, SnapshotError or OptionError for what is no collider.
+    Args:
+        shapes: known shapes by their digests.
+        room: samples for which there is room.
+    Raises: ValueError, SnapshotError or OptionError for an entry that is no valid collider.
     """
     _, is_alive, digest, plain, offset, surface, motion, target = entry
     shape = shapes.get(digest)
@@ -37,15 +40,15 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         shape = from_plain(plain)
     if not isinstance(shape, Shape):
         raise SnapshotError(
-            "this snapshot has a collider with a grid that this world never had: add one of each "
-            "MeshShape and HeightFieldShape (and remove it again) before restoring"
+            "this snapshot has a collider with a grid that this world never had: before restoring, add (and "
+            "remove again) one collider of each MeshShape and HeightFieldShape of the snapshot's world"
         )
     friction, restitution, thickness, group, mask = surface
     position, rotation, velocity, spin = (
         vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
     )
     if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
-        raise ValueError("a rotation is none")
+        raise ValueError("a collider's rotation is no unit quaternion")
     row = ColliderRow(
         shape,
         as_friction(friction),

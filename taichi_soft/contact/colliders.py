@@ -1,4 +1,4 @@
-"""All colliders of a world, and what a snapshot has of them."""
+"""All colliders of a world, and their part of a snapshot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
-from taichi_soft.contact.fields import NO_COLLIDER, ContactCapacity, ContactFields
+from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields, ContactCapacity
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
     forget_collider,
@@ -32,44 +32,41 @@ from taichi_soft.core.serialisation import digest_of
 Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
-"""Of all grids that come after `World.build`: 400 MB."""
-
-MOST_IMPULSE = 1e30
-"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
+"""Samples of all grids added after `World.build`, at most: 400 MB."""
 
 
 def ignore(lower: Floats, upper: Floats) -> None:
-    """What is told of jumps where nobody listens."""
+    """Ignore a jump: the default of `Colliders.on_jump`."""
 
 
 class Colliders(Slice):
-    """All colliders of one world: Python's side of `ContactFields`."""
+    """All colliders of one world: the Python side of `ColliderFields`."""
 
     name = "colliders"
 
     def __init__(self, context: Context) -> None:
-        """None yet."""
+        """Start without colliders."""
         super().__init__(context)
         self._rows: list[ColliderRow] = []
-        self.shapes: dict[str, Shape] = {}  # all that there ever were, by their digests
+        self.shapes: dict[str, Shape] = {}  # all shapes ever added, by their digests
         self._handles: list[Collider] = []
         self.floor: Collider | None = None  # of a world with colliders, from `World.build` on
-        self._contact: ContactFields | None = None
+        self._contact: ColliderFields | None = None
         self._body_count = 0
         self._built_count = 0  # colliders at `World.build`, with the floor
         self._impulses: Floats | None = None  # of the last step, once asked for
-        # Told where a collider appears, vanishes, jumps from or jumps to: lower and upper corner [m].
+        # Called with the box (two corners [m]) in which a collider appears, vanishes, leaves or arrives.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
-        self._is_dirty = False  # whether poses or velocities differ from what the fields hold
+        self._is_dirty = False  # True if the fields lack new poses or velocities
         self._movers: list[ColliderRow] = []  # with a velocity or a target
 
     @property
     def handles(self) -> Sequence[Collider]:
-        """Those that are alive."""
+        """Handles of the colliders that were not removed."""
         return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
 
     def handle(self, index: int) -> Collider:
-        """The latest that had that row."""
+        """Return the latest handle of a row."""
         return self._handles[index]
 
     def add(
@@ -116,7 +113,7 @@ class Colliders(Slice):
         return self._handles[index]
 
     def _free_row(self) -> int:
-        """A row for a new collider. Raises: StateError where there is none."""
+        """Return a row for a new collider. Raises: StateError if there is none."""
         for index, row in enumerate(self._rows):
             if not row.is_alive:
                 return index
@@ -130,7 +127,7 @@ class Colliders(Slice):
         return len(self._rows)
 
     def _free_samples(self, shape: Shape) -> int:
-        """Where the grid of a new collider goes. Raises: StateError where there is no room for it."""
+        """Return the first row for a new collider's grid. Raises: StateError if there is no room for it."""
         needed = len(shape.samples)
         if self._contact is None or needed == 0:
             return 0
@@ -149,7 +146,7 @@ class Colliders(Slice):
         return found
 
     def capacity(self, room: int, sample_room: int, *, soft: bool) -> ContactCapacity:
-        """What these colliders and `room` more with so many samples need.
+        """Return the capacity for these colliders and `room` more, with `sample_room` more samples.
 
         Rounded up so that similar worlds share kernels.
         """
@@ -161,12 +158,12 @@ class Colliders(Slice):
             soft,
         )
 
-    def load(self, contact: ContactFields, body_count: int) -> None:
-        """Fill the fields with what was added before `build`."""
-        self._contact, self._body_count, self._impulses = contact, body_count, None
+    def load(self, colliders: ColliderFields, body_count: int) -> None:
+        """Fill the fields with the colliders that were added before `build`."""
+        self._contact, self._body_count, self._impulses = colliders, body_count, None
         self._built_count = len(self._rows)
-        if contact.capacity.samples:
-            write_samples(contact, 0, np.zeros(1, dtype=np.float32))  # compiles
+        if colliders.capacity.samples:
+            write_samples(colliders, 0, np.zeros(1, dtype=np.float32))  # compiles
         begin = 0
         for row in self._rows:
             row.offset = begin
@@ -176,7 +173,7 @@ class Colliders(Slice):
         self._is_dirty = True
 
     def write(self, index: int) -> None:
-        """Bring the fields up to date after row `index` was added or removed."""
+        """Update the fields after row `index` was added or removed."""
         if self._contact is None:
             return
         row = self._rows[index]
@@ -189,7 +186,7 @@ class Colliders(Slice):
         self.on_jump(*row.box)
 
     def resurfaced(self, index: int) -> None:
-        """Bring fields and settings up to date after row `index` was given another friction."""
+        """Update fields and settings after the friction of row `index` changed."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
             self.context.apply_settings(replace(self.context.settings, friction=row.friction))
@@ -202,29 +199,29 @@ class Colliders(Slice):
             write_samples(self._contact, row.offset, np.ascontiguousarray(row.shape.samples))
 
     def _write_constants(self) -> None:
-        contact, rows = self._contact, self._rows
-        assert contact is not None
-        contact.collider_count[None] = len(rows)
-        fill = contact.loader.fill
-        fill(contact.collider_kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
-        fill(contact.collider_parameters, np.array([r.shape.parameters for r in rows]))
-        fill(contact.collider_resolution, np.array([r.shape.resolution for r in rows]))
-        fill(contact.collider_offset, np.array([r.offset for r in rows]))
-        fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
-        fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
-        contact.loader.write()
+        colliders, rows = self._contact, self._rows
+        assert colliders is not None
+        colliders.count[None] = len(rows)
+        fill = colliders.loader.fill
+        fill(colliders.kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
+        fill(colliders.parameters, np.array([r.shape.parameters for r in rows]))
+        fill(colliders.resolution, np.array([r.shape.resolution for r in rows]))
+        fill(colliders.offset, np.array([r.offset for r in rows]))
+        fill(colliders.surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
+        fill(colliders.filter, np.array([(r.group, r.mask) for r in rows]))
+        colliders.loader.write()
 
     def moved(self, row: ColliderRow) -> None:
-        """Note that a collider is elsewhere, or moves differently, from the next step on."""
+        """Record that the pose or the motion of a collider changed."""
         self._is_dirty = True
         self._movers = [other for other in self._movers if other is not row]
         if row.target is not None or row.velocity.any() or row.spin.any():
             self._movers.append(row)
 
     def prepare(self, dt: float) -> bool:
-        """Tell the fields where the colliders are and how they move through the coming step of `dt` [s].
+        """Write poses and motion of the colliders for the coming step of `dt` [s] to the fields.
 
-        Returns: whether any may be elsewhere, or move otherwise, than in the step before.
+        Returns: True if any pose or motion may differ from the last step.
         """
         self._impulses = None
         if not (self._is_dirty or self._movers):
@@ -236,13 +233,13 @@ class Colliders(Slice):
                 row.spin = rotation_vector(row.rotation, rotation) / dt
         motion = np.empty((len(self._rows), MOTION_WIDTH), dtype=np.float32)
         for line, row in zip(motion, self._rows, strict=True):
-            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *row.way(dt)])
+            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *row.swept_box(dt)])
         write_collider_motion(self._contact, motion)
         self._is_dirty = False
         return True
 
     def finish(self, dt: float) -> None:
-        """Take the colliders to where they are after a step of `dt` [s]."""
+        """Move the colliders to their poses after a step of `dt` [s]."""
         for row in list(self._movers):
             if row.target is None:
                 row.position = row.position + dt * row.velocity
@@ -254,48 +251,37 @@ class Colliders(Slice):
 
     @property
     def all_handles(self) -> Sequence[Collider]:
-        """Of each row, removed ones among them."""
+        """The handle of each row, including removed colliders."""
         return tuple(self._handles)
 
     def entries(self) -> list[list[Any]]:
-        """Number of handle, what each row is and how it moves. A shape without a grid is there in full."""
+        """Return handle number, row and motion of each collider. A shape without a grid is in it in full."""
         return [entry_of(handle) for handle in self._handles]
-
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Of particles, of bodies, of pairs of a body and a collider."""
-        bodies = len(self.context.slots.slots)
-        assert self._contact is not None
-        return [self.context.layout.particle_count, bodies, bodies * self._contact.capacity.colliders]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, ColliderRow]]:
-        """Rows of `entries`, with their handles' numbers.
+        """Read the rows of `entries`, with the numbers of their handles.
 
-        Raises: ValueError, SnapshotError or OptionError for what is no collider, or finds no room.
+        Raises: ValueError, SnapshotError or OptionError for an entry that is no valid collider, or lacks
+        room.
         """
         room = ContactCapacity() if self._contact is None else self._contact.capacity
         if len(entries) > room.colliders:
-            raise ValueError(f"it has {len(entries)} colliders, and there is no room for them")
+            raise ValueError(f"it has {len(entries)} colliders; this world has room for {room.colliders}")
         return [(int(entry[0]), read_row(entry, self.shapes, room.samples)) for entry in entries]
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where an impulse that contact goes on with is not finite."""
-        impulses: list[Any] = []
-        if self._contact is not None and self._contact.capacity.soft:
-            soft = self.context.built.state.soft
-            impulses += [soft.kept_normal_impulse, soft.kept_friction_impulse]
-        rows = [rows_of(field) for field in impulses]
+        """Raises: ValueError if an impulse on a point that something holds is not finite."""
         if self._contact is not None and self._contact.capacity.hull:
             hull = self.context.built.state.hull
-            is_held = rows_of(hull.held_by).max(axis=1) > 0  # what lies in the other rows is never read
-            rows += [rows_of(field)[is_held] for field in hull.held_impulses]
-        for row in rows:
-            if not np.abs(row).max(initial=0.0) <= MOST_IMPULSE:
-                raise ValueError("particles are out of reach, or not finite")
+            is_held = rows_of(hull.held_by).max(axis=1) > 0
+            for field in hull.held_impulses:
+                if not np.abs(rows_of(field)[is_held]).max(initial=0.0) <= MAX_IMPULSE:
+                    raise ValueError("impulses on hulls are too large, or not finite")
 
     def restore(self, read: Any) -> None:
-        """Let there be the colliders that were `read`, and no other."""
+        """Replace all colliders by those that were `read`."""
         before, handles = [row.constants for row in self._rows], self.context.handles
         for handle in self._handles:
             row_of(handle).is_alive = False
@@ -315,11 +301,11 @@ class Colliders(Slice):
         self._write_constants()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Add one, move it, ask what it felt and remove it."""
+        """Add a collider, move it, read its impulse and remove it, so that nothing compiles later."""
         if self._contact is None:
             return
         added: Collider | None = None
-        forget_collider(self._contact, self._body_count, 0)  # also where there is no room for another now
+        forget_collider(self._contact, self._body_count, 0)  # also without room for another
         with contextlib.suppress(StateError):  # there is no room for it
             added = self.add(
                 SphereShape(1.0),
@@ -340,7 +326,9 @@ class Colliders(Slice):
             added.remove()
 
     def impulses(self) -> Floats:
-        """Of the last step on each, (n, 6) [N s, N m s]; zero before the first."""
+        """Return the impulses of the last step on each collider, (n, 6) [N s, N m s]; zero before the first
+        step.
+        """
         if self._impulses is None:
             rows = np.zeros((len(self._rows), 6), dtype=np.float32)
             if self._contact is not None:

@@ -1,11 +1,26 @@
 """The Taichi fields of contact: colliders, and what each body has to do with them in the present step."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.field_loader import Loader
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.field_table import (
+    BODY,
+    COLLIDER,
+    CONTACT,
+    GRID_CELL,
+    LOADED,
+    OUTER,
+    PARTICLE,
+    SAMPLE,
+    TRIANGLE,
+    WORLD,
+    FieldGroup,
+    declare,
+)
+from taichi_soft.core.runtime import ti
 
 NO_COLLIDER = -1
 """Kind of a row of which the collider was removed."""
@@ -26,6 +41,9 @@ MAX_PARTNERS = 32
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
+MAX_IMPULSE = 1e30
+"""Largest impulse of a contact that a snapshot may have [N s]."""
+
 
 @dataclass(frozen=True)
 class ContactCapacity:
@@ -37,153 +55,126 @@ class ContactCapacity:
     hull: bool = False  # whether any of them does so by a hull
 
 
-@holds_fields
-class ContactFields:
+class ColliderFields(FieldGroup):
     """Colliders as rows of fields, and for each pair of a body and a collider a row of what passes between.
 
     The row of body b and collider c is b * colliders + c. A collider moves through a fixed step with the
     velocity and the spin it has here, from the pose it has here.
     """
 
-    def __init__(self, capacity: ContactCapacity, particles: int, bodies: int) -> None:
+    owner, when = "contact", "has_contact"
+    count = declare(WORLD, ti.i32, native=True)  # rows in use, removed ones among them
+    kind = declare(COLLIDER, ti.i32, native=True)  # a `ShapeKind`, or NO_COLLIDER
+    parameters = declare(COLLIDER, ti.f32, 8, native=True)
+    resolution = declare(COLLIDER, ti.i32, 3)
+    offset = declare(COLLIDER, ti.i32)  # of its first sample
+    # At the start of the step.
+    position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
+    velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
+    spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
+    surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
+    filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
+    # Box around its path in the step.
+    lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    upper = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # of its fastest point, at most
+    samples = declare(SAMPLE, ti.f32)
+
+    near = declare(CONTACT, ti.i32)  # colliders within reach of a body, packed to the front
+    near_count = declare(BODY, ti.i32, start=0)
+    reach = declare(BODY, ti.f32, unit="m")  # distance after which other colliders may be near
+    gone = declare(BODY, ti.f32, unit="m")  # longest distance moved since the near ones were searched
+    # On the collider in this step, and about its position. Slots that stay empty have them too: the impulse
+    # of a collider is a sum over all.
+    impulse = declare(CONTACT, ti.f32, 3, unit="N s", start=0, keep=CONTACT)
+    angular_impulse = declare(CONTACT, ti.f32, 3, unit="N m s", start=0, keep=CONTACT)
+    normal_impulse = declare(CONTACT, ti.f32, 3, unit="N s")  # on the body in this substep
+    # Of the normal impulses of its particles: their sum [N s], and those times the speed along the normal
+    # with which the surface came, and with which particle and surface came together [N].
+    normal_impulse_rates = declare(CONTACT, ti.f32, 3)
+    # Speed at which the body may leave, 0 if apart; and before the step.
+    rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
+    prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
+    body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
+    # From all that is near, when that was searched. Inside a body nothing is near.
+    particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)
+
+    def __init__(self, capacity: Any, real: Any) -> None:
         """Allocate; contents are zero."""
-        c = capacity.colliders
-        self.capacity = capacity
+        super().__init__(capacity, real)
+        self.capacity: ContactCapacity = capacity.contact
         self.loader = Loader()  # of what does not change when a collider moves
-        self.collider_count = ti.field(ti.i32, ())  # rows in use, removed ones among them
-        self.collider_kind = ti.field(ti.i32, c)  # a `ShapeKind`, or NO_COLLIDER
-        self.collider_parameters = ti.Vector.field(8, ti.f32, c)
-        self.collider_resolution = ti.Vector.field(3, ti.i32, c)
-        self.collider_offset = ti.field(ti.i32, c)  # of its first sample
-        self.collider_position = ti.Vector.field(3, ti.f32, c)  # [m], at the start of the step
-        self.collider_rotation = ti.Vector.field(4, ti.f32, c)  # unit quaternion, at the start of the step
-        self.collider_velocity = ti.Vector.field(3, ti.f32, c)  # [m/s]
-        self.collider_spin = ti.Vector.field(3, ti.f32, c)  # [rad/s]
-        self.collider_surface = ti.Vector.field(3, ti.f32, c)  # friction, restitution, thickness [m]
-        self.collider_filter = ti.Vector.field(2, ti.i32, c)  # group, mask
-        self.collider_lower = ti.Vector.field(3, ti.f32, c)  # box round its way through the step [m]
-        self.collider_upper = ti.Vector.field(3, ti.f32, c)
-        self.collider_speed = ti.field(ti.f32, c)  # of its fastest point [m/s], at most
-        self.samples = ti.field(ti.f32, max(capacity.samples, 1))
-
-        self.near = ti.field(ti.i32, bodies * c)  # colliders within reach of a body, packed to the front
-        self.near_count = ti.field(ti.i32, bodies)
-        self.reach = ti.field(ti.f32, bodies)  # way [m] after which other colliders may be near
-        self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
-        self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
-        self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
-        self.normal_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
-        # Of the normal impulses of its particles: their sum [N s], and those times the speed along the normal
-        # with which the surface came, and with which particle and surface came together [N].
-        self.normal_impulse_rates = ti.Vector.field(3, ti.f32, bodies * c)
-        self.rebound = ti.field(ti.f32, bodies * c)  # speed at which the body may leave [m/s]; 0 where apart
-        self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
-        # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
-        self.body_lower = ti.Vector.field(3, ti.f32, bodies)
-        self.body_upper = ti.Vector.field(3, ti.f32, bodies)
-        self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
-        self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
-        self.rest_state = ti.field(ti.i32, bodies)  # MOVING, SLOW or RESTING of `vibration`
-        self.is_exploding = ti.field(ti.i32, bodies)  # 1 where it must not take others with it
-        self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
-        self.is_stable = ti.field(ti.i32, bodies)  # 0 where forces changed a velocity by too much
-        self.has_failed = ti.field(ti.i32, bodies)  # 1 where it broke or was not solved well in this step
-        self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
-        # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
-        self.body_speed_beside = ti.field(ti.f32, bodies)  # of its fastest particle
-        self.body_mean_beside = ti.field(ti.f32, bodies)  # root mean square over particles
-        self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
-        self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
-
-        self.island_count = ti.field(ti.i32, ())
-        self.island_first = ti.field(ti.i32, bodies + 1)  # row of its first body
-        self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch or are joined, island by island
-        self.body_island = ti.field(ti.i32, bodies)
-        self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-
-    def carried(self) -> list[list[Any]]:
-        """What the next step depends on: of each particle, each body, each body and collider."""
-        return [
-            [self.particle_touches],
-            [self.calm, self.body_lower, self.body_upper, self.body_island],  # the box in which it sleeps
-            [self.impulse, self.angular_impulse, self.rebound],
-        ]
 
 
-@holds_fields
-class SoftContactFields:
+class SoftContactFields(FieldGroup):
     """What bodies need to touch each other: a grid of vertices, and candidates.
 
-    Each body has a piece of it, in which it looks at one other body after the next.
+    Each body has a part of them, which it uses for one other body after the next.
     """
 
-    def __init__(self, particles: int, bodies: int, outer: int, triangles: int) -> None:
-        """Allocate; contents are zero."""
-        self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
-        self.body_touches_itself = ti.field(ti.i32, bodies)
-        self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
-        self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
-        self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
-        self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
-        self.cell_position = ti.Vector.field(3, ti.f32, outer)  # of these [m]
-        self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
-        self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
-        self.searched_position = ti.Vector.field(3, ti.f32, particles)  # [m], at the search
-        # Beside what the bodies of an island share: ways [m] for which a search holds, and how far each body
-        # and each vertex is from where it was then; speeds before contact [m/s].
-        self.body_reach = ti.field(ti.f32, bodies)
-        self.body_lost = ti.field(ti.f32, bodies)  # way of a pair for which its vertices had room enough
-        self.body_gone = ti.field(ti.f32, bodies)
-        self.particle_gone = ti.field(ti.f32, particles)
-        self.particle_speed = ti.field(ti.f32, particles)
-        self.found_count = ti.field(ti.i32, outer)
-        self.found_triangle = ti.field(ti.i32, outer * FOUND)
-        self.found_distance = ti.field(ti.f32, outer * FOUND)  # [m], at the search
-        # Candidates: of each body vertex by vertex, without gaps.
-        self.slot_count = ti.field(ti.i32, bodies)
-        slots = outer * SLOTS + LANES  # the last ones are read and never used
-        self.slot_vertices = ti.Vector.field(4, ti.i32, slots)  # the vertex, and the triangle's corners
-        self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
-        self.slot_spare = ti.field(ti.f32, slots)  # distance at the search beyond the thickness [m]
-        self.near_slot = ti.field(ti.i32, slots)  # those near in this substep; behind them, old ones
-        self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; or NO_CONTACT
-        self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
-        self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
-        self.slot_normal_impulse = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
-        self.slot_friction_impulse = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
-        # Contacts of this substep; between a search and the gaps, those of the last one. Slots of each body
-        # from its first slot on; no other slot has an impulse. Of each what its solves share: inverse masses
-        # of the vertex and the corners [1/kg]; whether the bodies of the two move (1); normal of the
-        # triangle; shares of the corners in what the vertex feels, and height over the triangle times the
-        # gradients of the weights.
-        self.contact_count = ti.field(ti.i32, bodies)
-        self.contact_slot = ti.field(ti.i32, outer * SLOTS)
-        self.slot_inv_mass = ti.Vector.field(4, ti.f32, outer * SLOTS)
-        self.slot_moves = ti.Vector.field(2, ti.f32, outer * SLOTS)
-        self.slot_face = ti.Vector.field(3, ti.f32, outer * SLOTS)
-        self.slot_shares = ti.Vector.field(3, ti.f32, outer * SLOTS)
-        self.slot_levers = ti.Matrix.field(3, 3, ti.f32, outer * SLOTS)
-        # The contact in which a particle was pressed most at the end of the last step.
-        self.kept_triangle = ti.field(ti.i32, particles)
-        self.kept_normal_impulse = ti.field(ti.f32, particles)  # as `slot_normal_impulse`; 0 for none
-        self.kept_friction_impulse = ti.Vector.field(3, ti.f32, particles)
-        self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
-        # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
-        self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
-        self.pair_impulse = ti.Vector.field(3, ti.f32, bodies * PAIR_ROWS)  # on the second in a step [N s]
-        self.pairs_lost = ti.field(ti.i32, ())  # 1 where some had no row
-        # Bodies placed inside each other: see `kernels/parting.py`.
-        self.overlap = ti.field(ti.i32, bodies)  # CLEAR, JUST_PLACED or OVERLAPPING
-        self.partner_count = ti.field(ti.i32, bodies)  # bodies that each overlaps in this step
-        self.partner = ti.field(ti.i32, bodies * MAX_PARTNERS)
-        self.center = ti.Vector.field(3, ti.f32, bodies)  # of mass, after the step [m]
-        self.displacement = ti.Vector.field(3, ti.f32, bodies)  # of the centre in the step [m]
-        self.mean_velocity = ti.Vector.field(3, ti.f32, bodies)  # of the centre [m/s]
-        self.size = ti.field(ti.f32, bodies)  # largest side [m]
-        self.mobility = ti.field(ti.f32, bodies)  # inverse mass; 0 where pinned or not moving [1/kg]
-        self.parting_shift = ti.Vector.field(3, ti.f32, bodies)  # displacement that all partners ask for [m]
-        self.parting_kick = ti.Vector.field(3, ti.f32, bodies)  # change of velocity [m/s]
-
-    def carried(self) -> list[list[Any]]:
-        """Return the fields that the next step depends on: those of particles, and those of bodies."""
-        return [[self.kept_triangle, self.kept_normal_impulse, self.kept_friction_impulse], [self.overlap]]
+    owner, when = "contact", "has_soft_contact"
+    body_touches_itself = declare(BODY, ti.i32, start=LOADED)
+    cell_first = declare(GRID_CELL, ti.i32)
+    item = declare(OUTER, ti.i32)  # rows of `outer_particle` that may be near the other body
+    # The same, cell by cell, and their positions.
+    cell_item = declare(OUTER, ti.i32)
+    cell_position = declare(OUTER, ti.f32, 3, unit="m")
+    # At the search: corners of boxes, and positions.
+    triangle_lower = declare(TRIANGLE, ti.f32, 3, unit="m")
+    triangle_upper = declare(TRIANGLE, ti.f32, 3, unit="m")
+    searched_position = declare(PARTICLE, ti.f32, 3, unit="m")
+    # Relative to what the bodies of an island share: distances for which a search holds, and how far each
+    # body and each vertex is from where it was then.
+    body_reach = declare(BODY, ti.f32, unit="m")
+    body_lost = declare(BODY, ti.f32, unit="m")  # distance for which the vertices of a pair had room enough
+    body_gone = declare(BODY, ti.f32, unit="m")
+    particle_gone = declare(PARTICLE, ti.f32, unit="m")
+    found_count = declare(OUTER, ti.i32)
+    found_triangle = declare(OUTER, ti.i32, each=FOUND)
+    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # at the search
+    # Candidates, of each body vertex by vertex, without gaps. Code reads the last `LANES` rows and never
+    # uses them.
+    slot_count = declare(BODY, ti.i32, start=0)
+    # The vertex, and the triangle's corners.
+    slot_vertices = declare(OUTER, ti.i32, 4, each=SLOTS, beyond=LANES)
+    slot_triangle = declare(OUTER, ti.i32, each=SLOTS)
+    # Distance at the search beyond the thickness.
+    slot_spare = declare(OUTER, ti.f32, unit="m", each=SLOTS, beyond=LANES)
+    near_slot = declare(OUTER, ti.i32, each=SLOTS, beyond=LANES)  # near now; behind them, old ones
+    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # beyond the thickness; or NO_CONTACT
+    slot_weights = declare(OUTER, ti.f32, 3, each=SLOTS)  # barycentric, of the nearest point
+    slot_normal = declare(OUTER, ti.f32, 3, each=SLOTS)  # from the triangle to the vertex
+    slot_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=SLOTS)  # along it in this substep
+    slot_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=SLOTS)  # on the vertex
+    # Contacts of this substep; between a search and the gaps, those of the last one. Slots of each body
+    # from its first slot on; no other slot has an impulse.
+    contact_count = declare(BODY, ti.i32, start=0)
+    contact_slot = declare(OUTER, ti.i32, each=SLOTS)
+    # What the solves of a contact share: inverse masses of the vertex and the corners; whether the bodies of
+    # the two move (1); normal of the triangle; shares of the corners in the impulse on the vertex, and height
+    # over the triangle times the gradients of the weights.
+    slot_inv_mass = declare(OUTER, ti.f32, 4, unit="1/kg", each=SLOTS)
+    slot_moves = declare(OUTER, ti.f32, 2, each=SLOTS)
+    slot_face = declare(OUTER, ti.f32, 3, each=SLOTS)
+    slot_shares = declare(OUTER, ti.f32, 3, each=SLOTS)
+    slot_levers = declare(OUTER, ti.f32, (3, 3), each=SLOTS)
+    # The contact with the largest normal impulse on a particle at the end of the last step; 0 for none.
+    kept_triangle = declare(PARTICLE, ti.i32, keep=PARTICLE)
+    kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MAX_IMPULSE)
+    kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MAX_IMPULSE)
+    records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the rows below are filled
+    # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
+    pair_bodies = declare(BODY, ti.i32, 2, each=PAIR_ROWS, start=0)
+    pair_impulse = declare(BODY, ti.f32, 3, unit="N s", each=PAIR_ROWS, start=0)  # on the second in a step
+    pairs_lost = declare(WORLD, ti.i32, start=0)  # 1 if some had no row
+    # Bodies placed inside each other: see `kernels/parting.py`.
+    partner_count = declare(BODY, ti.i32, start=0)  # bodies that each overlaps in this step
+    partner = declare(BODY, ti.i32, each=MAX_PARTNERS)
+    center = declare(BODY, ti.f32, 3, unit="m")  # of mass, after the step
+    displacement = declare(BODY, ti.f32, 3, unit="m")  # of the centre in the step
+    mean_velocity = declare(BODY, ti.f32, 3, unit="m/s")  # of the centre
+    size = declare(BODY, ti.f32, unit="m")  # largest side
+    mobility = declare(BODY, ti.f32, unit="1/kg")  # inverse mass; 0 if pinned or not moving
+    parting_shift = declare(BODY, ti.f32, 3, unit="m")  # displacement that all partners ask for
+    parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # change of velocity

@@ -15,54 +15,48 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.core.field_loader import Loader
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.field_table import BODY, LOADED, OUTER, PARTICLE, TRIANGLE, FieldGroup, declare
+from taichi_soft.core.runtime import ti
 
 TOUCHES = 4
 """Colliders that a point of a hull may meet in a substep."""
 
 
-@holds_fields
-class HullFields:
-    """Touching surfaces, and what carries each particle that touches: itself, or of a hull's point four."""
+class HullFields(FieldGroup):
+    """Touching surfaces, and carriers of each particle that touches: itself, or four for a hull's point."""
 
-    def __init__(self, particles: int, bodies: int, outer: int, triangles: int, *, soft: bool) -> None:
-        """Allocate; contents are zero."""
-        # As those of the same names in `BodyFields`.
-        self.body_outer = ti.Vector.field(2, ti.i32, bodies)
-        self.body_triangles = ti.Vector.field(2, ti.i32, bodies)
-        self.outer_particle = ti.field(ti.i32, outer)
-        self.triangle_vertices = ti.Vector.field(3, ti.i32, triangles)
-        self.body_points = ti.Vector.field(2, ti.i32, bodies)  # rows of the points; none without a hull
-        self.carriers = ti.Vector.field(4, ti.i32, particles)
-        self.weights = ti.Vector.field(4, ti.f32, particles)
-        # Contacts with colliders in a substep, of each body from its first one on: normal of the collider,
-        # how fast it is there, how fast the point may be along the normal beside it [m/s]; how far behind the
-        # surface its way would end [m] that began at the place [m] with the velocity [m/s].
-        touches = TOUCHES * outer
-        self.touch_point = ti.field(ti.i32, touches)
-        self.touch_collider = ti.field(ti.i32, touches)
-        self.touch_normal = ti.Vector.field(3, ti.f32, touches)
-        self.touch_surface = ti.Vector.field(3, ti.f32, touches)
-        self.touch_allowed = ti.field(ti.f32, touches)
-        self.touch_beyond = ti.field(ti.f32, touches)
-        self.touch_start = ti.Vector.field(3, ti.f32, touches)
-        self.touch_start_velocity = ti.Vector.field(3, ti.f32, touches)
-        self.touch_inv_mass = ti.field(ti.f32, touches)  # of the point [1/kg]
-        self.touch_normal_impulse = ti.field(ti.f32, touches)  # on the point [N s]
-        self.touch_friction_impulse = ti.Vector.field(3, ti.f32, touches)
-        # Of each point: two colliders that it touched in the last substep, counted from 1, or 0, and their
-        # impulses on it [N s].
-        self.held_by = ti.Vector.field(2, ti.i32, particles)
-        self.held_normal_impulse = ti.Vector.field(2, ti.f32, particles)
-        self.held_friction_impulse = ti.Vector.field(3, ti.f32, particles)
-        self.held_second_friction_impulse = ti.Vector.field(3, ti.f32, particles)
-        if soft:
-            # Of each contact: how fast an impulse of 1 N s at one corner of the triangle makes another [m/s].
-            self.slot_mobility = ti.Matrix.field(3, 3, ti.f32, outer * SLOTS)
-
-    def carried(self) -> list[Any]:
-        """What the next step depends on, of each particle."""
-        return [self.held_by, *self.held_impulses]
+    owner, when = "contact", "has_hulls"
+    # As those of the same names in `BodyFields`.
+    body_outer = declare(BODY, ti.i32, 2, start=LOADED)
+    body_triangles = declare(BODY, ti.i32, 2, start=LOADED)
+    outer_particle = declare(OUTER, ti.i32, start=LOADED)
+    triangle_vertices = declare(TRIANGLE, ti.i32, 3, start=LOADED)
+    body_points = declare(BODY, ti.i32, 2, start=LOADED)  # rows of the points; none without a hull
+    carriers = declare(PARTICLE, ti.i32, 4, start=LOADED)
+    weights = declare(PARTICLE, ti.f32, 4, start=LOADED)
+    # Contacts with colliders in a substep, of each body from its first one on: normal of the collider, its
+    # velocity there, allowed speed of the point along the normal relative to it; how far behind the surface
+    # its path would end that began at the place with the velocity.
+    touch_point = declare(OUTER, ti.i32, each=TOUCHES)
+    touch_collider = declare(OUTER, ti.i32, each=TOUCHES)
+    touch_normal = declare(OUTER, ti.f32, 3, each=TOUCHES)
+    touch_surface = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)
+    touch_allowed = declare(OUTER, ti.f32, unit="m/s", each=TOUCHES)
+    touch_beyond = declare(OUTER, ti.f32, unit="m", each=TOUCHES)
+    touch_start = declare(OUTER, ti.f32, 3, unit="m", each=TOUCHES)
+    touch_start_velocity = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)
+    touch_inv_mass = declare(OUTER, ti.f32, unit="1/kg", each=TOUCHES)  # of the point
+    touch_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=TOUCHES)  # on the point
+    touch_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=TOUCHES)
+    # Two colliders that each point touched in the last substep, counted from 1, or 0, and their impulses on
+    # it. The impulses of other points mean nothing.
+    held_by = declare(PARTICLE, ti.i32, 2, start=0, keep=PARTICLE)
+    held_normal_impulse = declare(PARTICLE, ti.f32, 2, unit="N s", keep=PARTICLE)
+    held_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
+    held_second_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
+    # Of each contact of bodies: change of velocity of one corner of the triangle by an impulse of 1 N s at
+    # another.
+    slot_mobility = declare(OUTER, ti.f32, (3, 3), unit="1/kg", each=SLOTS, when="has_soft_contact")
 
     @property
     def held_impulses(self) -> list[Any]:
@@ -92,7 +86,6 @@ class HullFields:
         loader.fill(self.body_points, np.array(points))
         loader.fill(self.carriers, carriers)
         loader.fill(self.weights, weights)
-        loader.fill(self.held_by, np.zeros((0, 2)))
 
 
 def touching_rows(

@@ -1,4 +1,4 @@
-"""Whether a body starts inside another: for those who would rather be told than have the two moved apart."""
+"""Check for a body that starts inside another, for callers who prefer an error to moving the two apart."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 INSET = 0.02
-"""Depth over the mean edge from which bodies overlap. Contact itself moves shallower bodies apart."""
+"""Depth over the mean edge above which bodies overlap. Contact itself moves shallower bodies apart."""
 
 RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
-"""Axes: a ray along the third decides what is inside. It meets no edge of a usual mesh, and no vertex."""
+"""Axes whose third is the direction of the ray that decides what is inside. It meets no edge or vertex of a
+usual mesh."""
 
 CHUNK = 1 << 19
-"""Pairs of points and triangles that are looked at together."""
+"""Pairs of points and triangles that are compared at once."""
 
 
 class Placed(NamedTuple):
-    """A body where it is."""
+    """A body and its present vertex positions."""
 
     name: str
     asset: SoftBodyAsset
@@ -37,7 +38,7 @@ class Placed(NamedTuple):
 
     @property
     def corners(self) -> Floats:
-        """Triangles by which it touches others, (t, 3, 3) [m]."""
+        """Corners of the triangles by which it touches others, (t, 3, 3) [m]."""
         hull = self.asset.bound_hull
         if hull is not None:
             return np.asarray(self.asset.touching_points(self.positions)[hull.triangles])
@@ -45,7 +46,7 @@ class Placed(NamedTuple):
 
 
 def require_apart(body: Placed, others: Iterable[Placed]) -> None:
-    """Check that a body starts outside of all others that it may touch.
+    """Check that a body starts outside of all other bodies that it can touch.
 
     Raises: OptionError with the body that it overlaps deepest, and the depth.
     """
@@ -64,7 +65,7 @@ def require_apart(body: Placed, others: Iterable[Placed]) -> None:
 
 
 def _depth(body: Placed, other: Placed) -> float:
-    """Depth of the deepest vertex, or middle of a tetrahedron, of a body in another [m]; 0 for none."""
+    """Return the depth of the deepest vertex or tetrahedron centre of a body in another [m]; 0 for none."""
     if not len(other.tets):
         return 0.0
     corners = other.corners
@@ -84,7 +85,7 @@ def _depth(body: Placed, other: Placed) -> float:
 
 
 def _is_inside(points: Floats, corners: Floats) -> NDArray[np.bool_]:
-    """Whether a ray from each point leaves a closed surface more often than it enters it."""
+    """True for points from which a ray leaves a closed surface more often than it enters it."""
     seen = corners @ RAY.T - (points @ RAY.T)[:, None, None]
     x, y, z = np.moveaxis(seen, -1, 0)
     areas = np.roll(x, -1, axis=-1) * np.roll(y, -2, axis=-1) - np.roll(x, -2, axis=-1) * np.roll(

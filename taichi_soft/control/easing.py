@@ -21,7 +21,7 @@ from taichi_soft.bodies.kernels.constant_rows import write_numbers
 from taichi_soft.bodies.layout import BodyArrays
 from taichi_soft.bodies.measures import elastic_energy
 from taichi_soft.bodies.soft_body import Slice, SoftBody, present_asset, record_of
-from taichi_soft.control.constants import write_constants, write_stiffness
+from taichi_soft.control.material_constants import write_constants, write_stiffness
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.serialisation import below
 

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
-from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
-from taichi_soft.control.kernels.pins import WITH_FRAME, aim_pinned
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
+from taichi_soft.control.kernels.pins import aim_pinned
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.field_table import FRAME
 from taichi_soft.core.handles import Handle, recorded, serial_of
 from taichi_soft.core.math.rotations import turned
-from taichi_soft.core.serialisation import require_below, vector_of
+from taichi_soft.core.serialisation import vector_of
 
 
 class Frames(Slice):
@@ -75,7 +76,7 @@ class Frames(Slice):
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
         self.past, self.present = self.present, self.coming.copy()
 
-    def way(self, body: SoftBody) -> float:
+    def displacement(self, body: SoftBody) -> float:
         """Largest distance that frames moved a particle in the last, undone step [m]."""
         x, longest = body.positions().astype(np.float64), 0.0
         for each in self.holding(body):
@@ -109,9 +110,9 @@ class Frames(Slice):
             found.append((int(serial), present.astype(np.float32), coming.astype(np.float32)))
         return found
 
-    def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raise a ValueError if a particle follows an unknown frame."""
-        require_below(rows_of(self.context.built.state.particle_aim), WITH_FRAME + len(read))
+    def things(self, read: Any) -> dict[str, int]:
+        """As `Slice.things`: frames."""
+        return {FRAME: len(read)}
 
     def restore(self, read: Any) -> None:
         """Replace all frames by those from `read`. Pins get their velocities before the next step."""

@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
+from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of
 from taichi_soft.control.change import change, mass_of, numbers, require_per_body, rows_of
 from taichi_soft.control.grab_patch import Patch, patch_around, point_between
 from taichi_soft.control.kernels.grabs import (
+    ALL_GRABS,
     CORNERS,
     FORCE,
     LIMITS,
     MOST_GRABS,
     PATCH_ROWS,
+    PATCHES,
     PLACE,
+    USED_GRABS,
     end_grab,
     read_grab,
     write_grab,
@@ -31,7 +34,7 @@ from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.core.residue import weighted_sum
-from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
+from taichi_soft.core.serialisation import below, vector_of
 
 WEIGHTS = 10.0
 """Default largest force, in weights of the body on Earth."""
@@ -101,7 +104,7 @@ class Grabs(Numbered[Grab]):
 
     name = "grabs"
     prevents_levels = False  # see `hold_at`
-    most, way_out = MOST_GRABS, "release"
+    most, advice_verb = MOST_GRABS, "release"
 
     def release_body(self, body: SoftBody) -> None:
         """Release all grabs of a body."""
@@ -125,10 +128,10 @@ class Grabs(Numbered[Grab]):
             for number, grab in sorted(self.by_number.items())
         ]
 
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Numbers of grabs, of grabs up to the last one in use, and of patch rows."""
+    def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
+        """As `Slice.row_counts`: grabs up to the last one in use."""
         used = max((int(number) for _, number, _, _ in entries), default=-1) + 1
-        return [MOST_GRABS, used, used * PATCH_ROWS]
+        return {ALL_GRABS: MOST_GRABS, USED_GRABS: used, PATCHES: used * PATCH_ROWS}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
@@ -140,16 +143,6 @@ class Grabs(Numbered[Grab]):
                 raise ValueError("a grab has no body")
             found.append((int(serial), below(number, MOST_GRABS), int(slot), vector_of(point, 3)))
         return found
-
-    def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raise a ValueError if the fields have invalid indices or values that are not finite."""
-        fields, particles = self.context.built.state.grabs, self.context.layout.particle_count
-        require_below(rows_of(fields.body), len(self.context.slots.slots) + 1)
-        require_below(rows_of(fields.corners), particles)
-        require_below(rows_of(fields.count), PATCH_ROWS + 1)
-        require_below(rows_of(fields.particle), particles)
-        for field in (fields.weights, fields.target, fields.spring, fields.share):
-            require_finite(rows_of(field))
 
     def restore(self, read: Any) -> None:
         """Replace all grabs by those from `read`."""

@@ -28,9 +28,12 @@ from taichi_soft.control.change import (
 from taichi_soft.control.embedding import Places, places_at, places_on
 from taichi_soft.control.grab_patch import wave_speed
 from taichi_soft.control.kernels.joints import (
+    ALL_JOINTS,
     ENDS,
+    JOINT_ENDS,
     JOINT_ROWS,
     MOST_JOINTS,
+    USED_JOINT_ROWS,
     end_joint,
     forget_held,
     read_joint_impulse,
@@ -39,7 +42,7 @@ from taichi_soft.control.kernels.joints import (
 from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
-from taichi_soft.core.serialisation import below, indices_below, require_below
+from taichi_soft.core.serialisation import below, indices_below
 
 DRAW = 0.25
 """Largest closing speed of a gap, over the wave speed in the body times the square root of the held fraction
@@ -106,7 +109,7 @@ class Joints(Numbered[Joint]):
     """All joints of one world, by number."""
 
     name = "joints"
-    most, way_out = MOST_JOINTS, "release"
+    most, advice_verb = MOST_JOINTS, "release"
 
     @property
     def rows_in_use(self) -> int:
@@ -140,10 +143,10 @@ class Joints(Numbered[Joint]):
             for number, joint in sorted(self.by_number.items())
         ]
 
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Numbers of joints, of their rows, and of the ends of the rows."""
+    def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
+        """As `Slice.row_counts`."""
         rows = sum(len(particles) for *_, particles in entries)
-        return [MOST_JOINTS, rows, rows * ENDS]
+        return {ALL_JOINTS: MOST_JOINTS, USED_JOINT_ROWS: rows, JOINT_ENDS: rows * ENDS}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
@@ -164,16 +167,13 @@ class Joints(Numbered[Joint]):
         if not self.context.built.program.has_contact:
             return
         fields = self.context.built.state.joints
-        bodies, rows, weights = rows_of(fields.bodies), rows_of(fields.rows), rows_of(fields.weight)
-        require_below(bodies, len(self.context.slots.slots) + 1)
-        require_below(rows, JOINT_ROWS + 1)
-        require_below(rows_of(fields.particle), self.context.layout.particle_count)
+        bodies, rows = rows_of(fields.bodies), rows_of(fields.rows)
         noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in read}
         used = np.flatnonzero(bodies[:, 0])
         told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
         spans = sorted(rows[used].tolist())
         ends = [0, *(end for _, end in spans)]
-        if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
+        if told != noted or [start for start, _ in spans] != ends[:-1]:
             raise ValueError("its joints differ from its fields")
 
     def clear(self) -> None:

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import best_fitting_pose
-from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of
+from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.change import change, named_particles, numbers, require_per_body, rows_of
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
     MOTOR_ROWS,
+    USED_MOTORS,
     forget_impulse,
     read_speed,
     write_drive,
@@ -28,7 +29,7 @@ from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.math.rotations import length_of
 from taichi_soft.core.residue import kept
-from taichi_soft.core.serialisation import below, indices_below, require_finite, vector_of
+from taichi_soft.core.serialisation import below, indices_below, vector_of
 
 LARGEST_LIMIT = 1e12
 """Largest limit of torque [N m] and force [N]."""
@@ -156,7 +157,7 @@ class Motors(Numbered[Motor]):
     """All motors of one world, by number."""
 
     name = "motors"
-    most, way_out = MOST_MOTORS, "remove"
+    most, advice_verb = MOST_MOTORS, "remove"
 
     @property
     def rows_in_use(self) -> int:
@@ -205,9 +206,9 @@ class Motors(Numbered[Motor]):
             for number, motor in sorted(self.by_number.items())
         ]
 
-    def row_counts(self, entries: list[list[Any]]) -> list[int]:
-        """Number of motors up to the last one in use."""
-        return [max((int(number) for _, number, *_ in entries), default=-1) + 1]
+    def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
+        """As `Slice.row_counts`: motors up to the last one in use."""
+        return {USED_MOTORS: max((int(number) for _, number, *_ in entries), default=-1) + 1}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
@@ -232,10 +233,6 @@ class Motors(Numbered[Motor]):
         if is_twice or sum(len(driven) for *_, driven, _ in found) > MOTOR_ROWS:
             raise ValueError("it has more motors than a world can have")
         return found
-
-    def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raise a ValueError if results of motors are not finite."""
-        require_finite(rows_of(self.context.built.state.motors.impulse))
 
     def restore(self, read: Any) -> None:
         """Replace all motors by those from `read`."""

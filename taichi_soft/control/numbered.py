@@ -15,7 +15,7 @@ class Numbered(Slice, Generic[Kind]):
     """Base of grabs, joints and motors: all of one world, by index."""
 
     most = 0  # largest number of handles
-    way_out = ""  # verb of the advice if all are in use
+    advice_verb = ""  # verb of the advice if all are in use
 
     def __init__(self, context: Context) -> None:
         """Start without handles."""
@@ -40,6 +40,6 @@ class Numbered(Slice, Generic[Kind]):
         free = next((number for number in range(self.most) if number not in self.by_number), None)
         if free is None:
             raise StateError(
-                f"all {self.most} {self.name} of this world are in use: {self.way_out} one first"
+                f"all {self.most} {self.name} of this world are in use: {self.advice_verb} one first"
             )
         return free

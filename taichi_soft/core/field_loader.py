@@ -28,6 +28,11 @@ class Loader:
             whole[: len(rows)] = rows.reshape(len(rows), width)
         self._waiting.append((field, whole.reshape(-1)))
 
+    def fill_all(self, field: Any, number: float) -> None:
+        """Set all numbers of such a field, for `write`."""
+        rows = np.full(_rows_of(field) * getattr(field, "n", 1), number)
+        self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
+
     def write(self) -> None:
         """Write all filled fields."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]

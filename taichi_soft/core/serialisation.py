@@ -148,15 +148,3 @@ def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
     if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
         raise ValueError("it has invalid vertices")
     return found
-
-
-def require_below(rows: NDArray[Any], limit: int) -> None:
-    """Raise a ValueError unless all integers are from 0 to below `limit`."""
-    if rows.size and not (rows.min() >= 0 and rows.max() < limit):
-        raise ValueError("it has invalid particles or bodies")
-
-
-def require_finite(rows: NDArray[Any]) -> None:
-    """Raise a ValueError unless all numbers are finite."""
-    if not np.isfinite(rows).all():
-        raise ValueError("values that move its bodies are not finite")

@@ -17,7 +17,7 @@ from taichi_soft.cages import tetrahedra_of
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, TaichiSoftError
 from taichi_soft.core.types import CageMethodName
-from taichi_soft.doctor.surface import SurfaceFacts, facts_of
+from taichi_soft.doctor.triangle_facts import SurfaceFacts, facts_of
 from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh, load_mesh
 from taichi_soft.meshing.io import SURFACES

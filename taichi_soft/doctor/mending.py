@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.cages.solid import Solid, solid_of
 from taichi_soft.core.errors import MeshError
-from taichi_soft.doctor.surface import NO_AREA
+from taichi_soft.doctor.triangle_facts import NO_AREA
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.io import SURFACES
 from taichi_soft.meshing.surface import Surface, joined

@@ -28,7 +28,7 @@ from taichi_soft.events.kinds import (
     TearCandidates,
     Woke,
 )
-from taichi_soft.events.stress import StressWatches
+from taichi_soft.events.watched_stress import StressWatches
 
 
 def touch_rows(room: ContactCapacity, bodies: int) -> int:

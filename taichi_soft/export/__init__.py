@@ -1,6 +1,6 @@
 """Export a built world as a folder that the native library runs, see `engine_adapter/native`."""
 
-from taichi_soft.export.axes import AXES
+from taichi_soft.export.engine_axes import AXES
 from taichi_soft.export.exporting import ExportReport, export_world
 from taichi_soft.export.machine_code import PLATFORMS
 

@@ -16,24 +16,22 @@ from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import MAX_ACCELERATION
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grab_patch import LIMITS, elements_of, wave_speed
-from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
+from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS
 from taichi_soft.control.impulses import LARGEST_IMPULSE
-from taichi_soft.control.joints import Joints
-from taichi_soft.control.kernels.grabs import PATCH_ROWS
-from taichi_soft.control.kernels.joints import ENDS
-from taichi_soft.control.kernels.motors import MOST_MOTORS
-from taichi_soft.control.motors import Motors
+from taichi_soft.control.kernels.grabs import MOST_GRABS, PATCH_ROWS, PATCHES, USED_GRABS
+from taichi_soft.control.kernels.joints import ENDS, JOINT_ENDS, USED_JOINT_ROWS
+from taichi_soft.control.kernels.motors import ALL_MOTORS, MOST_MOTORS, MOTOR_PARTICLES, USED_MOTORS
 from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
 from taichi_soft.core.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.events.contacts import CONTACT_PAUSE
 from taichi_soft.events.log import MAX_EVENTS
 from taichi_soft.events.observer import touch_rows
 from taichi_soft.export.archive import words
-from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
+from taichi_soft.export.layout import FLOAT, WHOLE, image_of, places_of
 from taichi_soft.export.levels import constant_names, passage_arrays, slot_arrays
 from taichi_soft.export.meshes import ExportedMesh
-from taichi_soft.persistence.kernels.packing import OWNERS, carried, owners
-from taichi_soft.persistence.snapshot import carried_rows, finite_fields
+from taichi_soft.persistence.manifest import write_manifest
+from taichi_soft.persistence.snapshot import row_counts
 from taichi_soft.solver.context import WorldContext
 
 Arrays = dict[str, NDArray[Any]]
@@ -112,35 +110,20 @@ def _of_world(context: WorldContext) -> Arrays:
 def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
-    rows = carried_rows(context)
-    slices = [name for name, groups in state.carried.items() for _ in groups]
-    grabs, motors = state.grabs, state.motors
-    # Fields that move bodies must be finite.
-    moving = [state.particle_position, state.particle_velocity, *(field for _, field in finite_fields(state))]
-    moving += [grabs.weights, grabs.target, grabs.spring, grabs.limits, grabs.share]
-    # Grabs and motors have all rows, because the game adds more. Joints and motors have the particles they
-    # use.
-    whose = [_ALWAYS] * len(rows)
-    for owner, name in enumerate(slices, start=len(OWNERS)):
-        if name in (Grabs.name, Motors.name):
-            rows[owner] = int(np.prod(carried(state, owner)[0][0].shape))
-    if Joints.name in slices:
-        begin = len(OWNERS) + slices.index(Joints.name)
-        rows[begin + 1 : begin + 3] = [1, ENDS]
-        whose[begin + 1 : begin + 3] = [_OF_JOINTS, _OF_JOINTS]
-        moving += [state.joints.draw_speed, state.joints.weight]
-    kept = [
-        (place_of(field), rows[owner], whose[owner], any(field is each for each in moving))
-        for owner in owners(state)
-        for field, _, _ in carried(state, owner)
-    ]
-    of_motors = [motors.motor.get_member_field(key) for key in motors.motor.keys]
-    kept += [(place_of(field), MOST_MOTORS, _ALWAYS, True) for field in of_motors]
-    kept += [(place_of(motors.particle), 1, _OF_MOTORS, False)]
+    rows = row_counts(context, write_manifest(context)["slices"])
+    # The game adds grabs and motors. Joints and motors have the rows that they use.
+    rows |= {USED_GRABS: MOST_GRABS, PATCHES: MOST_GRABS * PATCH_ROWS, ALL_MOTORS: MOST_MOTORS}
+    rows |= {USED_MOTORS: MOST_MOTORS, MOTOR_PARTICLES: 1, USED_JOINT_ROWS: 1, JOINT_ENDS: ENDS}
+    whose = {MOTOR_PARTICLES: _OF_MOTORS, USED_JOINT_ROWS: _OF_JOINTS, JOINT_ENDS: _OF_JOINTS}
+    kept = []
+    for name, each, _ in state.fields:
+        group = each.keep if state.is_kept(each) else each.native_keep
+        if group:
+            kept.append((*_plain(places[name]), rows[group], whose.get(group, _ALWAYS)))
     return {
         "fields/names": words(list(places)),
         "fields/places": np.array([_plain(each) for each in places.values()], dtype=np.int64),
-        "fields/carried": np.array([(*_plain(each), *more) for each, *more in kept], dtype=np.int64),
+        "fields/kept": np.array(kept, dtype=np.int64),
         "fields/image": image_of(state),
     }
 

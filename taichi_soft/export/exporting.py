@@ -19,8 +19,8 @@ from taichi_soft.core.extras import require_extra
 from taichi_soft.core.part_folder import PartFolder
 from taichi_soft.core.runtime import export_kernels
 from taichi_soft.export.archive import words, written
-from taichi_soft.export.axes import axes_of
 from taichi_soft.export.description import description_of
+from taichi_soft.export.engine_axes import axes_of
 from taichi_soft.export.machine_code import compile_kernels, platforms_of
 from taichi_soft.export.meshes import meshes_of
 from taichi_soft.export.module import kernels_of

@@ -31,24 +31,8 @@ class FieldPlace:
 
 def places_of(state: State) -> dict[str, FieldPlace]:
     """Layouts of all fields with contiguous elements, by name; names of a slice's fields have a dot."""
-    found = {}
-    for name, field in _fields(state, ""):
-        place = place_of(field)
-        if place is not None:
-            found[name] = place
-    return found
-
-
-def _fields(holder: Any, prefix: str) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    for name, value in vars(holder).items():
-        if isinstance(value, ti.lang.struct.StructField):
-            found += [(f"{prefix}{name}.{key}", value.get_member_field(key)) for key in value.keys]
-        elif isinstance(value, ti.Field):
-            found.append((prefix + name, value))
-        elif getattr(type(value), "_data_oriented", False):
-            found += _fields(value, f"{prefix}{name}.")
-    return found
+    places = {name: place_of(field) for name, _, field in state.fields}
+    return {name: place for name, place in places.items() if place is not None}
 
 
 def place_of(field: Any) -> FieldPlace | None:

@@ -69,8 +69,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)
     found["shape_patch"] = _example(shape_patch)
-    found["forget_collider"] = _example(forget_collider, contact=state.contact)
-    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
+    found["forget_collider"] = _example(forget_collider, contact=state.colliders)
+    found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.colliders)
     found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)

@@ -31,9 +31,9 @@ from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.residue import kept, weighted_sum
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
-from taichi_soft.levels.fitting import fitting_motion, moments
 from taichi_soft.levels.passage import Passage, passage
 from taichi_soft.levels.reattaching import Reattachments, reattachments_at, update_handles, write_targets
+from taichi_soft.levels.rigid_fit import fitting_motion, moments
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

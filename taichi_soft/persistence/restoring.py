@@ -7,8 +7,8 @@ from dataclasses import replace
 from taichi_soft.bodies.cut_mesh import name_of
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
-from taichi_soft.control.constants import write_constants
 from taichi_soft.control.frictions import give_friction
+from taichi_soft.control.material_constants import write_constants
 from taichi_soft.core.handles import serial_of
 from taichi_soft.core.serialisation import as_plain
 from taichi_soft.fracture.cutting import refill_slot

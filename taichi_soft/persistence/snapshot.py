@@ -19,30 +19,21 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.contact.collider import Collider
-from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.constants import LANES
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.core.errors import SnapshotError, StateError
+from taichi_soft.core.field_table import BODY, COLLIDER, CONTACT, PARTICLE, SHAPE, WORLD
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.serialisation import from_json, to_json
 from taichi_soft.events import EventState, HandleLookup
-from taichi_soft.persistence.kernels.packing import (
-    BODY,
-    PARTICLE,
-    SHAPE,
-    WORLD,
-    carried,
-    copy_state,
-    hash_bodies,
-    owners,
-    row_table,
-)
+from taichi_soft.persistence.kernels.packing import copy_state, hash_bodies, row_table
 from taichi_soft.persistence.manifest import Manifest, read_manifest, read_parts, write_manifest
 from taichi_soft.persistence.restoring import restore_bodies
 from taichi_soft.persistence.world_structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 12
+MARK, VERSION = b"TSOFTSNP", 13
 
 Words = NDArray[np.int32]
 
@@ -80,18 +71,24 @@ def bodies_hash(context: WorldContext) -> str:
     return f"{code % 2**64:016x}"
 
 
+def row_counts(context: WorldContext, entries: dict[str, list[list[Any]]]) -> dict[str, int]:
+    """Number of rows of each group of fields in a snapshot, for the entries of the slices in a manifest."""
+    scene, slots = context.layout, len(context.slots.slots)
+    counts = {
+        WORLD: 1,
+        PARTICLE: scene.particle_count,
+        BODY: slots,
+        SHAPE: scene.block_count * 9 * LANES,
+        CONTACT: slots * context.built.state.capacity.contact.colliders,
+    }
+    for each in context.slices:
+        counts |= each.row_counts(entries[each.name])
+    return counts
+
+
 def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
-    """Layout of the words of each group of fields, for the entries of the slices in a manifest."""
-    state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
-    of_slices = {each.name: each for each in context.slices}
-    counts = [count for name in state.carried for count in of_slices[name].row_counts(entries[name])]
-    return row_table(state, scene.particle_count, slots, scene.block_count, counts)
-
-
-def carried_rows(context: WorldContext) -> list[int]:
-    """Number of rows of each group of fields in a snapshot, in the order of `owners`."""
-    rows: list[int] = _table(context, write_manifest(context)["slices"])[:-1, 0].tolist()
-    return rows
+    """Layout of the words of each group of fields."""
+    return row_table(context.built.state, row_counts(context, entries))
 
 
 def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = False) -> None:
@@ -140,59 +137,42 @@ def _four_parts(parts: list[memoryview]) -> list[memoryview]:
 def _require_words(context: WorldContext, manifest: Manifest, table: Words, words: Words) -> None:
     """Check the fields. Raises: SnapshotError for indices out of range and for values that are not finite."""
     state = context.built.state
-    limits: list[tuple[int, Any, int]] = [
-        (BODY, state.body_status, ABSENT + 1),
-    ]
-    if state.capacity.implicit:
-        limits.append((PARTICLE, state.particle_contact, max(state.capacity.contact.colliders, 1) + 1))
-    for owner, field, limit in limits:
-        rows = _rows(table, words, state, owner, field)
-        if rows.size and not (rows.min() >= 0 and rows.max() < limit):
-            raise SnapshotError("this snapshot is invalid: it names particles or bodies that do not exist")
-    bounds: list[tuple[Any, float]] = [
-        (state.particle_position, POSITION_LIMIT),
-        (state.particle_velocity, VELOCITY_LIMIT),
-    ]
-    for field, highest in bounds:
-        values = _rows(table, words, state, PARTICLE, field).view(np.float32)
-        if not np.abs(values).max() <= highest:
-            raise SnapshotError("this snapshot is invalid: particles are out of range, or not finite")
-    for owner, field in finite_fields(state):
-        if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
-            raise SnapshotError("this snapshot is invalid: velocities, forces or masses are not finite")
+    things = {
+        "": 0,
+        PARTICLE: context.layout.particle_count,
+        BODY: len(context.slots.slots),
+        COLLIDER: state.capacity.contact.colliders,
+    }
+    for each in context.slices:
+        things |= each.things(manifest.slices[each.name])
+    for name, declared, field in state.fields:
+        if state.is_kept(declared) and declared.is_bounded:
+            rows = _rows(table, words, state, field)
+            try:
+                declared.require(rows if field.dtype == ti.i32 else rows.view(np.float32), things)
+            except ValueError as error:
+                raise SnapshotError(f"this snapshot is invalid: its {name} {error}") from None
     for each in context.slices:
         try:
             each.require(manifest.slices[each.name], partial(_field_rows, table, words, state))
         except ValueError as error:
             raise SnapshotError(f"this snapshot is invalid: {error}") from None
-    is_present = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
+    is_present = _rows(table, words, state, state.body_status)[:, 0] != ABSENT
     if is_present.tolist() != [body is not None for body in manifest.bodies]:
         raise SnapshotError("this snapshot is invalid: its fields and its manifest name different bodies")
 
 
-def finite_fields(state: State) -> list[tuple[int, Any]]:
-    """Fields of floats that the next step reads, except positions and velocities; they must be finite."""
-    particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
-    particle += [state.particle_target, state.particle_push]
-    body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping, state.body_sound_speed]
-    body += [state.body_refinement]
-    shape = [state.tet_rest_inverse] if state.capacity.plastic else []
-    owners = (PARTICLE, particle), (BODY, body), (SHAPE, shape)
-    return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]
-
-
 def _field_rows(table: Words, words: Words, state: State, field: Any) -> NDArray[Any]:
     """Values of a slice's field in a snapshot, (rows, width), in the field's type."""
-    owner = next(each for each in owners(state) if any(f is field for f, _, _ in carried(state, each)))
-    rows = _rows(table, words, state, owner, field)
+    rows = _rows(table, words, state, field)
     return rows if field.dtype == ti.i32 else rows.view(np.float32)
 
 
-def _rows(table: Words, words: Words, state: State, owner: int, requested: Any) -> Words:
+def _rows(table: Words, words: Words, state: State, requested: Any) -> Words:
     """Words of a field in a snapshot, (rows, width)."""
-    count, width, begin = table[owner].tolist()
-    rows = words[begin : begin + count * width].reshape(count, width)
-    for field, column, size in carried(state, owner):
-        if field is requested:
-            return np.ascontiguousarray(rows[:, column : column + size])
-    raise KeyError(owner)
+    for (count, width, begin), group in zip(table.tolist(), state.kept.values(), strict=False):
+        for field, column, size in group:
+            if field is requested:
+                rows = words[begin : begin + count * width].reshape(count, width)
+                return np.ascontiguousarray(rows[:, column : column + size])
+    raise KeyError(requested)

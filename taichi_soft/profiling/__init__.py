@@ -5,7 +5,7 @@ from taichi_soft.profiling.budget import measure_budget
 from taichi_soft.profiling.comparison import compare_with_baseline
 from taichi_soft.profiling.crossover import measure_crossover
 from taichi_soft.profiling.devices import measure_devices
-from taichi_soft.profiling.game import measure_features, measure_heaps, measure_moments
+from taichi_soft.profiling.feature_costs import measure_features, measure_heaps, measure_moments
 from taichi_soft.profiling.implicit import measure_implicit
 from taichi_soft.profiling.kept_budget import measure_kept_budget
 from taichi_soft.profiling.law_costs import LawCost, measure_laws

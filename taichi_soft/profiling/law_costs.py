@@ -30,7 +30,7 @@ class LawCost:
     is_anisotropic: bool
     element: str  # "tetrahedron" or "edge"
     cost: Spread  # whole substep, including edge damping [ns per element]
-    ratio: Spread  # over that of "virial" with the linear strain, pair by pair
+    ratio: Spread  # cost over that of "virial" with the linear strain, from runs in turns
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:

@@ -109,7 +109,9 @@ class Camera:
             lower, upper: opposite corners of the box [m].
             margin: size of the view relative to the box, 1 to 10.
             aspect: width over height of the image.
-        Raises: as `framing`. A camera that looks straight up or down is tilted slightly.
+        Raises: as `framing`.
+
+        A camera that looks straight up or down is tilted slightly.
         """
         x, y, z = np.subtract(self.eye, self.target)
         return Camera.framing(

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.runtime import ti
+from taichi_soft.render.frame_arrays import SceneArrays
 from taichi_soft.render.geometry_kernels import PLANE, project_triangles
 from taichi_soft.render.kernel_types import TILE, matrix
 from taichi_soft.render.raster_kernels import rasterize
-from taichi_soft.render.scene import SceneArrays
 
 # Positions of samples inside a pixel [pixels]. Four samples form a rotated grid: no two share a row or
 # column, which smooths near-vertical and near-horizontal edges best.

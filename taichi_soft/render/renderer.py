@@ -15,14 +15,14 @@ from taichi_soft.render.backdrop import COLORS, Backdrop, BackdropName
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_linear
+from taichi_soft.render.drawn_surface import Surface
 from taichi_soft.render.floor_tiles import FloorTiles
+from taichi_soft.render.frame_arrays import SceneArrays
 from taichi_soft.render.look import Look
 from taichi_soft.render.occlusion import REACH, Occlusion
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
-from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
-from taichi_soft.render.surface import Surface
 from taichi_soft.render.tone import encode_table, light_table
 
 LARGEST = 8192  # pixels along an image; beyond it sample indices exceed 32 bits

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.render.camera import Camera
+from taichi_soft.render.frame_arrays import SceneArrays
 from taichi_soft.render.light_funcs import COARSE as COARSE_TEXELS
 from taichi_soft.render.light_funcs import FAINTEST
 from taichi_soft.render.lighting import SUN_AZIMUTH, SUN_ELEVATION
 from taichi_soft.render.opencv import cv2
 from taichi_soft.render.raster import CENTER, Raster
-from taichi_soft.render.scene import SceneArrays
 
 COARSE = int(COARSE_TEXELS)
 SIZE = 384  # texels along the sun's map

@@ -1,1 +1,1 @@
-"""The step: schedules, the substep, sleep, and what is done where it fails."""
+"""The step: schedules, substeps, integrators, sleep, and recovery from failures."""

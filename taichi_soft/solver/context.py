@@ -1,4 +1,4 @@
-"""What persistence and the world see of a world's parts: all of them."""
+"""The context of a world with all its parts, for persistence and the world itself."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from taichi_soft.solver.substeps import Substeps
 
 @dataclass(eq=False, kw_only=True)
 class WorldContext(Context):
-    """A world without its public face."""
+    """A world without its public interface."""
 
     contact_request: ContactRequest
     substeps: Substeps
-    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # a handle to what is in a slot
+    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # the handle of a slot
     fields: Simulation | None = None
-    built_with: list[str] = field(default_factory=list)  # shapes of colliders from before `build`, by digest
-    structure: bytes = b""  # what a snapshot's world must be built of, once it was asked for
+    built_with: list[str] = field(default_factory=list)  # digests of the colliders' shapes at `build`
+    structure: bytes = b""  # digest of the structure that a snapshot requires, computed on demand
 
     @property
     def contact(self) -> ContactSettings:
@@ -45,17 +45,17 @@ class WorldContext(Context):
 
     @property
     def colliders(self) -> Colliders:
-        """All of them."""
+        """The colliders of the world."""
         return self.of(Colliders)
 
     @property
     def floor_collider(self) -> Collider | None:
-        """The floor where there are colliders, from `build` on."""
+        """The floor, from `build` on; None in a world without colliders."""
         return self.colliders.floor
 
     @property
     def built(self) -> Simulation:
-        """Raises: StateError before `World.build`."""
+        """The built world. Raises: StateError before `World.build`."""
         if self.fields is None:
             raise StateError("the world is not built: call world.build() after the last add_body")
         return self.fields

@@ -1,4 +1,4 @@
-"""What made a body go non-finite: found out afterwards, by making its last step again."""
+"""Find why a body became non-finite, by repeating its last step."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import numpy as np
 from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.constants import LANES
-from taichi_soft.solver.kernels.failures import find_broken_element
+from taichi_soft.solver.kernels.failed_element import find_failed_element
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 
 def find_failure(state: State, program: StepProgram, scene: Scene, body: int, failed: FailedStep) -> Failure:
-    """Make the step that froze a body again and see where it breaks; the body stays as it is."""
+    """Repeat the step that froze a body and find where it fails. The body does not change."""
     found = np.full(2, -1, dtype=np.int32)
-    find_broken_element(state, program, body, failed.substeps, failed.h, int(failed.is_braked), found)
+    find_failed_element(state, program, body, failed.substeps, failed.h, int(failed.is_braked), found)
     element, substep = found.tolist()
     if element < 0:
         return Failure(body, None, failed.step, None, failed.time)

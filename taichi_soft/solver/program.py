@@ -1,4 +1,4 @@
-"""What a step kernel is compiled for."""
+"""The parameters that a step kernel is compiled for."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,11 @@ from taichi_soft.solver.integrators import IntegratorModel
 
 @dataclass(frozen=True)
 class StepProgram(Program):
-    """Structure of a world's step: everything that shapes the code, and no number."""
+    """Structure of a world's step: everything that changes the code, but no numbers."""
 
     integrator: IntegratorModel
     has_floor: bool
-    has_contact: bool = False  # with colliders, of which the floor then is one
-    has_soft_contact: bool = False  # bodies with each other
-    has_plasticity: bool = False  # of any body
+    has_contact: bool = False  # with colliders; the floor is one of them
+    has_soft_contact: bool = False  # between bodies
+    has_plasticity: bool = False  # at least one body has it
     worker_count: int = 1  # threads that share one flat step

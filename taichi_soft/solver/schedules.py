@@ -1,4 +1,4 @@
-"""How the step of a world is launched: one object per schedule, one call per fixed step."""
+"""Launch the step of a world: one function per schedule, one call per fixed step."""
 
 from collections.abc import Callable
 
@@ -12,34 +12,32 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 FLAT_FROM_TETS = 100_000
-"""Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
-Measured with `taichi-soft profile --crossover`: with both cores free, two threads win from some 5,000 on
-(0.83 of the time, 0.69 at 110,000). But a barrier that waits for a thread which another program has pushed
-off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
-300 times slower than on one thread, and only the largest still won."""
+"""Tetrahedra of a world's largest body from which its threads share bodies. On free cores, sharing pays for
+much smaller bodies (`taichi-soft profile --crossover`). But if another program occupies a core, a barrier
+waits milliseconds for the interrupted thread, and only the largest bodies still gain."""
 
-STRETCH = 2_000_000
-"""Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, several times as
-much where bodies touch, and up to 23 times where a step is made again. While a kernel runs, Python hears no
-Ctrl-C. A longer step takes a snapshot first: some 5 % of its time, and it is no step of a game."""
+MAX_CALL_WORK = 2_000_000
+"""Tetrahedra times substeps of one kernel call, at most. Ctrl-C waits for the end of the call: 0.03 s on one
+thread, several times longer with contact, and up to 23 times if the step is retried. A step that needs
+several calls takes a snapshot first."""
 
 ALL = 2**31 - 1
-"""Substeps of one call of a kernel that makes the whole step."""
+"""Substeps of a kernel call that runs the whole step."""
 
 Launch = Callable[[int, float], int]
 
 
 def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
-    """The schedule to use where `asked` leaves it open.
+    """Return the schedule `asked` for, or for AUTO the fastest.
 
-    A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
-    of them to keep the threads busy, or too few tetrahedra to be worth sharing.
+    A GPU needs one thread per tetrahedron. On a CPU, each body runs in one thread if there are enough bodies
+    to occupy all threads, or if none is large enough to be shared.
     """
     if asked is not Schedule.AUTO:
         return asked
     if device.is_gpu:
         return Schedule.FLAT
-    # A body without tetrahedra works on its edges, of which there are about twice as many per unit of work.
+    # In bodies without tetrahedra, two edges are about as much work as one tetrahedron.
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     is_balanced = max(sizes) * device.threads <= 1.25 * sum(sizes)
     if device.threads == 1 or is_balanced or max(sizes) < FLAT_FROM_TETS:
@@ -47,24 +45,25 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
     return Schedule.FLAT
 
 
-def most_substeps(scene: Scene, integrator: IntegratorModel) -> int:
-    """How many substeps a step of a world may have that one call of a kernel makes."""
+def substeps_per_call(scene: Scene, integrator: IntegratorModel) -> int:
+    """Return the largest number of substeps in one kernel call."""
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
-    return max(1, STRETCH // max(1, integrator.work * sum(sizes)))
+    return max(1, MAX_CALL_WORK // max(1, integrator.work * sum(sizes)))
 
 
 def make_launch(
     schedule: Schedule, state: State, program: StepProgram, scene: Scene, device: Device, retries: int = 0
 ) -> Launch:
-    """A function (substeps, h) -> number of bodies that failed, which makes one fixed step.
+    """Return a function (substeps, h) -> number of failed bodies, which runs one fixed step.
 
-    `retries`: how often a step that fails is made again.
+    Args:
+        retries: how often a failed step is retried.
     """
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count
 
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
-    stretch = most_substeps(scene, program.integrator)
+    stretch = substeps_per_call(scene, program.integrator)
 
     def by_islands(substeps: int, h: float) -> int:
         most = stretch if substeps > stretch else ALL
@@ -73,7 +72,7 @@ def make_launch(
             found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 1))
         return found
 
-    attempts = retries + 2 if retries else 1  # the last as fine as the one before it
+    attempts = retries + 2 if retries else 1  # the last has the same substeps as the one before
 
     def flat_cpu(substeps: int, h: float) -> int:
         failed, attempt = 1, 0

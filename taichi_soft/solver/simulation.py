@@ -1,4 +1,4 @@
-"""What `World.build` makes: fields, the kernel that moves them, and all that goes with a step of it."""
+"""A built world: its fields, its step kernel, and the Python side of a step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bod
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
-from taichi_soft.solver.kernels.untangling import REPORTED
+from taichi_soft.solver.kernels.untangling import REPORTED_AFTER
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch
@@ -44,7 +44,7 @@ from taichi_soft.solver.state import State
 
 @dataclass(eq=False)
 class Simulation:
-    """A built world without its public face."""
+    """A built world without its public interface."""
 
     settings: Settings
     pools: Pools[SoftBody]
@@ -58,22 +58,24 @@ class Simulation:
     state: State
     program: StepProgram
     launch: Launch
-    long_from: int  # substeps of a step beyond which it is made in several calls
+    long_from: int  # a step of more substeps takes several calls
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
-    loss: str = ""  # why the last step lost events, the first time since a drain
-    troubled: int = 0  # bodies that failed in the last step, stay inside out, or whose solves were not exact
-    _skips: bool = True  # somebody may stand still in the coming step
-    _is_still: bool = False  # none was awake after the last step, and nothing was changed since
-    _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
-    _inverted: set[int] = field(default_factory=set)  # slots of bodies that were reported as inside out
+    loss: str = ""  # why the last step lost events; set once per drain
+    troubled: int = 0  # bodies of the last step with failures, lasting inversions or inexact solves
+    _skips: bool = True  # bodies may skip the coming step
+    _is_still: bool = False  # no body is awake, and nothing changed since the last step
+    _warned: set[int] = field(default_factory=set)  # slots of bodies reported for inexact solves
+    _inverted: set[int] = field(default_factory=set)  # slots of bodies reported for inverted tetrahedra
 
     def __post_init__(self) -> None:
         self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
 
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
-        """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
+        """Run one fixed step of `seconds` in substeps of `h` [s]. Returns: a line for each body that it
+        froze.
+        """
         clock, colliders = self.clock, self.colliders
         if self.easings.by_body:
             self.easings.advance(seconds)
@@ -89,7 +91,7 @@ class Simulation:
             self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
         if colliders is not None:
             colliders.finish(seconds)
-        reports = self._note_failures(substeps, h) if self.troubled else []
+        reports = self._record_failures(substeps, h) if self.troubled else []
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
@@ -102,20 +104,20 @@ class Simulation:
         return reports
 
     def trial_step(self, seconds: float) -> None:
-        """Move the fields by a step that nobody takes note of, and that the caller takes back."""
+        """Run a step that records nothing, and that the caller undoes."""
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:
             self.colliders.prepare(seconds)
             begin_skips(self.state, len(self.pools.slots))
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
-        self.state.body_status.to_numpy()  # as where a body fails
-        self.state.body_patience.to_numpy()  # as where a body stays inside out
+        self.state.body_status.to_numpy()  # compiles what a failed body needs
+        self.state.body_patience.to_numpy()  # compiles what an inverted body needs
 
-    def _note_failures(self, substeps: int, h: float) -> list[str]:
-        """Mark the bodies that the last step froze; a line about each."""
+    def _record_failures(self, substeps: int, h: float) -> list[str]:
+        """Record the bodies that the last step froze. Returns: a line for each."""
         clock, reports = self.clock, []
-        # What freezes a body is the last of several attempts.
+        # The last attempt freezes the body.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
         if self.program.integrator.halvings > 0:
             finer, is_braked = 1 << self.program.integrator.halvings, False
@@ -128,39 +130,39 @@ class Simulation:
             )
             self.events.record_frozen(body)
             reports.append(
-                f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
-                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"
+                f"body {body.index} went non-finite in step {clock.steps}: restored to t = "
+                f"{clock.time:.4g} s and frozen; see body.failure. {self._suggest_fix(body)}"
             )
         return reports
 
-    def _way_out(self, body: SoftBody) -> str:
-        """What may help a body that the last step froze."""
+    def _suggest_fix(self, body: SoftBody) -> str:
+        """Suggest a fix for a body that the last step froze."""
         lower, upper = body.aabb()
-        way, size = self.frames.way(body), float((upper - lower).max())
-        if way > size:
+        moved, size = self.frames.displacement(body), float((upper - lower).max())
+        if moved > size:
             return (
-                f"It is {size:.3g} m large, and its frame moved it by {way:.3g} m in this step: move frames "
-                "in shorter ways, or make the jump by Frame.teleport"
+                f"It is {size:.3g} m large, and its frame moved it by {moved:.3g} m in this step: move the "
+                "frame by less per step, or jump with Frame.teleport"
             )
         return "Use more substeps or a softer material"
 
     def check_shapes(self) -> None:
-        """Warn of bodies that keep tetrahedra inside out, once of each."""
+        """Warn once of each body whose tetrahedra stay inverted."""
         patience = self.state.body_patience.to_numpy()
         for body in self.pools.occupants:
             index = body.index
-            if patience[index] < REPORTED or index in self._inverted or body.is_frozen:
+            if patience[index] < REPORTED_AFTER or index in self._inverted or body.is_frozen:
                 continue
             self._inverted.add(index)
             warnings.warn(
-                f"body {index} has tetrahedra that stay inside out: body.flipped_tets() lists them. Take a "
+                f"body {index} has tetrahedra that stay inside out: body.flipped_tets() lists them. Use a "
                 "larger Young's modulus, a coarser mesh or mesh.improved()",
                 SolverWarning,
                 stacklevel=4,
             )
 
     def check_solves(self) -> None:
-        """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
+        """Warn once of each body whose implicit solves were inexact in the last step."""
         if not self.state.capacity.implicit:
             return
         residuals = self.state.body_residual.to_numpy()
@@ -179,26 +181,26 @@ class Simulation:
             )
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
-        """Let a body begin in an empty slot, as `rows` say (see `SoftBodyAsset.placed`)."""
+        """Place a body in an empty slot, as given by `rows` (see `SoftBodyAsset.placed`)."""
         spawn_body(self.state, slot, rows)
         self.mark_changed()
 
     def empty(self, slot: int) -> None:
-        """Take the body in a slot out of the fields."""
+        """Remove the body in a slot from the fields."""
         self._warned.discard(slot)
         self._inverted.discard(slot)
         self._is_still = False
         despawn_body(self.state, slot)
 
     def skip(self, slots: Sequence[int]) -> None:
-        """Let bodies stand still in the coming step."""
+        """Make bodies skip the coming step."""
         if slots:
             skip_bodies(self.state, np.array(slots, dtype=np.int32))
             self._skips = True
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Bodies that the last step moved together, by slot; who came since then is alone."""
+        """Return the islands of the last step, by slot. Bodies added since then are separate."""
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)
@@ -219,14 +221,14 @@ class Simulation:
         self.wake(-1)
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
-        """Wake who sleeps near a box, given by two corners [m]."""
+        """Wake bodies that sleep near a box, given by two corners [m]."""
         if self.sleeps:
             box = np.concatenate([lower, upper]).astype(np.float32)
             if wake_near(self.state, len(self.pools.slots), box):
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Corners of a box round a body and what it touches others by, as it is now [m]."""
+        """Return corners of the present box around a body and its contact hull [m]."""
         lower, upper = body.aabb()
         asset = present_asset(body)
         if asset.hull is not None:
@@ -236,11 +238,11 @@ class Simulation:
         return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, first particle of a body, *arguments) that changes nothing."""
+        """Call a kernel (state, first particle of a body, *arguments) that only reads."""
         return kernel(self.state, self.scene.ranges[slot].particles[0], *arguments)
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that changes a body, or all for -1: the way of all control."""
+        """Call a kernel (state, *arguments) that changes a body, or all for -1. All control uses this."""
         found = self.attempt(kernel, *arguments)
         self.mark_modified(slot)
         return found
@@ -250,16 +252,18 @@ class Simulation:
         return kernel(self.state, *arguments)
 
     def mark_modified(self, slot: int) -> None:
-        """Take note that control has changed a body, or all for -1."""
+        """Record that control changed a body, or all for -1."""
         self.wake(slot)
         self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
-        """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
+        """Move a body to other positions. Raises: OptionError for values out of range."""
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
-                raise OptionError(f"{name} must lie within {limit:g} of zero")
+                raise OptionError(
+                    f"{name} must lie within {limit:g} of zero, got up to {np.abs(rows).max():.4g}"
+                )
         left = self.box_of(body)
         write_motion(self.state, body.index, x, v)
         self.on_placed(body)
@@ -267,75 +271,75 @@ class Simulation:
         self.wake_near(*left)
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """Of the vertices, between the previous step and the last one, (n, 3) [m]."""
+        """Positions of the vertices, interpolated between the last two steps, (n, 3) [m]."""
         return self.readout.positions(body, alpha, out)
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
-        """Of the vertices at the time of their positions, (n, 3) [m/s]."""
+        """Velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
         return self.readout.velocities(body)
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m]."""
+        """A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m]."""
         return self.readout.rest_inverses(body)
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Vertices that are held now, ascending."""
+        """Vertices that are pinned now, ascending."""
         return pinned_vertices(body)
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
-        """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider.
+        """Raises: OptionError if points of a body's surface, (k, 3) [m], are too deep inside a collider.
 
-        The floor is left to the caller, who names the height that is missing.
+        The caller checks the floor, and names the missing height.
         """
         if self.colliders is not None:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
             require_clear(others, present_asset(body), points, f"body {body.index}")
 
     def mark_joints_changed(self) -> None:
-        """Let bodies that are joined be stepped together, where no step finds out by itself."""
+        """Rebuild the islands of joined bodies in worlds whose steps do not search for islands."""
         if self.program.has_contact and not self.program.has_soft_contact:
             list_joined_islands(self.state, len(self.pools.slots))
 
     def apply_settings(self, settings: Settings) -> None:
-        """Have other gravity, or another friction of the floor."""
+        """Change gravity or the floor's friction."""
         self.settings = self.readout.settings = settings
         self.state.write_surroundings(settings)
 
     def on_placed(self, body: SoftBody) -> None:
-        """Look for bodies that a body overlaps, in the next step."""
+        """Make the next step check which bodies this body overlaps."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
 
     def on_cut(self, body: SoftBody) -> None:
-        """Take note that a body has other vertices."""
+        """Record that the vertices of a body changed."""
         self.events.renew_watches(body)
 
     def was_restored(self) -> None:
-        """Take note that the fields are those of a snapshot."""
+        """Record that a snapshot was restored."""
         self._skips = True
         self.mark_changed()
 
     def mark_changed(self) -> None:
-        """Take note that the fields were written to."""
+        """Record that the fields changed."""
         self._is_still = False
         self.readout.has_moved()
 
     def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Where vertices of a body lie in the fields."""
+        """Return the rows of a body's vertices in the fields."""
         rows: NDArray[np.int32] = self.scene.bodies[slot].rank[vertices]
         return (rows + self.scene.ranges[slot].particles[0]).astype(np.int32)
 
     def is_asleep(self, slot: int) -> bool:
-        """Whether the body in a slot sleeps."""
+        """True if the body in a slot is asleep."""
         return int(self.state.body_status[slot]) == ASLEEP
 
     def solve_residual(self, body: SoftBody) -> float | None:
-        """As `Body.solve_residual`."""
+        """See `Body.solve_residual`."""
         has_solved = self.state.capacity.implicit and self.clock.steps > record_of(body).first_step
         return float(self.state.body_residual[body.index]) if has_solved else None
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """What broke first in the body in a slot."""
+        """Find the first failure of the body in a slot."""
         return find_failure(self.state, self.program, self.scene, slot, failed)
 
 

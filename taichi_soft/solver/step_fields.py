@@ -1,6 +1,10 @@
 """Fields of the step: how far each island has come in it, and what threads have to know of each other."""
 
-from taichi_soft.core.runtime import holds_fields, ti
+import numpy as np
+
+from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.field_table import BODY, LOADED, WORLD, FieldGroup, declare
+from taichi_soft.core.runtime import ti
 
 MOST_PARTS = 16
 """Parts of an island's bodies: threads beyond these share theirs."""
@@ -52,15 +56,40 @@ class Job:
     shift: ti.math.vec3
 
 
-@holds_fields
-class JobFields:
+class IslandFields(FieldGroup):
+    """Islands, and what their bodies tell each other in a substep."""
+
+    owner, when = "solver", "has_contact"
+    count = declare(WORLD, ti.i32, start=LOADED, native=True)
+    first = declare(BODY, ti.i32, beyond=1, start=LOADED)  # row of its first body
+    body = declare(BODY, ti.i32, start=LOADED)  # bodies that may touch or are joined, by island
+    of_body = declare(BODY, ti.i32, start=LOADED, keep=BODY)
+    parent = declare(BODY, ti.i32)  # in the forest of islands
+    sweep_order = declare(BODY, ti.i32, start=LOADED)  # bodies by their lower x
+    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING of `vibration`
+    is_exploding = declare(BODY, ti.i32)  # 1 if it must not take others with it
+    is_stable = declare(BODY, ti.i32)  # 0 if forces changed a velocity by too much
+    has_failed = declare(BODY, ti.i32)  # 1 if it broke or was not solved well in this step
+    body_speed = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle in this substep
+    # Relative to the velocity that its island shares; with leapfrog of what was touched before the push.
+    body_speed_beside = declare(BODY, ti.f32, unit="m/s")  # of its fastest particle
+    body_mean_beside = declare(BODY, ti.f32, unit="m/s")  # root mean square over particles
+
+    def load(self, loader: Loader, bodies: int) -> None:
+        """Give each body an island of its own."""
+        loader.fill(self.count, np.array([bodies]))
+        loader.fill(self.first, np.arange(bodies + 1))
+        for rows in (self.body, self.of_body, self.sweep_order):
+            loader.fill(rows, np.arange(bodies))
+
+
+class JobFields(FieldGroup):
     """What threads share islands by: see `kernels/jobs.py`."""
 
-    def __init__(self, bodies: int) -> None:
-        """Allocate; contents are zero."""
-        self.job = Job.field(shape=bodies)  # type: ignore[attr-defined]  # of each island, what is called for
-        self.unfinished_islands = ti.field(ti.i32, ())  # of several bodies
-        self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
-        self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
-        self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
-        self.unfinished = ti.field(ti.i32, bodies)  # bodies of each island whose phase is not made yet
+    owner, when = "solver", "has_contact"
+    job = declare(BODY, Job, below={})  # of each island, what is called for
+    unfinished_islands = declare(WORLD, ti.i32)  # of several bodies
+    useful_helpers = declare(WORLD, ti.i32)  # threads beside their owners that could find a body there
+    parts = declare(WORLD, ti.i32)  # of the bodies of an island, one for each thread
+    untaken = declare(BODY, ti.i32, each=MOST_PARTS)  # bodies of each part that wait for a thread
+    unfinished = declare(BODY, ti.i32)  # bodies of each island whose phase is not done yet

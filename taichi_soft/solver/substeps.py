@@ -1,4 +1,4 @@
-"""Into how many substeps a fixed step is cut."""
+"""Choose the number of substeps of a fixed step."""
 
 from __future__ import annotations
 
@@ -23,44 +23,48 @@ _PLAIN = {float, int, np.float64, type(None)}
 
 
 SOFT_CONTACT_STEP = 1 / 240
-"""Substep of implicit Euler [s], at most, where bodies touch each other and nothing else is asked for. What
-passes between them the solve does not know of, so they look softer the longer it is: in a pile of three,
-blocks of half a metre (1 MPa) are lower than by leapfrog by 3 to 9 mm so, and by 9 to 27 mm at 120 Hz; at
-60 Hz the pile falls."""
+"""Longest substep of implicit Euler [s] chosen for a world with contact between bodies. The solve ignores
+forces between bodies, so bodies in a pile look softer with longer substeps: twice this substep compresses a
+pile of three blocks about three times as much, and with four times it the pile falls."""
 
 
 MANY_SUBSTEPS = 500
-"""Of a step: a world that needs more says so. A body of 1,000 tetrahedra then takes 8 ms a step."""
+"""Substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per step."""
 
 FRAME = 1 / 60
-"""Step [s] for which a world is judged when it is built."""
+"""Step [s] used to judge a world when it is built."""
 
 TET_TIME = 15e-9
-"""Of a tetrahedron and substep on one thread [s], about (docs: `taichi-soft profile --baseline`)."""
+"""Approximate time per tetrahedron and substep on one thread [s] (`taichi-soft profile --baseline`)."""
 
 
 class Substeps:
-    """How long the substeps of one world can be, and how long they are."""
+    """Stable and chosen substeps of one world."""
 
     def __init__(
         self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool | None, most: int | None
     ) -> None:
-        """`has_stable_step`: longer substeps explode. `soft_contact`, `most`: as arguments of `World`."""
+        """Start without choices.
+
+        Args:
+            has_stable_step: True if longer substeps explode.
+            most: see `World(max_substeps=)`.
+        """
         self._pools = pools
         self.has_stable_step, self._soft_contact = has_stable_step, soft_contact
         self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
         self._asked: tuple[Any, ...] = ()
-        self._chosen = (0.0, 0, 0.0)  # for what was asked last
+        self._chosen = (0.0, 0, 0.0)  # the answer to `_asked`
         self._warned: set[float] = set()
         self._most, self._is_said = most, False
 
     @property
     def has_limit(self) -> bool:
-        """True if a step that needs too many is refused."""
+        """True if a step that needs too many substeps is refused."""
         return self._most is not None
 
     def stable_step(self, body: SoftBody) -> StableStep:
-        """As `World.stable_step`."""
+        """See `World.stable_step`."""
         described = record_of(body).description
         present = present_asset(body)
         if described is present.description:
@@ -71,8 +75,8 @@ class Substeps:
 
     @property
     def rule(self) -> tuple[float, float]:
-        """Of a step, as many substeps are stable as its length times the first, over the second [s], is
-        rounded up to.
+        """Factor and divisor [s] that give the number of stable substeps: length of the step times the first,
+        over the second, rounded up.
 
         Raises: StateError for a world without bodies.
         """
@@ -88,14 +92,14 @@ class Substeps:
         return 1.0, longest
 
     def stable_count(self, dt: float) -> int:
-        """As `World.stable_substeps`."""
+        """See `World.stable_substeps`."""
         share, longest = self.rule
         return max(1, math.ceil(share * as_step(dt) / longest))
 
     def review(self) -> None:
-        """Before a world is built: say how many substeps a frame will take, where these are many.
+        """Before a world is built, warn if a frame needs many substeps.
 
-        Raises: OptionError where they are more than the world may take.
+        Raises: OptionError if it needs more than the world allows.
         """
         if self._pools.slots and self.has_stable_step:
             self._require_few(FRAME, self.stable_count(FRAME))
@@ -111,23 +115,23 @@ class Substeps:
             f"body {index}: {step.reason}"
         )
         if is_refused:
-            raise OptionError(f"{said}; the world takes max_substeps={self._most:,}")
+            raise OptionError(f"{said}; the world allows max_substeps={self._most:,}")
         self._is_said = True
         warnings.warn(said, SlowStepWarning, stacklevel=6)
 
     def _stiffest(self) -> tuple[int, StableStep]:
-        """The slot that needs the shortest substeps, and these."""
+        """Return the slot that needs the shortest substeps, and its stable step."""
         found = [(asset.stable_step, slot) for slot, asset in enumerate(self._pools.assets)]
         found += [(self.stable_step(body), body.index) for body in self._pools.occupants]
         step, slot = min(found, key=lambda each: each[0].limit)
         return slot, step
 
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
+        """Return length of a step [s], number of substeps and their length [s], for `World.step`.
 
         Raises: OptionError.
         """
-        asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but they are refused
+        asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but both are refused
         if not {type(dt), type(substeps)} <= _PLAIN or self._asked != asked:
             self._chosen = self._check(dt, substeps)
             self._asked = asked
@@ -140,12 +144,12 @@ class Substeps:
             if self.has_stable_step:
                 self._require_few(seconds, count)
         elif self._most is not None and count > self._most:
-            raise OptionError(f"substeps is {count:,}; the world takes max_substeps={self._most:,}")
+            raise OptionError(f"substeps is {count:,}; the world allows max_substeps={self._most:,}")
         h = seconds / count
         _log.info("a step of %g s is made in %d substeps", seconds, count)
         if not self.has_stable_step:
             return seconds, count, h
-        # Of bodies that were cut or are of something else nothing is estimated here: the caller knows better.
+        # Bodies that were cut or changed material are not estimated: the caller chose the number.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned:
@@ -154,18 +158,18 @@ class Substeps:
                 f"{self._pools.assets.index(stiffest)} can take ({stiffest.stable_step.stiffest}): it may "
                 f"explode. Use substeps={self.stable_count(seconds)} or leave substeps out",
                 UnstableStepWarning,
-                stacklevel=5,  # who called World.step
+                stacklevel=5,  # the caller of World.step
             )
             self._warned.add(h)
         return seconds, count, h
 
     def forget(self) -> None:
-        """Choose anew, whatever is asked."""
+        """Discard the last choice."""
         self._asked = ()
 
     def renew(self) -> None:
-        """Take note that a body is made of something else."""
+        """Discard estimates of materials that are no longer used."""
         used = {record_of(each).description for each in self._pools.occupants}
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
-        if self._asked[1:2] == (None,):  # whose number was chosen for what was there before
+        if self._asked[1:2] == (None,):  # chosen for the previous materials
             self.forget()

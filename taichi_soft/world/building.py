@@ -1,4 +1,4 @@
-"""Bodies and colliders of a world moved into Taichi fields, with the kernels that fit them."""
+"""Build a world: allocate its fields, fill them, and choose its kernels."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.integrators import INTEGRATORS
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
-from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
+from taichi_soft.solver.schedules import choose_schedule, make_launch, substeps_per_call
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.state import Capacity, State
 from taichi_soft.solver.substeps import FRAME
@@ -42,7 +42,7 @@ _log = logging.getLogger(__name__)
 
 
 def build(context: WorldContext) -> Simulation:
-    """As `World.build`, of a world that was not."""
+    """Build a world for `World.build`."""
     pools, scene, colliders = context.slots, context.layout, context.colliders
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
@@ -87,13 +87,13 @@ def build(context: WorldContext) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
-        most_substeps(scene, program.integrator),
+        substeps_per_call(scene, program.integrator),
         EventLog(Observer(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
     if has_contact:
-        colliders.load(state.contact, len(pools.slots))
-        woken = weakref.WeakMethod(simulation.wake_near)  # or the two would keep each other
+        colliders.load(state.colliders, len(pools.slots))
+        woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would be a cycle
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
     _log.info(
         "built a world of %d slots for bodies and %d tetrahedra: schedule %s, %s, %s; %d substeps in 1/60 s",
@@ -108,7 +108,7 @@ def build(context: WorldContext) -> Simulation:
 
 
 def _add_floor(context: WorldContext) -> None:
-    """Make the floor one of the colliders."""
+    """Add the floor to the colliders."""
     settings = context.settings
     if settings.floor is not None:
         floor = context.colliders.floor = context.colliders.add(
@@ -125,7 +125,7 @@ def _add_floor(context: WorldContext) -> None:
 
 
 def _schedule(context: WorldContext, device: Device) -> Schedule:
-    """The schedule of a world. Raises: OptionError for what the one asked for cannot do."""
+    """Choose the schedule of a world. Raises: OptionError if the requested one lacks a feature."""
     settings, request = context.settings, context.contact_request
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
@@ -193,24 +193,24 @@ def _is_plastic(context: WorldContext) -> bool:
 
 
 def _fill(context: WorldContext, contact: ContactSettings, state: State, program: StepProgram) -> None:
-    """Write all bodies into the fields, in slots that are empty yet."""
+    """Write all bodies to the fields. Their slots stay empty."""
     fill, assets = state.loader.fill, context.slots.assets
     if program.has_plasticity:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
-        fill(state.contact.sleep_speed, np.array([contact.sleep_speed]))
-        fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
+        fill(state.sleep_speed, np.array([contact.sleep_speed]))
+        fill(state.colliders.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
-        fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
+    fill(state.body_surface, np.array([a.surface_row for a in assets]))
     models = [program.models.index(asset.description.model) for asset in assets]
     kinds = [asset.kind_row(is_implicit=state.capacity.implicit) for asset in assets]
     state.load(context.layout, models, np.array(kinds))
 
 
 def _warm_up(context: WorldContext, state: State) -> None:
-    """A body that comes and goes, so that nothing compiles where the first does in the game."""
+    """Spawn and despawn each kind of body, so that nothing compiles during the game."""
     for asset in context.slots.kinds:
         slot = context.slots.assets.index(asset)
         if asset.spare_vertices or asset.coarser:

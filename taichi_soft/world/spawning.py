@@ -11,8 +11,8 @@ from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.soft_body import belongs_to, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.contact.overlap import Placed, require_apart
-from taichi_soft.control.constants import write_constants
 from taichi_soft.control.frictions import give_friction
+from taichi_soft.control.material_constants import write_constants
 from taichi_soft.core.checks import as_count, as_flag, as_rotation, as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import turned
@@ -199,7 +199,7 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
-        else:  # a snapshot may have restored an earlier body here, cut or at another level
+        else:  # the slot can hold data of a restored body that was cut or had another level
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return make_handle(context, asset)

@@ -13,8 +13,7 @@ class WorldStates(WorldParts):
     """Methods of a world for its state."""
 
     def snapshot(self) -> bytes:
-        """Return the complete state between two steps, for `restore` in this world or one that was built
-        equally.
+        """Return the complete state between two steps, for `restore` in this world or an identical one.
 
         It contains bodies, colliders, frames, grabs, attachments and joints, gravity, wind, changed
         materials and frictions, all forces of the next step, and running contacts of recorded events; but no
@@ -39,7 +38,7 @@ class WorldStates(WorldParts):
         stay watched. Waiting events of undone steps are dropped; repeating the steps records them again, even
         those that were drained before.
         Args:
-            data: result of `snapshot`, from this world or one that was built equally.
+            data: result of `snapshot`, from this world or one that was built the same way.
         Raises: SnapshotError for damaged data, or for a world that was built differently, with the first
             difference; OptionError for data that is not bytes; StateError before `build`.
         """

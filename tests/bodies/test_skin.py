@@ -19,7 +19,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.bodies import skin_mesh
-from taichi_soft.doctor.surface import facts_of
+from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.render.replay import replay
 from taichi_soft.world.bare import bare_world
 

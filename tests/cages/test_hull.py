@@ -6,7 +6,7 @@ import surfaces
 import trimesh
 from difficult_surfaces import letter
 
-from taichi_soft.bodies.hull import MIN_WEIGHT, bind
+from taichi_soft.bodies.bound_hull import MIN_WEIGHT, bind
 from taichi_soft.cages import tetrahedra_of
 from taichi_soft.cages.hull import hull_of
 from taichi_soft.meshing.surfaces import read_surfaces

@@ -14,7 +14,7 @@ from taichi_soft import LAWS
 from taichi_soft.cli.app import app
 from taichi_soft.profiling import LawCost, Spread, find_compiler
 from taichi_soft.profiling.law_costs import kinds_of
-from taichi_soft.profiling.report import law_table
+from taichi_soft.profiling.profile_tables import law_table
 
 SPREAD = Spread(1.0, 1.0, 1.0, 1.0)
 

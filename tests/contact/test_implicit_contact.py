@@ -149,7 +149,7 @@ def test_what_lies_feels_the_collider_with_its_weight_and_leaves_when_it_is_thro
 def test_what_colliders_take_up_is_what_the_body_lost(dt):
     """A spinning ball falls into a corner of a plane, two boxes and a sphere: to the solver's tolerance.
 
-    The long steps are made again in pieces, and what they did before is forgotten.
+    The long steps are retried in pieces, and the results of the failed attempts are discarded.
     """
     world = room(tolerance=1e-6, most_iterations=1000)
     world.add_collider(PlaneShape(), friction=0.4)

@@ -5,7 +5,7 @@ import pytest
 
 from taichi_soft import Contact, Material, TetMesh, box
 from taichi_soft.contact.fields import SLOTS
-from taichi_soft.contact.kernels.narrow_phase import find_gaps
+from taichi_soft.contact.kernels.narrow_phase import find_contacts
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 from taichi_soft.world.bare import bare_world
@@ -19,7 +19,7 @@ BODY = 3  # whose vertex it is; the triangles belong to those before it
 def find(state: ti.template(), body: ti.i32):
     ti.loop_config(serialize=True)
     for _ in range(1):
-        find_gaps(state, body, 0.0, 1 / 600)
+        find_contacts(state, body, 0.0, 1 / 600)
 
 
 class Candidates:
@@ -33,8 +33,8 @@ class Candidates:
         world.build()
         self.world, self.state = world, world._built.state
         assert isinstance(self.state, State)
-        contact, soft = self.state.contact, self.state.soft
-        for field in (contact.is_exploding, soft.particle_gone, soft.particle_speed):
+        state = self.state
+        for field in (state.islands.is_exploding, state.soft.particle_gone, state.particle_speed):
             field.fill(0)  # a step writes them first; here they may be of the last world of this size
         outer = self.state.body_outer.to_numpy()[BODY][0]
         self.first, self.vertex = outer * SLOTS, self.state.outer_particle[outer]

@@ -177,7 +177,7 @@ def test_a_world_whose_driven_body_has_frozen_can_be_restored():
 
 
 def test_effort_counts_the_attempt_that_was_kept_only():
-    """A jelly on the floor, torn at so hard that steps are made again."""
+    """A jelly on the floor, pulled so hard that steps are retried."""
     world, body = made(WHEEL, JELLY, gravity=(0, 0, -9.81), floor=-0.7)
     motor = world.add_motor(body, HUB, (1, 0, 0), speed=2e4, max_torque=2e4)
     for _ in range(60):

@@ -151,7 +151,7 @@ def touching(spare_vertices=0, cells=(), **options):
 
 def frictions_of(world):
     """Of each slot: what its body says, what contact reads."""
-    rows = world._built.state.soft.body_surface.to_numpy()[: world.slot_count, 0]
+    rows = world._built.state.body_surface.to_numpy()[: world.slot_count, 0]
     return {body.index: (body.friction, pytest.approx(float(rows[body.index]))) for body in world.bodies}
 
 

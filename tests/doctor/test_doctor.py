@@ -14,7 +14,7 @@ from taichi_soft.cli import main
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.doctor import Grade, diagnose
 from taichi_soft.doctor.mending import write_mended
-from taichi_soft.doctor.surface import facts_of
+from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
 RUBBER = Material(young=5e5, poisson=0.4, density=1000.0)

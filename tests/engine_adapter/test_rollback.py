@@ -1,4 +1,4 @@
-"""Late inputs: steps taken back and made again. That they come out the same: see `test_threads.py`."""
+"""Late inputs: steps are undone and repeated. `test_threads.py` checks that the results are the same."""
 
 import numpy as np
 import pytest

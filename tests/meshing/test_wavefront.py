@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from taichi_soft import MeshError
-from taichi_soft.doctor.surface import facts_of
+from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
 FORMS = ["{0}", "{0}/{1}", "{0}//{2}", "{0}/{1}/{2}"]

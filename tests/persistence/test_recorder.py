@@ -1,4 +1,4 @@
-"""Flight recordings: written when a body freezes or on request, and made again from the file alone."""
+"""Flight recordings: written when a body freezes or on request, and repeated from the file alone."""
 
 import base64
 import json

@@ -23,7 +23,7 @@ from taichi_soft import (
     rope,
 )
 from taichi_soft.core.container import seal, unseal
-from taichi_soft.persistence.snapshot import MARK, VERSION
+from taichi_soft.persistence.snapshot import MARK, VERSION, row_counts
 from taichi_soft.world.bare import bare_world
 
 
@@ -346,18 +346,18 @@ def test_a_snapshot_of_a_time_when_worlds_had_fewer_slices_is_refused(small):
     refused(small, seal(MARK, VERSION, older), "slices")
 
 
-def forged(data, change):
+def forged(world, data, change):
     """A snapshot with a right checksum of what somebody made up."""
     structure, notes, words, memory = unseal(data, MARK, VERSION, "snapshot")
     content, rows = json.loads(bytes(notes)), np.frombuffer(words, "<i4").copy()
-    change(content, rows)
+    change(content, rows, world)
     return seal(
         MARK, VERSION, [bytes(structure), json.dumps(content).encode(), rows.tobytes(), bytes(memory)]
     )
 
 
 def set_note(*path, to):
-    def change(content, rows):
+    def change(content, rows, world):
         for key in path[:-1]:
             content = content[key]
         content[path[-1]] = to
@@ -365,15 +365,22 @@ def set_note(*path, to):
     return change
 
 
-def set_word(at, to):
-    def change(content, rows):
-        rows[at] = to
+def set_number(name, to, row=0, column=0):
+    """Change a number of a field in a snapshot of `small`."""
+
+    def change(content, rows, world):
+        state = world._context.built.state
+        field = next(field for each, _, field in state.fields if each == name)
+        counts, start = row_counts(world._context, content["slices"]), 0
+        for group, members in state.kept.items():
+            width = sum(size for *_, size in members)
+            for each, first, _ in members:
+                if each is field:
+                    at = start + row * width + first + column
+                    rows[at] = np.float32(to).view(np.int32) if isinstance(to, float) else to
+            start += counts[group] * width
 
     return change
-
-
-BODIES = 2 * 8 * 24
-"""The word after 24 for each particle. Ten follow for each body, then wind (4) and grabs."""
 
 
 @pytest.mark.parametrize(
@@ -397,18 +404,19 @@ BODIES = 2 * 8 * 24
         set_note("last_dt", to=np.inf),
         set_note("handles", to=1),
         set_note("bodies", 1, 0, to=1),
-        set_word(0, np.float32(np.nan).view(np.int32)),
-        set_word(12, np.float32(np.nan).view(np.int32)),
-        set_word(0, np.float32(1e30).view(np.int32)),
-        set_word(14, 77),
-        set_word(BODIES + 24, 99),
-        set_word(BODIES, 9),
-        set_word(BODIES + 14, np.float32(np.nan).view(np.int32)),
-        set_word(BODIES + 19, np.float32(np.nan).view(np.int32)),
+        set_number("particle_position", np.nan),
+        set_number("prev_velocity", np.nan),
+        set_number("particle_position", 1e30),
+        set_number("particle_aim", 77),
+        set_number("body_status", 99),
+        set_number("body_status", 4),
+        set_number("body_velocity_lag", np.nan),
+        set_number("wind", np.nan, column=3),
+        set_number("grabs.body", 99),
     ],
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
-    refused(small, forged(small.snapshot(), change))
+    refused(small, forged(small, small.snapshot(), change))
 
 
 @pytest.fixture(scope="module")
@@ -445,7 +453,7 @@ def test_whatever_a_note_says_it_is_refused_whole_or_restored_whole(held):
     count = 0
     for path in leaves(content):
         for bad in (np.nan, 1e30, 2**70, None):
-            made_up = forged(data, set_note(*path, to=bad))
+            made_up = forged(world, data, set_note(*path, to=bad))
             try:
                 world.restore(made_up)
             except SnapshotError:

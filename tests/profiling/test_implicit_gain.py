@@ -4,7 +4,7 @@ import numpy as np
 
 from taichi_soft import Material, box, force_gradient, internal_forces
 from taichi_soft.profiling.implicit import measure_implicit
-from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.sparse import SparseBody
 from taichi_soft.world.bare import bare_world
 

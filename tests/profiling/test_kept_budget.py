@@ -6,7 +6,7 @@ import trimesh
 from taichi_soft import Material, SoftBodyAsset
 from taichi_soft.profiling import kept_budget, measure_kept_budget
 from taichi_soft.profiling.kept_budget import Course, first_met, tell
-from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.spread import Spread
 
 FACTS = {"is_kept": True, "is_fixed": False, "tets": 7, "frozen": 0, "stolen": None, "skipped": 0.0}

@@ -12,8 +12,8 @@ from taichi_soft.profiling import (
     compare_with_baseline,
     compile_baseline,
     devices,
+    feature_costs,
     find_compiler,
-    game,
     measure_budget,
     measure_crossover,
     measure_devices,
@@ -21,7 +21,7 @@ from taichi_soft.profiling import (
     measure_moments,
     scaling,
 )
-from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.spread import Spread
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
@@ -68,8 +68,8 @@ def test_the_crossover_times_both_schedules():
 
 
 def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
-    monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
-    monkeypatch.setattr(game, "SETTLING", 3)
+    monkeypatch.setattr(feature_costs, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
+    monkeypatch.setattr(feature_costs, "SETTLING", 3)
     heaps = measure_heaps(1, 3)
     assert [(heap.bodies, heap.tets) for heap in heaps] == [(32, 32 * 968), (32, 32 * 5)]
     for heap in heaps:
@@ -82,7 +82,7 @@ def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
 
 
 def test_a_frame_with_a_spawn_is_timed_against_the_others(monkeypatch):
-    monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
+    monkeypatch.setattr(feature_costs, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
     snapshot, come, go, plain = measure_moments(5)
     assert "5,000 tetrahedra" in snapshot.name
     assert plain.cost.median == pytest.approx(1.0)

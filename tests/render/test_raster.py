@@ -5,8 +5,8 @@ import pytest
 
 from taichi_soft import init
 from taichi_soft.render import Camera
+from taichi_soft.render.frame_arrays import SceneArrays
 from taichi_soft.render.raster import ROTATED_GRID, Raster
-from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.texture import SceneTextures
 
 WIDTH, HEIGHT = 200, 140

@@ -128,7 +128,7 @@ def fallen(schedule):
 
 
 def torn():
-    """Bodies so torn that their steps fail, are made again, and have tetrahedra to bring back."""
+    """Bodies so torn that their steps fail and are retried, and that have inverted tetrahedra to restore."""
     world = bare_world()
     for i in range(3):
         mesh = CUBE if i % 2 else sphere(0.5, 3)

@@ -1,4 +1,4 @@
-"""Steps that are too coarse: made again, finer, in every world; and how many substeps a world may take."""
+"""Steps that are too coarse are retried with smaller substeps in every world; the limit of substeps."""
 
 import warnings
 
@@ -128,7 +128,7 @@ def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
     world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e9), law="springs", position=(0, 0, 3))
     world.build()
     world.step(1 / 60)
-    with pytest.raises(OptionError, match="substeps is 3; the world takes max_substeps=2"):
+    with pytest.raises(OptionError, match="substeps is 3; the world allows max_substeps=2"):
         world.step(1 / 60, 3)
 
 

@@ -169,7 +169,7 @@ def test_no_mode_stands_still_whenever_it_would_be_damped():
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 def test_damping_however_large_leaves_momentum_and_spin_and_gives_no_energy_by_the_same_substeps(schedule):
-    """Nothing is made again here: a substep that damping makes unstable would show."""
+    """Nothing is retried here: a substep that damping makes unstable would show."""
     mesh = sphere(0.5, 2)
     found = {}
     for ratio in (0.0, 0.3, 1.0, 1000.0):

@@ -59,12 +59,12 @@ def connected(slots, pairs):
 
 def listed(world):
     """The islands as the step finds them. Checks that each body knows its own."""
-    contact = world._built.state.contact
-    count = contact.island_count[None]
-    first, rows = contact.island_first.to_numpy()[: count + 1], contact.island_body.to_numpy()
+    fields = world._built.state.islands
+    count = fields.count[None]
+    first, rows = fields.first.to_numpy()[: count + 1], fields.body.to_numpy()
     assert first[0] == 0
     islands = [rows[start:end].tolist() for start, end in pairwise(first)]
-    number = contact.body_island.to_numpy()
+    number = fields.of_body.to_numpy()
     for island, bodies in enumerate(islands):
         assert (number[bodies] == island).all()
     return islands
@@ -98,8 +98,8 @@ def test_islands_of_bodies_that_touch_are_their_connected_sets(touching, seed):
         shift = rng.uniform(-1.0, 1.0, 3) * (2, 1, 0.2)
         body.set_motion(CUBE.vertices + shift, np.zeros_like(CUBE.vertices))
     find(world._built.state, COUNT + EMPTY, DT)
-    contact, slots = world._built.state.contact, [body.index for body in world.bodies]
-    lower, upper = contact.body_lower.to_numpy(), contact.body_upper.to_numpy()
+    state, slots = world._built.state, [body.index for body in world.bodies]
+    lower, upper = state.body_bounds_lower.to_numpy(), state.body_bounds_upper.to_numpy()
     near = [
         (a, b)
         for a in slots

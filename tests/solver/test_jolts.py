@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lab.drop_test.robustness.cell_run import run_cell
 from lab.drop_test.robustness.cells import choose_cells
 from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
-from lab.drop_test.robustness.trial import run_cell
 from taichi_soft import Material
 from taichi_soft.world.bare import bare_world
 

@@ -24,7 +24,7 @@ OPTIONS = {
 
 
 def fallen(options):
-    """A heap, and a cube so torn that its steps fail and are made again."""
+    """A heap, and a cube so torn that its steps fail and are retried."""
     world = bare_world(**options)
     for i in range(3):
         world.add_body(CUBE if i % 2 else BALL, MATERIAL, position=(0.1 * i, 0.05 * i, 0.5 + 0.6 * i))
@@ -41,7 +41,7 @@ def fallen(options):
 @pytest.mark.parametrize("stretch", [1, 3000])
 def test_a_step_in_pieces_is_the_step_bit_for_bit(name, stretch, monkeypatch):
     whole = fallen(OPTIONS[name]).state_hash()
-    monkeypatch.setattr(schedules, "STRETCH", stretch)
+    monkeypatch.setattr(schedules, "MAX_CALL_WORK", stretch)
     assert fallen(OPTIONS[name]).state_hash() == whole
 
 
@@ -84,7 +84,7 @@ def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
 @pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="which hears Ctrl-C")
 def test_ctrl_c_lets_a_short_step_end(monkeypatch):
     """The world is then as after a step that nobody ended."""
-    monkeypatch.setattr(schedules, "STRETCH", 10**9)
+    monkeypatch.setattr(schedules, "MAX_CALL_WORK", 10**9)
 
     def stepped():
         world = bare_world()

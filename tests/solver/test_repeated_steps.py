@@ -1,4 +1,4 @@
-"""Impacts faster than sound: a step that breaks is made again with finer substeps."""
+"""Impacts faster than sound: a step that fails is retried with smaller substeps."""
 
 import numpy as np
 import pytest

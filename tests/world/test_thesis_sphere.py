@@ -104,7 +104,7 @@ def test_one_that_is_too_stiff_is_warned_about_then_frozen(thesis_mesh, young):
     assert failure.time == pytest.approx(failure.step * DT)
     assert 0 <= failure.substep < SUBSTEPS
     assert 0 <= failure.tetrahedron < len(thesis_mesh.tets)
-    assert f"in step {failure.step}: put back to t = {failure.time:.4g} s" in report
+    assert f"in step {failure.step}: restored to t = {failure.time:.4g} s" in report
     assert f"step {failure.step}" in report
 
     frozen = body.positions()

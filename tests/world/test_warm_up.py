@@ -91,7 +91,7 @@ def test_nothing_is_compiled_where_what_yields_tears(compiled):
         world.step(DT, SUBSTEPS)
     assert compiled == []
     assert lost.failure is not None
-    assert compiled == ["find_broken_element"]
+    assert compiled == ["find_failed_element"]
 
 
 def test_nothing_is_compiled_while_the_game_is_filled(game):

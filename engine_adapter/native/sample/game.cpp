@@ -38,8 +38,8 @@ int main(int count, char** arguments) {
       for (const ts_event& each : events) touches += each.collider == lift;  // a sound, as loud as each.impulse
       if (i % 50 != 0) continue;
       const auto [impulse, moment] = world.collider_impulse(lift);
-      std::printf("%.2f s: %zu balls of %zu triangles, the first at %.3f m; the lift feels %.1f N, touched %d times\n",
-                  clock.time, balls.size(), index_buffer.size() / 3, world.center(balls[0])[2],
+      std::printf("%.2f s: %zu ball%s of %zu triangles, the first at %.3f m; the lift feels %.1f N, touched %d times\n",
+                  clock.time, balls.size(), balls.size() == 1 ? "" : "s", index_buffer.size() / 3, world.center(balls[0])[2],
                   impulse[2] * -60.0 + 0.0, touches);
     }
     std::printf("state %016llx\n", static_cast<unsigned long long>(world.hash()));

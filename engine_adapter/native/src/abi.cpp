@@ -305,14 +305,14 @@ void write_overlaps(const Turn& world, const std::vector<int32_t>& slots, ts_bod
 
 const Asset& asset_in(const Scene& scene, int32_t asset) {
   if (asset < 0 || size_t(asset) >= scene.assets.size()) {
-    fail(TS_ERROR_ARGUMENT, "there is no asset %d: there are %zu, from 0", asset, scene.assets.size());
+    fail(TS_ERROR_ARGUMENT, "asset %d does not exist (%zu in all, numbered from 0)", asset, scene.assets.size());
   }
   return scene.assets[size_t(asset)];
 }
 
 const Mesh& mesh_of(const Scene& scene, int32_t mesh) {
   if (mesh < 0 || size_t(mesh) >= scene.meshes.size()) {
-    fail(TS_ERROR_ARGUMENT, "there is no mesh %d: there are %zu, from 0", mesh, scene.meshes.size());
+    fail(TS_ERROR_ARGUMENT, "mesh %d does not exist (%zu in all, numbered from 0)", mesh, scene.meshes.size());
   }
   return scene.meshes[size_t(mesh)];
 }
@@ -376,7 +376,7 @@ ts_result ts_scene_get_name(ts_scene scene, int32_t kind, int32_t number, char* 
     given(name, "name");
     const auto& names = found->names(kind);
     if (number < 0 || size_t(number) >= names.size())
-      fail(TS_ERROR_ARGUMENT, "there is no %d: there are %zu", number, names.size());
+      fail(TS_ERROR_ARGUMENT, "number %d does not exist (%zu in all, numbered from 0)", number, names.size());
     const std::string& text = names[size_t(number)];
     if (capacity < text.size() + 1)
       fail(TS_ERROR_SIZE, "name has room for %zu bytes: give %zu", capacity, text.size() + 1);

@@ -5,13 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "constants.hpp"
 #include "archive.hpp"
 #include "rotations.hpp"
 
 namespace taichi_soft {
 
-// Kinds of shapes with a grid, after TS_PLANE to TS_CAPSULE, as in taichi_soft/contact/distances/kinds.py.
-enum { kHeightField = 4, kMeshShape = 5 };
 
 struct Pose {
   Vector position;
@@ -30,7 +29,7 @@ struct Collider {
   Pose target;   // at the end of the next step
   Box bounds;    // in its own frame
   double skin;   // thickness, plus the margin for edges
-  int32_t kind;  // as in taichi_soft/contact/distances/kinds.py
+  int32_t kind;  // as in taichi_soft/contact/distances/shape_kind.py
   float parameters[8];
   double friction, restitution;  // a restitution of -1 uses that of the bodies
   int32_t group, mask;

@@ -8,8 +8,6 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr int32_t kActive = 0, kAsleep = 2;  // as in taichi_soft/bodies/status.py
-
 bool are_there(const Contact& contact, const Present& present) {
   const size_t other = size_t(contact.other);
   return present.bodies[size_t(contact.slot)] == contact.a &&

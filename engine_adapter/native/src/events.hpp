@@ -7,14 +7,13 @@
 #include <map>
 #include <vector>
 
+#include "constants.hpp"
 #include "archive.hpp"
 #include "taichi_soft.h"
 
 namespace taichi_soft {
 
 using Pair = std::array<int32_t, 3>;  // a slot, the kind of the other object, and its slot or number
-enum { kOfCollider = 0, kOfBody = 1 };
-constexpr size_t kPairRows = 32;  // largest number of touching pairs per body, as in taichi_soft/contact/fields.py
 
 struct Contact {    // current contact
   ts_body a, b;     // b is 0 for a collider

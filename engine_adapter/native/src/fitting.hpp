@@ -1,4 +1,4 @@
-// Best-fitting rotation of a shape: the same as taichi_soft/levels/fitting.py, and equal to taichi_soft/bodies/pose.py
+// Best-fitting rotation of a shape: the same as taichi_soft/levels/rigid_fit.py, and equal to taichi_soft/bodies/pose.py
 // in the precision of a 32-bit float.
 #pragma once
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "error.hpp"
+#include "fields.hpp"
 
 namespace taichi_soft {
 
@@ -146,7 +147,7 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   read_assets();
   read_meshes();
   // Snapshots stay valid if the same scene is exported again.
-  for (const char* name : {"fields/carried", "fields/places"}) {
+  for (const char* name : {"fields/kept", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
   }
@@ -164,14 +165,21 @@ void Scene::read_fields() {
   const size_t image = archive.get<unsigned char>("fields/image").count;
   if (rows.count != 5 * field_names_.size()) invalid_file("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
-  const auto kept = archive.rows<int64_t>("fields/carried", 8);
-  for (size_t i = 0; i + 8 <= kept.count; i += 8) {
-    const Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), int(kept[i + 6]), kept[i + 7] != 0};
-    if (kept[i + 5] < 0 || each.whose < Carried::kAlways || each.whose > Carried::kOfMotors ||
-        each.count > each.place.count) {
+  std::map<size_t, const Bound*> bounds;  // by where their field lies
+  for (const Bound& each : kBounds) {
+    const auto name = std::find(field_names_.begin(), field_names_.end(), each.field);
+    if (name != field_names_.end()) bounds[places_[size_t(name - field_names_.begin())].offset] = &each;
+  }
+  const auto rows_kept = archive.rows<int64_t>("fields/kept", 7);
+  for (size_t i = 0; i + 7 <= rows_kept.count; i += 7) {
+    const int64_t* row = rows_kept.data + i;
+    KeptField each = {place_from(row, image), size_t(row[5]), int(row[6]), nullptr};
+    if (row[5] < 0 || each.whose < KeptField::kAlways || each.whose > KeptField::kOfMotors || each.count > each.place.count) {
       invalid_file("the fields of snapshots");
     }
-    carried.push_back(each);
+    const auto bound = bounds.find(each.place.offset);
+    if (bound != bounds.end()) each.bound = bound->second;
+    kept.push_back(each);
   }
 }
 

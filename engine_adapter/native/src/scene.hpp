@@ -8,6 +8,7 @@
 
 #include "archive.hpp"
 #include "axes.hpp"
+#include "constants.hpp"
 #include "kernels.hpp"
 
 namespace taichi_soft {
@@ -18,15 +19,15 @@ struct Place {
   bool is_whole;
 };
 
-struct Carried {  // a field in snapshots, and the number of its elements there
+struct Bound;
+
+struct KeptField {  // a field in snapshots, and the number of its elements there
   enum { kAlways, kOfJoints, kOfMotors };
   Place place;
-  size_t count;    // per row of joints or motors, for their fields
+  size_t count;  // per row of joints or motors, for their fields
   int whose;
-  bool is_finite;  // must be finite, because it moves bodies
+  const Bound* bound;  // of its numbers, or null
 };
-
-constexpr size_t kLanes = 8;  // as in taichi_soft/core/constants.py
 
 struct SlotRows {  // data that kernels write into a slot: see `body_rows` in taichi_soft/fracture/cutting.py
   Archive::View<float> rest, rest_inverses, edge_damping, kind, weights;
@@ -108,7 +109,7 @@ class Scene {
   bool has_levels = false, has_hulls = false;  // true if any asset has levels of detail, or a hull
   std::vector<std::string> constant_names;  // fields with constants of tetrahedra
   std::vector<Mesh> meshes;
-  std::vector<Carried> carried;
+  std::vector<KeptField> kept;
   uint32_t code = 0;  // identifies compatible snapshots
 
  private:

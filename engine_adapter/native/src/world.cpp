@@ -14,9 +14,6 @@ constexpr double kRoundOff = 1e-9;  // [steps], as in engine_adapter/fixed_step.
 constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
-const char* const kMotorFields[] = {"body", "first", "end", "turns", "is_fixed", "has_point"};
-const char* const kColliderFields[] = {"position", "rotation", "velocity", "spin", "lower", "upper", "speed"};
-
 }  // namespace
 
 World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(std::make_unique<Machine>(*scene_)) {
@@ -56,70 +53,11 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
 }
 
 void World::bind() {
-  char* root = machine_->root();
-  const Scene& s = *scene_;
-  const size_t bodies = size_t(s.slot_count), particles = size_t(s.particle_count);
-  body_status_ = {root, s.place("body_status", bodies, 1)};
-  body_drives_ = {root, s.place("body_drives", bodies, 1)};
-  particle_aim_ = {root, s.place("particle_aim", particles, 1)};
-  is_awake_ = {root, s.place("progress.is_awake", bodies, 1)};
-  failed_ = {root, s.place("progress.failed", bodies, 1)};
-  is_driven_ = {root, s.place("motors.is_driven", bodies, 1)};
-  position_ = {root, s.place("particle_position", particles, 3)};
-  velocity_ = {root, s.place("particle_velocity", particles, 3)};
-  mass_ = {root, s.place("particle_mass", particles, 1)};
-  inv_mass_ = {root, s.place("particle_inv_mass", particles, 1)};
-  lag_ = {root, s.place("body_velocity_lag", bodies, 1)};
-  gravity_scale_ = {root, s.place("body_gravity_scale", bodies, 1)};
-  damping_ = {root, s.place("body_damping", bodies, 1)};
-  wind_ = {root, s.place("wind", 1, 4)};
-  gravity_ = {root, s.place("gravity", 1, 3)};
-  floor_ = {root, s.place("floor", 1, 3)};
-  target_ = {root, s.place("particle_target", particles, 3)};
-  reaction_ = {root, s.place("particle_reaction", particles, 3)};
-  if (s.is_implicit) particle_contact_ = {root, s.place("particle_contact", particles, 1)};
-  grab_body_ = {root, s.place("grabs.body", kMostGrabs, 1)};
-  grab_corners_ = {root, s.place("grabs.corners", kMostGrabs, kGrabCorners)};
-  grab_weights_ = {root, s.place("grabs.weights", kMostGrabs, kGrabCorners)};
-  grab_target_ = {root, s.place("grabs.target", kMostGrabs, 3)};
-  grab_spring_ = {root, s.place("grabs.spring", kMostGrabs, 3)};
-  grab_limits_ = {root, s.place("grabs.limits", kMostGrabs, 3)};
-  grab_force_ = {root, s.place("grabs.force", kMostGrabs, 3)};
-  grab_count_ = {root, s.place("grabs.count", kMostGrabs, 1)};
-  grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
-  grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
-  for (size_t i = 0; i < 6; ++i) {
-    motor_wholes_[i] = {root, s.place(std::string("motors.motor.") + kMotorFields[i], kMostMotors)};
-  }
-  motor_axis_ = {root, s.place("motors.motor.axis", kMostMotors, 3)};
-  motor_point_ = {root, s.place("motors.motor.point", kMostMotors, 3)};
-  motor_speed_ = {root, s.place("motors.motor.speed", kMostMotors)};
-  motor_limit_ = {root, s.place("motors.motor.limit", kMostMotors)};
-  motor_impulse_ = {root, s.place("motors.impulse", kMostMotors)};
-  motor_particle_ = {root, s.place("motors.particle", kMotorRows)};
-  if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
-  if (s.has_soft_contact) {
-    records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
-    body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
-  }
-  joint_bodies_ = {root, s.place("joints.bodies", kMostJoints, 2)};
-  joint_span_ = {root, s.place("joints.rows", kMostJoints, 2)};
-  joint_impulse_ = {root, s.place("joints.impulse", kMostJoints, 3)};
-  island_count_ = {root, s.place("contact.island_count", 1, 1)};
-  const size_t rows = colliders_.rows.size();
-  const Place kind = s.place("contact.collider_kind", rows, 1);
-  collider_kind_ = {root, kind};
-  collider_room_ = kind.count;
-  for (int i = 0; i < 7; ++i) {
-    const size_t width = i == 1 ? 4 : i == 6 ? 1 : 3;
-    collider_[i] = {root, s.place(std::string("contact.collider_") + kColliderFields[i], collider_room_, width)};
-  }
-  collider_parameters_ = {root, s.place("contact.collider_parameters", collider_room_, 8)};
-  collider_surface_ = {root, s.place("contact.collider_surface", collider_room_, 3)};
-  collider_filter_ = {root, s.place("contact.collider_filter", collider_room_, 2)};
-  collider_count_ = {root, s.place("contact.collider_count", 1, 1)};
+  collider_room_ = scene_->place("colliders.kind", colliders_.rows.size()).count;
+  fields_ = Fields(machine_->root(), *scene_, collider_room_);
+  if (scene_->patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
   // The kernel that reads contacts does not check the number of rows.
-  if (events_.touch_rows < bodies * (collider_room_ + (s.has_soft_contact ? kPairRows : 0))) {
+  if (events_.touch_rows < size_t(scene_->slot_count) * (collider_room_ + (scene_->has_soft_contact ? kPairRows : 0))) {
     fail(TS_ERROR_FILE, "the world file is invalid: events. Export it again");
   }
 }
@@ -166,7 +104,7 @@ bool World::aim_pins(double dt) {
                                   Machine::array(machine_->frames, frames, 12)});
   has_work_ = false;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    has_work_ = has_work_ || (body_drives_(slot) & kMovesPins) != 0;
+    has_work_ = has_work_ || (fields_.body_drives(slot) & kMovesPins) != 0;
   }
   return has_work_;
 }
@@ -176,14 +114,14 @@ bool World::prepare_colliders(double dt) {
   for (size_t c = 0; c < motion_.size(); ++c) {
     const ColliderMotion& m = motion_[c];
     for (int k = 0; k < 3; ++k) {
-      collider_[0](c, k) = m.position[k];
-      collider_[2](c, k) = m.velocity[k];
-      collider_[3](c, k) = m.spin[k];
-      collider_[4](c, k) = m.lower[k];
-      collider_[5](c, k) = m.upper[k];
+      fields_.colliders.position(c, k) = m.position[k];
+      fields_.colliders.velocity(c, k) = m.velocity[k];
+      fields_.colliders.spin(c, k) = m.spin[k];
+      fields_.colliders.lower(c, k) = m.lower[k];
+      fields_.colliders.upper(c, k) = m.upper[k];
     }
-    for (int k = 0; k < 4; ++k) collider_[1](c, k) = m.rotation[k];
-    collider_[6](c) = m.speed;
+    for (int k = 0; k < 4; ++k) fields_.colliders.rotation(c, k) = m.rotation[k];
+    fields_.colliders.speed(c) = m.speed;
   }
   return true;
 }
@@ -200,11 +138,11 @@ void World::step(double dt, int32_t substeps) {
     std::vector<int32_t> others;
     const int32_t watched = (events_.kinds() & TS_FROZE) != 0 ? scene_->slot_count : 0;
     for (int32_t slot = 0; slot < watched; ++slot) {
-      if (body_status_(slot) != kFrozen) others.push_back(slot);
+      if (fields_.body_status(slot) != kFrozen) others.push_back(slot);
     }
     launch_step(count, dt / count);
     for (int32_t slot : others) {
-      if (body_status_(slot) == kFrozen) frozen.push_back(slot);
+      if (fields_.body_status(slot) == kFrozen) frozen.push_back(slot);
     }
   }
   colliders_.finish(dt);
@@ -228,7 +166,7 @@ void World::launch_step(int32_t substeps, double h) {
   machine_->launch("step", {Machine::whole(bodies), Machine::whole(helpers), Machine::whole(substeps), Machine::real(h),
                             Machine::whole(kAll), Machine::whole(0)});
   int32_t busy = 0;
-  for (int32_t island = 0; island < island_count_(0); ++island) busy += failed_(island) + is_awake_(island);
+  for (int32_t island = 0; island < fields_.islands.count(0); ++island) busy += fields_.progress.failed(island) + fields_.progress.is_awake(island);
   is_still_ = busy == 0;
 }
 

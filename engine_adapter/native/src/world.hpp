@@ -7,6 +7,7 @@
 
 #include "colliders.hpp"
 #include "events.hpp"
+#include "fields.hpp"
 #include "locks.hpp"
 #include "machine.hpp"
 #include "passage.hpp"
@@ -15,34 +16,9 @@
 
 namespace taichi_soft {
 
-// The same as in taichi_soft/bodies/status.py.
-enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
-enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32 };
-enum Aims { kStill = 0, kWithFrame = 3 };  // as in taichi_soft/control/kernels/pins.py
-
-// The same as in taichi_soft/control/kernels/grabs.py; fields of other sizes are refused.
-constexpr size_t kMostGrabs = 16, kPatchRows = 128, kGrabCorners = 4;
-
-// The same as in taichi_soft/control/kernels/joints.py and motors.py.
-constexpr size_t kMostJoints = 64, kJointRows = 2048, kJointEnds = 5;
-constexpr size_t kMostMotors = 64, kMotorRows = 16384;
-
 constexpr size_t kMostFrames = 100000;
 
 inline float as_float(double number) { return static_cast<float>(number); }
-
-// Numbers of a field in memory.
-template <typename Number>
-class Field {
- public:
-  Field() = default;
-  Field(char* root, const Place& place) : first_(root + place.offset), stride_(place.stride) {}
-  Number& operator()(size_t i, size_t k = 0) const { return reinterpret_cast<Number*>(first_ + i * stride_)[k]; }
-
- private:
-  char* first_ = nullptr;
-  size_t stride_ = 0;
-};
 
 struct Vertices {  // a list of a body's vertices; an empty list means all
   const int32_t* numbers;
@@ -111,7 +87,7 @@ class World {
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
   // The level of detail that fills a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
-  int32_t status_of(int32_t slot) const { return body_status_(slot); }
+  int32_t status_of(int32_t slot) const { return fields_.body_status(slot); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
   void despawn(int32_t slot);
   void read_positions(int32_t slot, double alpha, float* rows);
@@ -206,7 +182,7 @@ class World {
   };
   struct MotorRow {
     size_t number;
-    int32_t slot, kind[3];  // turns, is_fixed, has_point
+    int32_t slot, turns, is_fixed, has_point;
     float axis[3], point[3], speed, limit;
     std::vector<int32_t> particles;
   };
@@ -327,21 +303,9 @@ class World {
   bool is_still_ = false;  // all bodies slept after the last step, and nothing has changed since
   double rows_at_ = -1.0;  // alpha of the cached positions; below 0 if they are outdated
 
-  Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
-  Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
-  Field<float> gravity_, floor_, body_surface_;
-  Field<int32_t> particle_contact_, records_touches_;
-  Field<int32_t> grab_body_, grab_corners_, grab_count_, grab_particle_;
-  Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;
-  Field<int32_t> joint_bodies_, joint_span_;
-  Field<float> joint_impulse_;
-  Field<int32_t> motor_wholes_[6], motor_particle_;  // body, first, end, turns, is_fixed, has_point
-  Field<float> motor_axis_, motor_point_, motor_speed_, motor_limit_, motor_impulse_;
-  Field<float> collider_[7], collider_parameters_, collider_surface_;
-  Field<int32_t> collider_kind_, collider_filter_, collider_count_;
+  Fields fields_;
   size_t collider_room_ = 0;
   std::vector<Field<float>> constants_;  // constants of tetrahedra, if any asset has levels
-  Field<int32_t> body_blocks_;
 };
 
 }  // namespace taichi_soft

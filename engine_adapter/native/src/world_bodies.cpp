@@ -14,9 +14,9 @@ constexpr ts_body kBody = uint64_t(3) << 56;  // prefix of body handles
 
 ts_body World::body_in(int32_t slot) const {
   if (slot < 0 || slot >= scene_->slot_count) {
-    fail(TS_ERROR_ARGUMENT, "slot is %d: there are %d, from 0", slot, scene_->slot_count);
+    fail(TS_ERROR_ARGUMENT, "slot %d does not exist (%d in all, numbered from 0)", slot, scene_->slot_count);
   }
-  return body_status_(slot) == kAbsent ? 0 : kBody | ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
+  return fields_.body_status(slot) == kAbsent ? 0 : kBody | ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
 }
 
 int32_t World::slot_of(ts_body body) const {
@@ -94,10 +94,10 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
 ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift,
                      const Vector& spin) {
   if (asset < 0 || size_t(asset) >= scene_->assets.size()) {
-    fail(TS_ERROR_ARGUMENT, "asset is %d: there are %zu, from 0", asset, scene_->assets.size());
+    fail(TS_ERROR_ARGUMENT, "asset %d does not exist (%zu in all, numbered from 0)", asset, scene_->assets.size());
   }
   int32_t slot = 0;
-  while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || body_status_(slot) != kAbsent)) ++slot;
+  while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || fields_.body_status(slot) != kAbsent)) ++slot;
   if (slot == scene_->slot_count) {
     fail(TS_ERROR_STATE, "all %d bodies of asset %d are in use: reserve more before exporting, or despawn one",
          scene_->assets[asset].slot_count, asset);
@@ -118,20 +118,20 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
 
 void World::despawn(int32_t slot) {
   for (size_t j = 0; j < kMostJoints; ++j) {
-    if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
+    if (fields_.joints.bodies(j, 0) == slot + 1 || fields_.joints.bodies(j, 1) == slot + 1) end_joint(j);
   }
   for (size_t m = 0; m < kMostMotors; ++m) {
-    if (motor_wholes_[0](m) == slot + 1) end_motor(m);
+    if (fields_.motors.motor.body(m) == slot + 1) end_motor(m);
   }
   for (size_t g = 0; g < kMostGrabs; ++g) {
-    if (grab_body_(g) == slot + 1) end_grab(g);
+    if (fields_.grabs.body(g) == slot + 1) end_grab(g);
   }
   give_friction(slot, asset_of(slot).friction);
   wake_near(box_of(slot));
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
-  body_drives_(slot) &= ~kMovesPins;  // otherwise attached vertices would keep their targets
+  fields_.body_drives(slot) &= ~kMovesPins;  // otherwise attached vertices would keep their targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 
@@ -140,7 +140,7 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
   const size_t n = asset_of(slot).vertex_count();
   if (alpha == 1.0) {
     for (size_t v = 0; v < n; ++v) {
-      for (int k = 0; k < 3; ++k) rows[3 * v + k] = position_(particle(slot, v), k);
+      for (int k = 0; k < 3; ++k) rows[3 * v + k] = fields_.particle_position(particle(slot, v), k);
     }
   } else {
     const uint32_t count = uint32_t(scene_->particle_count);
@@ -186,7 +186,7 @@ Vector World::center_of(int32_t slot) const {
   double mass = 0.0;
   for (size_t v = 0; v < asset.vertex_count(); ++v) {
     mass += asset.masses[v];
-    for (int k = 0; k < 3; ++k) moment[k] += asset.masses[v] * position_(particle(slot, v), k);
+    for (int k = 0; k < 3; ++k) moment[k] += asset.masses[v] * fields_.particle_position(particle(slot, v), k);
   }
   for (double& each : moment) each /= mass;
   return moment;
@@ -202,7 +202,8 @@ std::vector<int32_t> World::checked(int32_t slot, Vertices which, bool may_be_al
   }
   found.assign(which.numbers, which.numbers + which.count);
   for (int32_t vertex : found) {
-    if (vertex < 0 || size_t(vertex) >= n) fail(TS_ERROR_ARGUMENT, "there is no vertex %d: there are %zu", vertex, n);
+    if (vertex < 0 || size_t(vertex) >= n)
+      fail(TS_ERROR_ARGUMENT, "vertex %d does not exist (%zu in all, numbered from 0)", vertex, n);
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
@@ -216,7 +217,7 @@ void World::give_rows(int32_t slot, const std::vector<int32_t>& vertices) {
 
 void World::require_unattached(int32_t slot, const std::vector<int32_t>& vertices) const {
   for (int32_t vertex : vertices) {
-    if (particle_aim_(particle(slot, size_t(vertex))) >= kWithFrame) {
+    if (fields_.particle_aim(particle(slot, size_t(vertex))) >= kWithFrame) {
       fail(TS_ERROR_STATE, "vertex %d of the body in slot %d is attached to a frame", vertex, slot);
     }
   }
@@ -323,19 +324,19 @@ void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point,
 
 void World::set_gravity_scale(int32_t slot, double scale) {
   if (!(std::fabs(scale) <= 1e3)) fail(TS_ERROR_ARGUMENT, "scale is %g: give -1000 to 1000", scale);
-  gravity_scale_(slot) = as_float(scale);
+  fields_.body_gravity_scale(slot) = as_float(scale);
   mark_modified(slot);
 }
 
 void World::set_damping(int32_t slot, double rate) {
   if (!(rate >= 0.0 && rate <= 1e6)) fail(TS_ERROR_ARGUMENT, "rate is %g: give 0 to 1e6 per second", rate);
-  damping_(slot) = as_float(rate);
-  body_drives_(slot) = (body_drives_(slot) & ~kDamped) | (as_float(rate) > 0.0f ? kDamped : 0);
+  fields_.body_damping(slot) = as_float(rate);
+  fields_.body_drives(slot) = (fields_.body_drives(slot) & ~kDamped) | (as_float(rate) > 0.0f ? kDamped : 0);
   mark_modified(slot);
 }
 
 void World::set_sheltered(int32_t slot, bool is_sheltered) {
-  body_drives_(slot) = (body_drives_(slot) & ~kSheltered) | (is_sheltered ? kSheltered : 0);
+  fields_.body_drives(slot) = (fields_.body_drives(slot) & ~kSheltered) | (is_sheltered ? kSheltered : 0);
   mark_modified(slot);
 }
 
@@ -353,7 +354,7 @@ void World::unpin(int32_t slot, Vertices which) {
   if (which.count == 0) {
     const auto stays = [&](int32_t v) {
       const size_t p = particle(slot, size_t(v));
-      return inv_mass_(p) != 0.0f || particle_aim_(p) >= kWithFrame;
+      return fields_.particle_inv_mass(p) != 0.0f || fields_.particle_aim(p) >= kWithFrame;
     };
     vertices.erase(std::remove_if(vertices.begin(), vertices.end(), stays), vertices.end());
     if (vertices.empty()) return mark_modified(slot);
@@ -405,9 +406,9 @@ void World::set_wind(const Vector& velocity, double density, double drag) {
   const float given[4] = {as_float(velocity[0]), as_float(velocity[1]), as_float(velocity[2]),
                           as_float(density * drag)};
   bool differs = false;
-  for (int k = 0; k < 4; ++k) differs = differs || given[k] != wind_(0, k);
+  for (int k = 0; k < 4; ++k) differs = differs || given[k] != fields_.wind(0, k);
   if (!differs) return;
-  for (int k = 0; k < 4; ++k) wind_(0, k) = given[k];
+  for (int k = 0; k < 4; ++k) fields_.wind(0, k) = given[k];
   mark_modified(-1);
 }
 

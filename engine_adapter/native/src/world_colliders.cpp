@@ -5,7 +5,7 @@ namespace taichi_soft {
 
 Collider& World::collider(int32_t number) {
   if (number < 0 || size_t(number) >= colliders_.rows.size() || !colliders_.rows[size_t(number)].is_alive) {
-    fail(TS_ERROR_ARGUMENT, "there is no collider %d: there are %zu, from 0", number, colliders_.rows.size());
+    fail(TS_ERROR_ARGUMENT, "collider %d does not exist (%zu in all, numbered from 0)", number, colliders_.rows.size());
   }
   return colliders_.rows[size_t(number)];
 }
@@ -38,16 +38,16 @@ void World::remove_collider(int32_t number) {
 }
 
 void World::write_colliders() {
-  collider_count_(0) = int32_t(colliders_.rows.size());
+  fields_.colliders.count(0) = int32_t(colliders_.rows.size());
   for (size_t c = 0; c < colliders_.rows.size(); ++c) {
     const Collider& row = colliders_.rows[c];
-    collider_kind_(c) = row.is_alive ? row.kind : -1;
-    for (int k = 0; k < 8; ++k) collider_parameters_(c, k) = row.parameters[k];
-    collider_surface_(c, 0) = as_float(row.friction);
-    collider_surface_(c, 1) = as_float(row.restitution);
-    collider_surface_(c, 2) = as_float(row.skin);
-    collider_filter_(c, 0) = row.group;
-    collider_filter_(c, 1) = row.mask;
+    fields_.colliders.kind(c) = row.is_alive ? row.kind : -1;
+    for (int k = 0; k < 8; ++k) fields_.colliders.parameters(c, k) = row.parameters[k];
+    fields_.colliders.surface(c, 0) = as_float(row.friction);
+    fields_.colliders.surface(c, 1) = as_float(row.restitution);
+    fields_.colliders.surface(c, 2) = as_float(row.skin);
+    fields_.colliders.filter(c, 0) = row.group;
+    fields_.colliders.filter(c, 1) = row.mask;
   }
 }
 

@@ -38,7 +38,7 @@ void World::record_events(int32_t kinds) {
     fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_FROZE", kinds);
   }
   if (Events::looks_for(kinds)) look();
-  if (scene_->has_soft_contact) records_touches_(0) = (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED)) != 0 ? 1 : 0;
+  if (scene_->has_soft_contact) fields_.soft.records_touches(0) = (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED)) != 0 ? 1 : 0;
   events_.record(kinds, present());
 }
 

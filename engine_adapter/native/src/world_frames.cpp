@@ -42,7 +42,7 @@ int32_t World::add_frame(const Pose& pose) {
 void World::remove_frame(int32_t number) {
   const size_t row = frame(number);
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    if (body_status_(slot) != kAbsent) detach_vertices(slot, attached_vertices(slot, number));
+    if (fields_.body_status(slot) != kAbsent) detach_vertices(slot, attached_vertices(slot, number));
   }
   frame_alive_[row] = 0;
 }
@@ -60,7 +60,7 @@ Pose World::frame_pose(int32_t number) const {
 std::vector<int32_t> World::attached_vertices(int32_t slot, int32_t number) const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {
-    const int32_t aim = particle_aim_(particle(slot, v)) - kWithFrame;
+    const int32_t aim = fields_.particle_aim(particle(slot, v)) - kWithFrame;
     if (number < 0 ? aim >= 0 : aim == number) found.push_back(int32_t(v));
   }
   return found;
@@ -75,19 +75,19 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
     double offset[3];
-    for (int k = 0; k < 3; ++k) offset[k] = double(position_(p, k)) - double(row[9 + k]);
+    for (int k = 0; k < 3; ++k) offset[k] = double(fields_.particle_position(p, k)) - double(row[9 + k]);
     for (int k = 0; k < 3; ++k) {
-      target_(p, k) =
+      fields_.particle_target(p, k) =
           as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
-      reaction_(p, k) = 0.0f;
+      fields_.particle_reaction(p, k) = 0.0f;
     }
-    inv_mass_(p) = 0.0f;
-    particle_aim_(p) = kWithFrame + number;
+    fields_.particle_inv_mass(p) = 0.0f;
+    fields_.particle_aim(p) = kWithFrame + number;
     feels_[p] = feels ? 1 : 0;
     attachments_[p] = attachment;
-    if (scene_->is_implicit) particle_contact_(p) = 0;
+    if (scene_->is_implicit) fields_.particle_contact(p) = 0;
   }
-  body_drives_(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
+  fields_.body_drives(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
   mark_modified(slot);
   has_work_ = true;
 }
@@ -108,12 +108,12 @@ void World::detach_vertices(int32_t slot, const std::vector<int32_t>& vertices) 
   if (vertices.empty()) return;
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
-    inv_mass_(p) = 1.0f / mass_(p);
-    particle_aim_(p) = kStill;
+    fields_.particle_inv_mass(p) = 1.0f / fields_.particle_mass(p);
+    fields_.particle_aim(p) = kStill;
     feels_[p] = 0;
     attachments_[p] = 0;
   }
-  if (!is_felt(slot, attached_vertices(slot, -1))) body_drives_(slot) &= ~kFeelsReaction;
+  if (!is_felt(slot, attached_vertices(slot, -1))) fields_.body_drives(slot) &= ~kFeelsReaction;
   mark_modified(slot);
 }
 
@@ -133,7 +133,7 @@ void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) co
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
     Vector part, arm;
-    for (int k = 0; k < 3; ++k) part[k] = reaction_(p, k), arm[k] = position_(p, k) - origin[k];
+    for (int k = 0; k < 3; ++k) part[k] = fields_.particle_reaction(p, k), arm[k] = fields_.particle_position(p, k) - origin[k];
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
       impulse[k] += part[k];

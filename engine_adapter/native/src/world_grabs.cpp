@@ -19,7 +19,7 @@ ts_grab World::grab_at(int32_t number) const {
   if (number < 0 || size_t(number) >= kMostGrabs) {
     fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostGrabs - 1);
   }
-  if (grab_body_(size_t(number)) == 0) return 0;
+  if (fields_.grabs.body(size_t(number)) == 0) return 0;
   return kGrab | ts_grab(grab_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
 }
 
@@ -36,7 +36,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   const Asset& asset = asset_of(slot);
   if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to grab", slot);
   if (triangle < 0 || size_t(triangle) >= asset.surface.count / 3) {
-    fail(TS_ERROR_ARGUMENT, "triangle is %d: there are %zu, from 0", triangle, asset.surface.count / 3);
+    fail(TS_ERROR_ARGUMENT, "triangle %d does not exist (%zu in all, numbered from 0)", triangle, asset.surface.count / 3);
   }
   double sum = 0.0, weights[3];
   for (int i = 0; i < 3; ++i) sum = sum + given[i];
@@ -49,7 +49,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   }
   if (!(max_force <= 1e20)) fail(TS_ERROR_ARGUMENT, "max_force is %g N: give at most 1e20", max_force);
   size_t g = 0;
-  while (g < kMostGrabs && grab_body_(g) != 0) ++g;
+  while (g < kMostGrabs && fields_.grabs.body(g) != 0) ++g;
   if (g == kMostGrabs) fail(TS_ERROR_STATE, "all %zu grabs of this world are in use: release one first", kMostGrabs);
 
   for (int i = 0; i < 3; ++i) weights[i] = std::max(given[i], 0.0);
@@ -62,21 +62,21 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   const int32_t* corners = asset.surface.data + 3 * triangle;
   const Patch patch = patch_around(asset, corners, weights, 3);
 
-  grab_body_(g) = slot + 1;
+  fields_.grabs.body(g) = slot + 1;
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i < 3 ? i : 0])));
-    grab_weights_(g, i) = i < 3 ? as_float(weights[i]) : 0.0f;
+    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(corners[i < 3 ? i : 0])));
+    fields_.grabs.weights(g, i) = i < 3 ? as_float(weights[i]) : 0.0f;
   }
   const double spring[3] = {mass * (omega * omega), 2 * mass * omega, 2 * scene_->highest_pull_speed / omega};
   const double limits[3] = {std::min(strongest, patch.strength), strongest, 1 / mass};
   for (int k = 0; k < 3; ++k) {
-    grab_target_(g, k) = as_float(point[k]);
-    grab_spring_(g, k) = as_float(spring[k]);
-    grab_limits_(g, k) = as_float(limits[k]);
-    grab_force_(g, k) = 0.0f;
+    fields_.grabs.target(g, k) = as_float(point[k]);
+    fields_.grabs.spring(g, k) = as_float(spring[k]);
+    fields_.grabs.limits(g, k) = as_float(limits[k]);
+    fields_.grabs.force(g, k) = 0.0f;
   }
   write_patch(g, slot, patch);
-  body_drives_(slot) |= kGrabbed;
+  fields_.body_drives(slot) |= kGrabbed;
   grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
   mark_modified(slot);
   return grab_at(int32_t(g));
@@ -104,33 +104,33 @@ Patch World::patch_around(const Asset& asset, const int32_t* corners, const doub
 }
 
 void World::write_patch(size_t g, int32_t slot, const Patch& patch) {
-  grab_count_(g) = int32_t(patch.vertices.size());
+  fields_.grabs.count(g) = int32_t(patch.vertices.size());
   for (size_t i = 0; i < patch.vertices.size(); ++i) {
-    grab_particle_(g * kPatchRows + i) = int32_t(particle(slot, size_t(patch.vertices[i])));
-    grab_share_(g * kPatchRows + i) = as_float(patch.shares[i]);
+    fields_.grabs.particle(g * kPatchRows + i) = int32_t(particle(slot, size_t(patch.vertices[i])));
+    fields_.grabs.share(g * kPatchRows + i) = as_float(patch.shares[i]);
   }
 }
 
 void World::move_grab(ts_grab grab, const Vector& point) {
   const size_t g = grab_of(grab);
-  for (int k = 0; k < 3; ++k) grab_target_(g, k) = as_float(point[k]);
-  mark_modified(grab_body_(g) - 1);
+  for (int k = 0; k < 3; ++k) fields_.grabs.target(g, k) = as_float(point[k]);
+  mark_modified(fields_.grabs.body(g) - 1);
 }
 
 void World::release(ts_grab grab) { end_grab(grab_of(grab)); }
 
 void World::end_grab(size_t g) {
-  const int32_t body = grab_body_(g);
-  grab_body_(g) = 0;
+  const int32_t body = fields_.grabs.body(g);
+  fields_.grabs.body(g) = 0;
   bool is_held = false;
-  for (size_t each = 0; each < kMostGrabs; ++each) is_held = is_held || grab_body_(each) == body;
-  if (!is_held) body_drives_(body - 1) &= ~kGrabbed;
+  for (size_t each = 0; each < kMostGrabs; ++each) is_held = is_held || fields_.grabs.body(each) == body;
+  if (!is_held) fields_.body_drives(body - 1) &= ~kGrabbed;
   mark_modified(body - 1);
 }
 
 Vector World::grab_force(ts_grab grab) const {
   const size_t g = grab_of(grab);
-  return {grab_force_(g, 0), grab_force_(g, 1), grab_force_(g, 2)};
+  return {fields_.grabs.force(g, 0), fields_.grabs.force(g, 1), fields_.grabs.force(g, 2)};
 }
 
 }  // namespace taichi_soft

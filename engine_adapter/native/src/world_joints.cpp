@@ -13,13 +13,13 @@ namespace taichi_soft {
 namespace {
 
 constexpr ts_joint kJoint = uint64_t(5) << 56;  // prefix of joint handles
-constexpr double kFarthest = -0.5, kDraw = 0.25, kLeastWeight = 1e-4;
+constexpr double kLeastWeight = 1e-4;
 
 }  // namespace
 
 Vector World::vertex_place(int32_t slot, int32_t vertex) const {
   const size_t p = particle(slot, size_t(vertex));
-  return {position_(p, 0), position_(p, 1), position_(p, 2)};
+  return {fields_.particle_position(p, 0), fields_.particle_position(p, 1), fields_.particle_position(p, 2)};
 }
 
 // Positions of vertices of `slot` in the tetrahedra of `other`, in their current shapes.
@@ -101,7 +101,7 @@ double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
 size_t World::joint_rows() const {
   int32_t used = 0;
   for (size_t j = 0; j < kMostJoints; ++j) {
-    if (joint_bodies_(j, 0) != 0) used = std::max(used, joint_span_(j, 1));
+    if (fields_.joints.bodies(j, 0) != 0) used = std::max(used, fields_.joints.rows(j, 1));
   }
   return size_t(used);
 }
@@ -110,7 +110,7 @@ ts_joint World::joint_at(int32_t number) const {
   if (number < 0 || size_t(number) >= kMostJoints) {
     fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostJoints - 1);
   }
-  if (joint_bodies_(size_t(number), 0) == 0) return 0;
+  if (fields_.joints.bodies(size_t(number), 0) == 0) return 0;
   return kJoint | ts_joint(joint_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
 }
 
@@ -139,7 +139,7 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
     holders = holders_on(other, partners);
   }
   size_t j = 0;
-  while (j < kMostJoints && joint_bodies_(j, 0) != 0) ++j;
+  while (j < kMostJoints && fields_.joints.bodies(j, 0) != 0) ++j;
   if (j == kMostJoints) fail(TS_ERROR_STATE, "all %zu joints of this world are in use: release one first", kMostJoints);
   const size_t used = joint_rows(), n = vertices.size();
   if (used + n > kJointRows) {
@@ -174,8 +174,8 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
 void World::release_joint(ts_joint joint) { end_joint(joint_of(joint)); }
 
 void World::end_joint(size_t j) {
-  const int32_t body = joint_bodies_(j, 0) - 1;
-  wake_slot(joint_bodies_(j, 1) - 1);
+  const int32_t body = fields_.joints.bodies(j, 0) - 1;
+  wake_slot(fields_.joints.bodies(j, 1) - 1);
   machine_->launch("end_joint", {Machine::whole(int32_t(j))});
   mark_modified(body);
   joints_have_changed();
@@ -190,7 +190,7 @@ void World::joints_have_changed() {
 Vector World::joint_force(ts_joint joint) const {
   const size_t j = joint_of(joint);
   const double dt = std::max(last_dt_, 1e-30);
-  return {joint_impulse_(j, 0) / dt, joint_impulse_(j, 1) / dt, joint_impulse_(j, 2) / dt};
+  return {fields_.joints.impulse(j, 0) / dt, fields_.joints.impulse(j, 1) / dt, fields_.joints.impulse(j, 2) / dt};
 }
 
 }  // namespace taichi_soft

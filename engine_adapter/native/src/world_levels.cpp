@@ -45,7 +45,6 @@ void World::read_levels() {
     return first >= 0 && each * size_t(first) + rows <= most;
   };
   for (const std::string& name : scene_->constant_names) constants_.push_back({machine_->root(), scene_->place(name)});
-  body_blocks_ = {machine_->root(), scene_->place("body_blocks", slots, 2)};
   for (size_t slot = 0; slot < slots; ++slot) {
     const Asset& asset = whole_of(int32_t(slot));
     if (asset.level_count() == 1) continue;
@@ -98,7 +97,7 @@ void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_
        array_of(asset.rank), array_of(rows.tet_vertices), array_of(rows.tet_edges),
        Machine::array(rows.rest_inverses.data, 2, uint32_t(inverses)), array_of(rows.edges, 2),
        array_of(rows.edge_damping), array_of(rows.edge_blocks, 2), array_of(rows.triangles, 3), array_of(rows.outer)});
-  const size_t blocks = rows.tet_vertices.count / (4 * kLanes), first = size_t(body_blocks_(size_t(slot)));
+  const size_t blocks = rows.tet_vertices.count / (4 * kLanes), first = size_t(fields_.body_blocks(size_t(slot)));
   for (size_t i = 0; i < constants_.size(); ++i) {
     const Archive::View<float>& each = rows.constants[i];
     const size_t begin = first * (each.count / blocks);
@@ -134,16 +133,16 @@ void World::require_change(int32_t slot, int32_t level, bool may_release) const 
   }
   bool has_joints = false, has_motors = false;
   for (size_t j = 0; j < kMostJoints; ++j) {
-    has_joints = has_joints || joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1;
+    has_joints = has_joints || fields_.joints.bodies(j, 0) == slot + 1 || fields_.joints.bodies(j, 1) == slot + 1;
   }
-  for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || motor_wholes_[0](m) == slot + 1;
+  for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || fields_.motors.motor.body(m) == slot + 1;
   if ((has_joints || has_motors) && !may_release) {
     fail(TS_ERROR_STATE,
          "the body in slot %d has %s%s%s on its vertices: release or remove them before changing its level, or "
          "call ts_body_set_level with release = 1",
          slot, has_joints ? "joints" : "", has_joints && has_motors ? " and " : "", has_motors ? "motors" : "");
   }
-  if (body_status_(slot) == kFrozen) {
+  if (fields_.body_status(slot) == kFrozen) {
     fail(TS_ERROR_STATE, "the body in slot %d is frozen: despawn it, and spawn another", slot);
   }
 }
@@ -151,7 +150,7 @@ void World::require_change(int32_t slot, int32_t level, bool may_release) const 
 std::vector<int32_t> World::pinned(int32_t slot) const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {
-    if (inv_mass_(particle(slot, v)) == 0.0f) found.push_back(int32_t(v));
+    if (fields_.particle_inv_mass(particle(slot, v)) == 0.0f) found.push_back(int32_t(v));
   }
   return found;
 }
@@ -181,9 +180,9 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
   const std::vector<int32_t> sources = pinned(slot);
   for (int32_t vertex : sources) {
     const size_t p = particle(slot, size_t(vertex));
-    if (particle_aim_(p) < kWithFrame) continue;
+    if (fields_.particle_aim(p) < kWithFrame) continue;
     Hanging& each = found[attachments_[p]];
-    each.frame = particle_aim_(p) - kWithFrame, each.feels = feels_[p] != 0;
+    each.frame = fields_.particle_aim(p) - kWithFrame, each.feels = feels_[p] != 0;
     each.before.push_back(vertex);
   }
   if (found.empty() || held.empty()) return found;
@@ -191,7 +190,7 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
       nearest_sources(asset_of(slot), sources, whole_of(slot).level(size_t(level)), held);
   for (size_t i = 0; i < held.size(); ++i) {
     const size_t p = particle(slot, size_t(nearest[i]));
-    if (particle_aim_(p) >= kWithFrame) found[attachments_[p]].after.push_back(held[i]);
+    if (fields_.particle_aim(p) >= kWithFrame) found[attachments_[p]].after.push_back(held[i]);
   }
   return found;
 }
@@ -200,10 +199,10 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
 void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                       std::map<int32_t, Hanging>* attached) {
   for (size_t j = 0; j < kMostJoints; ++j) {
-    if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
+    if (fields_.joints.bodies(j, 0) == slot + 1 || fields_.joints.bodies(j, 1) == slot + 1) end_joint(j);
   }
   for (size_t m = 0; m < kMostMotors; ++m) {
-    if (motor_wholes_[0](m) == slot + 1) end_motor(m);
+    if (fields_.motors.motor.body(m) == slot + 1) end_motor(m);
   }
   for (bool is_done = false; !is_done;) {  // a release reduces the held vertices, so others may lose theirs
     std::vector<int32_t> finest = finest_held(slot);
@@ -250,13 +249,13 @@ void World::attach_at_level(const std::map<int32_t, Hanging>& attached, const Mo
 
 // Point of the rest shape that a grab holds.
 Vector World::rest_point_of_grab(size_t g) const {
-  const int32_t slot = grab_body_(g) - 1;
+  const int32_t slot = fields_.grabs.body(g) - 1;
   const Asset& asset = asset_of(slot);
   double weights[kGrabCorners], sum = 0.0;
-  for (size_t i = 0; i < kGrabCorners; ++i) weights[i] = double(grab_weights_(g, i)), sum = sum + weights[i];
+  for (size_t i = 0; i < kGrabCorners; ++i) weights[i] = double(fields_.grabs.weights(g, i)), sum = sum + weights[i];
   Vector place = {0.0, 0.0, 0.0};
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    const int32_t rank = grab_corners_(g, i) - int32_t(begin_of(slot));
+    const int32_t rank = fields_.grabs.corners(g, i) - int32_t(begin_of(slot));
     const auto at = std::find(asset.rank.begin(), asset.rank.end(), rank);
     const size_t vertex = at == asset.rank.end() ? 0 : size_t(at - asset.rank.begin());
     for (size_t k = 0; k < 3; ++k) place[k] += weights[i] / sum * asset.vertices[3 * vertex + k];
@@ -266,7 +265,7 @@ Vector World::rest_point_of_grab(size_t g) const {
 
 // Moves a grab to the body's current tetrahedra, around a point of the rest shape.
 void World::hold_at(size_t g, const Vector& place) {
-  const int32_t slot = grab_body_(g) - 1;
+  const int32_t slot = fields_.grabs.body(g) - 1;
   const Asset& asset = asset_of(slot);
   const int32_t* corners = asset.tets.data;
   std::array<double, 4> weights{};
@@ -283,10 +282,10 @@ void World::hold_at(size_t g, const Vector& place) {
   }
   const Patch patch = patch_around(asset, corners, weights.data(), 4);
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
-    grab_weights_(g, i) = as_float(weights[i]);
+    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(corners[i])));
+    fields_.grabs.weights(g, i) = as_float(weights[i]);
   }
-  grab_limits_(g, 0) = std::min(grab_limits_(g, 1), as_float(patch.strength));
+  fields_.grabs.limits(g, 0) = std::min(fields_.grabs.limits(g, 1), as_float(patch.strength));
   write_patch(g, slot, patch);
 }
 
@@ -300,7 +299,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   make_room(slot, level, may_release, &change.held, &attached);
   std::vector<std::pair<size_t, Vector>> grabbed;
   for (size_t g = 0; g < kMostGrabs; ++g) {
-    if (grab_body_(g) == slot + 1) grabbed.push_back({g, rest_point_of_grab(g)});
+    if (fields_.grabs.body(g) == slot + 1) grabbed.push_back({g, rest_point_of_grab(g)});
   }
   Motion before(source.vertex_count());
   const float* found = machine_->rows.room<float>(before.numbers.size());
@@ -310,7 +309,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   attach_at_level(attached, before, &after);
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
-  write_slot(slot, level, after, body_status_(slot));
+  write_slot(slot, level, after, fields_.body_status(slot));
   if (scene_->has_soft_contact) machine_->launch("mark_placed", {Machine::whole(slot)});
   give_friction(slot, friction_[size_t(slot)]);
   for (const auto& each : attached) {

@@ -12,7 +12,6 @@ namespace taichi_soft {
 namespace {
 
 constexpr ts_motor kMotor = uint64_t(6) << 56;  // prefix of motor handles
-constexpr double kLargestLimit = 1e12, kThinnest = 1e-3;
 
 double sum_of(const std::vector<double>& numbers) {
   double total = 0.0;
@@ -65,15 +64,15 @@ Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, c
 std::vector<World::MotorRow> World::motors() const {
   std::vector<MotorRow> found;
   for (size_t m = 0; m < kMostMotors; ++m) {
-    if (motor_wholes_[0](m) == 0) continue;
+    if (fields_.motors.motor.body(m) == 0) continue;
     MotorRow row;
     row.number = m;
-    row.slot = motor_wholes_[0](m) - 1;
-    for (size_t k = 0; k < 3; ++k) row.kind[k] = motor_wholes_[3 + k](m);
-    for (size_t k = 0; k < 3; ++k) row.axis[k] = motor_axis_(m, k), row.point[k] = motor_point_(m, k);
-    row.speed = motor_speed_(m), row.limit = motor_limit_(m);
-    for (int32_t r = motor_wholes_[1](m); r < motor_wholes_[2](m); ++r) {
-      row.particles.push_back(motor_particle_(size_t(r)));
+    row.slot = fields_.motors.motor.body(m) - 1;
+    row.turns = fields_.motors.motor.turns(m), row.is_fixed = fields_.motors.motor.is_fixed(m), row.has_point = fields_.motors.motor.has_point(m);
+    for (size_t k = 0; k < 3; ++k) row.axis[k] = fields_.motors.motor.axis(m, k), row.point[k] = fields_.motors.motor.point(m, k);
+    row.speed = fields_.motors.motor.speed(m), row.limit = fields_.motors.motor.limit(m);
+    for (int32_t r = fields_.motors.motor.first(m); r < fields_.motors.motor.end(m); ++r) {
+      row.particles.push_back(fields_.motors.particle(size_t(r)));
     }
     found.push_back(std::move(row));
   }
@@ -82,32 +81,32 @@ std::vector<World::MotorRow> World::motors() const {
 
 // Replaces all motors by these, in the order of their indices.
 void World::write_motors(const std::vector<MotorRow>& rows) {
-  for (size_t m = 0; m < kMostMotors; ++m) motor_wholes_[0](m) = 0;
+  for (size_t m = 0; m < kMostMotors; ++m) fields_.motors.motor.body(m) = 0;
   size_t at = 0;
   for (const MotorRow& row : rows) {
     const size_t m = row.number;
-    motor_wholes_[0](m) = row.slot + 1;
-    motor_wholes_[1](m) = int32_t(at);
-    for (int32_t each : row.particles) motor_particle_(at++) = each;
-    motor_wholes_[2](m) = int32_t(at);
-    for (size_t k = 0; k < 3; ++k) motor_wholes_[3 + k](m) = row.kind[k];
-    for (size_t k = 0; k < 3; ++k) motor_axis_(m, k) = row.axis[k], motor_point_(m, k) = row.point[k];
-    motor_speed_(m) = row.speed, motor_limit_(m) = row.limit;
+    fields_.motors.motor.body(m) = row.slot + 1;
+    fields_.motors.motor.first(m) = int32_t(at);
+    for (int32_t each : row.particles) fields_.motors.particle(at++) = each;
+    fields_.motors.motor.end(m) = int32_t(at);
+    fields_.motors.motor.turns(m) = row.turns, fields_.motors.motor.is_fixed(m) = row.is_fixed, fields_.motors.motor.has_point(m) = row.has_point;
+    for (size_t k = 0; k < 3; ++k) fields_.motors.motor.axis(m, k) = row.axis[k], fields_.motors.motor.point(m, k) = row.point[k];
+    fields_.motors.motor.speed(m) = row.speed, fields_.motors.motor.limit(m) = row.limit;
   }
   mark_driven();
 }
 
 void World::mark_driven() {
-  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) is_driven_(size_t(slot)) = 0;
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) fields_.motors.is_driven(size_t(slot)) = 0;
   for (size_t m = 0; m < kMostMotors; ++m) {
-    if (motor_wholes_[0](m) != 0) is_driven_(size_t(motor_wholes_[0](m) - 1)) = 1;
+    if (fields_.motors.motor.body(m) != 0) fields_.motors.is_driven(size_t(fields_.motors.motor.body(m) - 1)) = 1;
   }
 }
 
 size_t World::motor_rows() const {
   int32_t used = 0;
   for (size_t m = 0; m < kMostMotors; ++m) {
-    if (motor_wholes_[0](m) != 0) used = std::max(used, motor_wholes_[2](m));
+    if (fields_.motors.motor.body(m) != 0) used = std::max(used, fields_.motors.motor.end(m));
   }
   return size_t(used);
 }
@@ -116,7 +115,7 @@ ts_motor World::motor_at(int32_t number) const {
   if (number < 0 || size_t(number) >= kMostMotors) {
     fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostMotors - 1);
   }
-  if (motor_wholes_[0](size_t(number)) == 0) return 0;
+  if (fields_.motors.motor.body(size_t(number)) == 0) return 0;
   return kMotor | ts_motor(motor_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
 }
 
@@ -128,7 +127,7 @@ size_t World::motor_of(ts_motor motor) const {
   return size_t(number);
 }
 
-bool World::turns(ts_motor motor) const { return motor_wholes_[3](motor_of(motor)) != 0; }
+bool World::turns(ts_motor motor) const { return fields_.motors.motor.turns(motor_of(motor)) != 0; }
 
 ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   const std::vector<int32_t> vertices = checked(slot, which, false);
@@ -154,7 +153,7 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   }
   MotorRow row;
   row.number = m, row.slot = slot;
-  row.kind[0] = drive.turns, row.kind[1] = drive.is_fixed, row.kind[2] = drive.has_point;
+  row.turns = drive.turns, row.is_fixed = drive.is_fixed, row.has_point = drive.has_point;
   for (size_t k = 0; k < 3; ++k) row.axis[k] = as_float(axis[k]), row.point[k] = as_float(drive.point[k]);
   row.speed = as_float(drive.speed), row.limit = as_float(drive.limit);
   for (int32_t vertex : vertices) row.particles.push_back(int32_t(particle(slot, size_t(vertex))));
@@ -162,7 +161,7 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   const auto at = std::find_if(rows.begin(), rows.end(), [&](const MotorRow& each) { return each.number > m; });
   rows.insert(at, std::move(row));
   write_motors(rows);
-  motor_impulse_(m) = 0.0f;
+  fields_.motors.impulse(m) = 0.0f;
   motor_generations_[m] = (motor_generations_[m] + 1) & 0xFFFFFF;
   mark_modified(slot);
   return motor_at(number);
@@ -171,21 +170,21 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
 void World::set_motor_speed(ts_motor motor, double speed) {
   const size_t m = motor_of(motor);
   require_motor_speed(speed, scene_->velocity_limit);
-  motor_speed_(m) = as_float(speed);
-  mark_modified(motor_wholes_[0](m) - 1);
+  fields_.motors.motor.speed(m) = as_float(speed);
+  mark_modified(fields_.motors.motor.body(m) - 1);
 }
 
 void World::set_motor_limit(ts_motor motor, double limit) {
   const size_t m = motor_of(motor);
   require_motor_limit(limit);
-  motor_limit_(m) = as_float(limit);
-  mark_modified(motor_wholes_[0](m) - 1);
+  fields_.motors.motor.limit(m) = as_float(limit);
+  mark_modified(fields_.motors.motor.body(m) - 1);
 }
 
 void World::remove_motor(ts_motor motor) { end_motor(motor_of(motor)); }
 
 void World::end_motor(size_t m) {
-  const int32_t slot = motor_wholes_[0](m) - 1;
+  const int32_t slot = fields_.motors.motor.body(m) - 1;
   std::vector<MotorRow> rows = motors();
   rows.erase(std::find_if(rows.begin(), rows.end(), [&](const MotorRow& each) { return each.number == m; }));
   write_motors(rows);
@@ -194,14 +193,14 @@ void World::end_motor(size_t m) {
 
 double World::motor_speed(ts_motor motor) {
   const size_t m = motor_of(motor);
-  if (body_status_(size_t(motor_wholes_[0](m) - 1)) == kFrozen) return 0.0;
+  if (fields_.body_status(size_t(fields_.motors.motor.body(m) - 1)) == kFrozen) return 0.0;
   return machine_->launch("read_speed", {Machine::whole(int32_t(m))});
 }
 
 double World::motor_effort(ts_motor motor) const {
   const size_t m = motor_of(motor);
-  if (body_status_(size_t(motor_wholes_[0](m) - 1)) == kFrozen) return 0.0;
-  return motor_impulse_(m) / std::max(last_dt_, 1e-30);
+  if (fields_.body_status(size_t(fields_.motors.motor.body(m) - 1)) == kFrozen) return 0.0;
+  return fields_.motors.impulse(m) / std::max(last_dt_, 1e-30);
 }
 
 }  // namespace taichi_soft

@@ -11,7 +11,7 @@ uint32_t World::write_active_slots() {
   int32_t* slots = machine_->rows.room<int32_t>(size_t(scene_->slot_count));
   uint32_t count = 0;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    if (body_status_(slot) != kAbsent) slots[count++] = slot;
+    if (fields_.body_status(slot) != kAbsent) slots[count++] = slot;
   }
   return count;
 }

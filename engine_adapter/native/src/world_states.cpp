@@ -27,14 +27,14 @@ uint64_t World::hash() const {
   };
   const auto mix_two = [&mix](uint32_t x, uint32_t y) { mix(uint64_t(x) | uint64_t(y) << 32); };
   for (int32_t body = 0; body < scene_->slot_count; ++body) {
-    mix(uint32_t(body_status_(body)));
-    if (body_status_(body) == kAbsent) continue;
-    mix_two(bits_of(lag_(body)), uint32_t(body_drives_(body)));
-    mix_two(bits_of(gravity_scale_(body)), bits_of(damping_(body)));
+    mix(uint32_t(fields_.body_status(body)));
+    if (fields_.body_status(body) == kAbsent) continue;
+    mix_two(bits_of(fields_.body_velocity_lag(body)), uint32_t(fields_.body_drives(body)));
+    mix_two(bits_of(fields_.body_gravity_scale(body)), bits_of(fields_.body_damping(body)));
     const size_t begin = begin_of(body), end = begin + asset_of(body).vertex_count();
     for (size_t p = begin; p < end; ++p) {
-      for (int k = 0; k < 3; ++k) mix_two(bits_of(position_(p, k)), bits_of(velocity_(p, k)));
-      mix_two(bits_of(inv_mass_(p)), uint32_t(particle_aim_(p)));
+      for (int k = 0; k < 3; ++k) mix_two(bits_of(fields_.particle_position(p, k)), bits_of(fields_.particle_velocity(p, k)));
+      mix_two(bits_of(fields_.particle_inv_mass(p)), uint32_t(fields_.particle_aim(p)));
     }
   }
   return code;
@@ -86,14 +86,14 @@ bool is_place(const Pose& pose) {
 
 constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
 
-size_t count_of(const Carried& each, const SnapshotHead& head) {
+size_t count_of(const KeptField& each, const SnapshotHead& head) {
   const uint64_t rows[] = {1, head.joint_rows, head.motor_rows};
   return each.count * size_t(rows[each.whose]);
 }
 
-size_t size_of_fields(const SnapshotHead& head, const std::vector<Carried>& carried) {
+size_t size_of_fields(const SnapshotHead& head, const std::vector<KeptField>& kept) {
   size_t words = 0;
-  for (const Carried& each : carried) words += count_of(each, head) * each.place.width;
+  for (const KeptField& each : kept) words += count_of(each, head) * each.place.width;
   return 4 * words;
 }
 
@@ -114,7 +114,7 @@ size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
 World::Levels World::present_levels() const {
   Levels found;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    const bool lives = body_status_(slot) != kAbsent;
+    const bool lives = fields_.body_status(slot) != kAbsent;
     found.levels.push_back(lives ? level_of(slot) : 0);
     found.held.push_back(found.levels.back() != 0 ? held_[size_t(slot)] : std::vector<int32_t>());
   }
@@ -152,7 +152,7 @@ size_t World::snapshot_size() const {
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = events_.contact_count();
   head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
-  return sizeof head + size_of_levels(head, size_t(scene_->slot_count)) + size_of_fields(head, scene_->carried) +
+  return sizeof head + size_of_levels(head, size_t(scene_->slot_count)) + size_of_fields(head, scene_->kept) +
          size_of_rest(head, size_t(scene_->slot_count), feels_.size());
 }
 
@@ -174,7 +174,7 @@ void World::snapshot(char* bytes) const {
     put(&at, &count, 1);
   }
   for (const auto& each : levels.held) put_all(&at, each);
-  for (const Carried& each : scene_->carried) {
+  for (const KeptField& each : scene_->kept) {
     const char* row = machine_->root() + each.place.offset;
     const size_t count = count_of(each, head);
     for (size_t i = 0; i < count; ++i, row += each.place.stride) put(&at, row, 4 * each.place.width);
@@ -219,7 +219,7 @@ class World::Packed {
  public:
   Packed(const World& world, const char* at, const SnapshotHead& head, const std::vector<int32_t>& levels)
       : levels_(levels) {
-    for (const Carried& each : world.scene().carried) {
+    for (const KeptField& each : world.scene().kept) {
       rows_[each.place.offset] = {at, each.place.width};
       at += 4 * count_of(each, head) * each.place.width;
     }
@@ -304,34 +304,22 @@ bool World::are_motors_valid(const Packed& packed, const SnapshotHead& head) con
 // True if all indices are in range and all values are finite, so that a step is safe.
 bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
   const Scene& s = *scene_;
-  std::vector<std::pair<size_t, int64_t>> limits = {// of whole numbers, by where their field lies
-                                                    {s.place("body_status").offset, kAbsent + 1},
-                                                    {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
-                                                    {s.place("grabs.body").offset, s.slot_count + 1},
-                                                    {s.place("grabs.corners").offset, s.particle_count},
-                                                    {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
-                                                    {s.place("grabs.particle").offset, s.particle_count},
-                                                    {s.place("motors.motor.body").offset, s.slot_count + 1},
-                                                    {s.place("motors.particle").offset, s.particle_count},
-                                                    {s.place("joints.bodies").offset, s.slot_count + 1},
-                                                    {s.place("joints.rows").offset, int64_t(kJointRows) + 1},
-                                                    {s.place("joints.particle").offset, s.particle_count}};
+  const int64_t counts[] = {0, s.particle_count, s.slot_count, int64_t(collider_room_), int64_t(head.frames)};
   Levels levels;
   if (!parse_levels(&at, head, &levels)) return false;
   const Packed packed(*this, at, head, levels.levels);
-  for (const Carried& each : s.carried) {
-    int64_t limit = int64_t(1) << 32;
-    for (const auto& [offset, most] : limits) limit = each.place.offset == offset ? most : limit;
-    const bool is_limited = limit < int64_t(1) << 32;
+  for (const KeptField& each : s.kept) {
+    const int64_t end = each.bound == nullptr ? 0 : counts[each.bound->things] + each.bound->beside;
+    const float most = each.bound == nullptr ? kAny : each.bound->most;
     for (size_t i = 0; i < count_of(each, head) * each.place.width; ++i) {
       if (each.place.is_whole) {
         int32_t number;
         take(&at, &number, 1);
-        if (is_limited && (number < 0 || number >= limit)) return false;
+        if (end > 0 && (number < 0 || number >= end)) return false;
       } else {
         float number;
         take(&at, &number, 1);
-        if (each.is_finite && !std::isfinite(number)) return false;
+        if (std::isfinite(most) && !(std::fabs(number) <= most)) return false;
       }
     }
   }
@@ -389,7 +377,7 @@ void World::restore(const char* bytes, size_t size) {
   const size_t slots = size_t(scene_->slot_count);
   if (head.joint_rows > kJointRows || head.motor_rows > kMotorRows) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   if (head.held > slots * size_t(scene_->particle_count)) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
-  const size_t fields = sizeof head + size_of_levels(head, slots) + size_of_fields(head, scene_->carried);
+  const size_t fields = sizeof head + size_of_levels(head, slots) + size_of_fields(head, scene_->kept);
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
       head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots, feels_.size()) ||
       (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
@@ -420,7 +408,7 @@ void World::restore(const char* bytes, size_t size) {
     if (packed.lives(slot + 1) && levels.levels[size_t(slot)] != level_of(slot)) refill(slot, levels.levels[size_t(slot)]);
   }
   held_ = std::move(levels.held);
-  for (const Carried& each : scene_->carried) {
+  for (const KeptField& each : scene_->kept) {
     char* row = machine_->root() + each.place.offset;
     const size_t count = count_of(each, head);
     for (size_t i = 0; i < count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);

@@ -74,12 +74,12 @@ void World::set_body_friction(int32_t slot, double friction) {
 
 void World::give_friction(int32_t slot, double friction) {
   friction_[size_t(slot)] = friction;
-  if (scene_->has_soft_contact) body_surface_(size_t(slot)) = as_float(friction);
+  if (scene_->has_soft_contact) fields_.body_surface(size_t(slot)) = as_float(friction);
 }
 
 void World::write_surroundings() {
-  for (size_t k = 0; k < 3; ++k) gravity_(0, k) = as_float(surroundings_.gravity[k]);
-  floor_(0, 2) = as_float(surroundings_.friction);
+  for (size_t k = 0; k < 3; ++k) fields_.gravity(0, k) = as_float(surroundings_.gravity[k]);
+  fields_.floor(0, 2) = as_float(surroundings_.friction);
 }
 
 bool World::is_valid(const Surroundings& given) const {

@@ -1,7 +1,7 @@
 """Single bodies, dropped or strongly deformed, with many meshes, materials and steps."""
 
+from lab.drop_test.robustness.cell_run import run_cell
 from lab.drop_test.robustness.cells import GROUPS, choose_cells, law_variants
-from lab.drop_test.robustness.trial import run_cell
 from lab.drop_test.robustness.verdict import Verdict
 
 __all__ = ["GROUPS", "Verdict", "choose_cells", "law_variants", "run_cell"]

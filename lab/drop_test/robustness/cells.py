@@ -1,4 +1,4 @@
-"""Which cells there are: groups of bodies, times laws, times dampings. A cell is plain data."""
+"""The cells of the sweep: groups of bodies, times laws, times dampings. A cell is plain data."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from taichi_soft.core.types import FlipsName, LawName
 from taichi_soft.elements.laws import LAWS, EnergyLaw, StressLaw
 
 Cell = dict[str, Any]
-"""group, name, mesh, scale, young, poisson, density, dt, wreck, seed; law and flips (None: what a game gets
-by default) and damping, a name in `DAMPINGS`."""
+"""group, name, mesh, scale, young, poisson, density, dt, wreck, seed; law and flips (None: the defaults), and
+damping, a name in `DAMPINGS`."""
 
 MESHES: dict[str, Callable[[], TetMesh]] = {**OWN_MESHES, **FOREIGN_MESHES}
 
@@ -33,7 +33,7 @@ USUAL: Cell = {
     "wreck": None,
     "seed": 0,
 }
-"""What a cell is where nothing else is said."""
+"""Default values of a cell."""
 
 AXES: dict[str, tuple[float, ...]] = {
     "young": (1e4, 1e5, 1e6, 1e7, 1e8, 1e9),
@@ -42,7 +42,7 @@ AXES: dict[str, tuple[float, ...]] = {
     "scale": (0.01, 0.1, 1.0, 10.0),
     "dt": (1 / 30, 1 / 60, 1 / 120),
 }
-"""Of the group `cells`, in which each is a mesh of a metre."""
+"""Values of the group `cells`. Its meshes are about 1 m large at scale 1."""
 
 CELL_COUNT = 153
 CELL_MESHES = ("sphere 4", "beam 3", "cylinder 3", "torus 2")
@@ -55,14 +55,16 @@ DAMPINGS: dict[str, Callable[[TetMesh, Cell], dict[str, float]]] = {
         "damping_ratio": 0.0,
     },
 }
-"""What `Material` is given beside E, nu and density."""
+"""Further arguments of `Material`."""
 
 WRECKED_MESHES = ("box 2", "box 4", "slab 2", "sphere 2", "sphere 4")
 WRECKED_SEEDS = range(3)
 
 
 def law_variants() -> list[tuple[str | None, str | None]]:
-    """Law and flips: those of a game that names neither, then each law on tetrahedra with each it takes."""
+    """Pairs of law and flips: the defaults first, then each law on tetrahedra with each treatment that it
+    has.
+    """
     laws = [law for law in LAWS.values() if isinstance(law, StressLaw | EnergyLaw)]
     return [(None, None), *((law.name, flips.value) for law in laws for flips in law.flips)]
 
@@ -76,39 +78,39 @@ def choose_cells(
     count: int | None = None,
     wrecks: int = 0,
 ) -> list[Cell]:
-    """Cells of some groups, by some laws.
+    """Choose cells by groups and laws.
 
     Args:
-        groups: names in `GROUPS`; None means all.
-        law: "default" for what a game gets that names neither law nor flips; None means all of them.
-        flips: of `law`, or of all that take it.
-        damping: a name in `DAMPINGS`; None means the default one, and of named laws all.
-        count: of each group, a sample that grows with it; None means all.
-        wrecks: how many random ones to add, to `wrecked` or as a group of their own.
-    Raises: OptionError for names that are not known.
+        groups: names in `GROUPS`; None: all.
+        law: name of a law, or "default" for default law and flips; None: all.
+        flips: treatment of flips, for `law` or all laws that have it; None: all.
+        damping: a name in `DAMPINGS`; None: the default damping for the default law, and all for named laws.
+        count: size of a sample of each group; a larger sample contains the smaller ones. None: all.
+        wrecks: number of random ones to add, to `wrecked` or as a separate group.
+    Raises: OptionError for unknown names.
     """
     for name in groups or []:
         _require_known("--only", name, GROUPS)
     if damping is not None:
         _require_known("--damping", damping, DAMPINGS)
     variants = [
-        (each, way)
-        for each, way in law_variants()
-        if law in (None, each or "default") and (flips is None or flips == way)
+        (each, treatment)
+        for each, treatment in law_variants()
+        if law in (None, each or "default") and (flips is None or flips == treatment)
     ]
     if not variants:
-        known = ", ".join(f"{each} {way}" for each, way in law_variants()[1:])
-        raise OptionError(f"no law {law!r} with flips {flips!r}: choose 'default' or of {known}")
+        known = ", ".join(f"{each} {treatment}" for each, treatment in law_variants()[1:])
+        raise OptionError(f"no law {law!r} with flips {flips!r}: choose 'default' or one of {known}")
     found = []
     for name, make in GROUPS.items():
         if groups is None or name in groups:
             bodies = list(make())
-            found += bodies if count is None else [bodies[k] for k in _some(len(bodies), count)]
+            found += bodies if count is None else [bodies[k] for k in _sample(len(bodies), count)]
     if wrecks and (groups is None or "wrecked" in groups):
         found += [random_wreck(number) for number in range(wrecks)]
     return [
-        {**body, "law": each, "flips": way, "damping": chosen}
-        for each, way in variants
+        {**body, "law": each, "flips": treatment, "damping": chosen}
+        for each, treatment in variants
         for chosen in ([damping] if damping else ["default"] if each is None else DAMPINGS)
         for body in found
     ]
@@ -116,11 +118,11 @@ def choose_cells(
 
 def _require_known(option: str, name: str, known: Any) -> None:
     if name not in known:
-        raise OptionError(f"{option} {name!r} is not known: choose of {', '.join(known)}")
+        raise OptionError(f"{option} {name!r} is not known: choose one of {', '.join(known)}")
 
 
-def _some(total: int, count: int) -> list[int]:
-    """`count` of `total` numbers, at random but always the same; a larger sample holds the smaller one."""
+def _sample(total: int, count: int) -> list[int]:
+    """Choose `count` of `total` numbers at random, always the same; larger samples contain smaller ones."""
     return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 
@@ -135,7 +137,7 @@ def _foreign() -> Iterator[Cell]:
 
 
 def _grid() -> Iterator[Cell]:
-    """Each axis against each other with the rest as usual, then more of the full grid at random."""
+    """Yield each pair of axes with the rest at their defaults, then random cells of the full grid."""
     names = list(AXES)
     usual = tuple(USUAL[name] for name in names)
     chosen = {
@@ -164,7 +166,9 @@ def _wrecked() -> Iterator[Cell]:
 
 
 def random_wreck(number: int) -> Cell:
-    """A box or sphere of some size and material, wrecked somehow; stiff enough to bear its own weight."""
+    """Return a strongly deformed box or sphere of random size and material, stiff enough to bear its own
+    weight.
+    """
     rng = np.random.default_rng([number, 22])
     mesh, wreck = str(rng.choice(WRECKED_MESHES)), str(rng.choice(list(WRECKS)))
     scale, density = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in ((0.1, 3.0), (100.0, 3000.0)))
@@ -186,4 +190,4 @@ GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {
     "cells": _grid,
     "wrecked": _wrecked,
 }
-"""By name; bodies without law, flips and damping."""
+"""Groups of bodies by name, without law, flips and damping."""

@@ -1,4 +1,4 @@
-"""Meshes as others bring them: slivers, gradings, plates, rods and letters, from seeded random points."""
+"""Meshes as users bring them: slivers, gradings, plates, rods and letters, from seeded random points."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from taichi_soft.meshing.delaunay import scipy_spatial
 
 Floats = NDArray[np.float64]
 Loops = tuple[tuple[tuple[float, float], ...], ...]
-"""Outlines (x, y) of a flat figure; what is inside an odd number of them is filled."""
+"""Outlines (x, y) of a flat figure, filled by the even-odd rule."""
 
 FLATTEST_OUTSIDE = 0.002
-"""Volume over longest edge cubed (0.118 if regular): flatter ones at the surface are taken off, as meshers
-do. Inside they stay."""
+"""Volume over longest edge cubed (0.118 if regular), below which tetrahedra at the surface are removed, as
+meshers do. Inside they stay."""
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:
-    """Of (n, d) candidates, in random order, those that keep their spacing (n,) from all taken before."""
+    """Choose from (n, d) candidates, in random order, those that keep their spacing (n,) from all chosen
+    before.
+    """
     order = rng.permutation(len(candidates))
     points, gaps = candidates[order], np.broadcast_to(spacing, len(candidates))[order]
     taken = np.zeros(len(points), dtype=bool)
@@ -31,7 +33,7 @@ def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats 
 
 
 def delaunay_body(points: Floats) -> TetMesh:
-    """The Delaunay mesh of (n, 3) points [m], without the flat tetrahedra that its surface begins with."""
+    """Return the Delaunay mesh of (n, 3) points [m], without flat tetrahedra at its surface."""
     tets = np.asarray(scipy_spatial("foreign meshes").Delaunay(points).simplices, dtype=np.int64)
     x = points[tets]
     volumes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6
@@ -51,7 +53,7 @@ def delaunay_body(points: Floats) -> TetMesh:
 
 
 def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
-    """Random points in a ball, `spacing` apart (in diameters)."""
+    """Mesh random points in a ball, at least `spacing` diameters apart."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(-0.5, 0.5, (8 * count, 3))
     points = points[np.linalg.norm(points, axis=1) < 0.5][:count]
@@ -59,7 +61,7 @@ def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
 
 
 def box_cloud(size: tuple[float, float, float], count: int, seed: int, spacing: float = 0.0) -> TetMesh:
-    """Random points in a box, its corners among them; no two nearer than `spacing` [m]."""
+    """Mesh random points in a box, including its corners, at least `spacing` [m] apart."""
     rng = np.random.default_rng(seed)
     corners = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)], dtype=np.float64)
     points = np.concatenate([corners, rng.uniform(size=(count, 3))]) * size
@@ -67,8 +69,9 @@ def box_cloud(size: tuple[float, float, float], count: int, seed: int, spacing: 
 
 
 def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
-    """Even points on a sphere, and few random ones inside: as a mesher leaves a surface that it may not
-    refine within."""
+    """Mesh even points on a sphere and a few random ones inside, like a mesher that cannot refine the
+    surface.
+    """
     rng = np.random.default_rng(seed)
     k = np.arange(count) + 0.5
     height, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
@@ -79,8 +82,10 @@ def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
 
 
 def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh:
-    """A cubic lattice, each point moved by up to `jitter` cells: four neighbours lie almost in a plane and on
-    a circle, and Delaunay joins many of them to a sliver."""
+    """Mesh a cubic lattice with each point moved by up to `jitter` cells.
+
+    Four neighbours lie almost in a plane and on a circle, and Delaunay joins many of them to a sliver.
+    """
     rng = np.random.default_rng(seed)
     points = np.indices((cells + 1,) * 3).reshape(3, -1).T + rng.uniform(
         -jitter, jitter, ((cells + 1) ** 3, 3)
@@ -89,7 +94,7 @@ def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh
 
 
 def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
-    """A cube with edges `ratio` times longer in one corner than in the opposite one."""
+    """Mesh a cube with edges `ratio` times longer in one corner than in the opposite one."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(40 * count, 3)) ** (1 + np.log10(ratio))
     away = np.linalg.norm(points, axis=1) / 3**0.5
@@ -101,11 +106,11 @@ def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
 def flat_body(
     loops: Loops, size: float, thickness: float, layers: int, spacing: float, seed: int, inside: float = 1.0
 ) -> TetMesh:
-    """A figure of longest side `size` [m], triangulated irregularly and drawn out by `thickness` [m].
+    """Triangulate a figure of longest side `size` [m] irregularly, and extrude it by `thickness` [m].
 
     Args:
-        spacing: of points along the outline, over `size`.
-        inside: the same within it, over that.
+        spacing: distance of points along the outline, over `size`.
+        inside: distance of points within it, over that along the outline.
     """
     rng = np.random.default_rng(seed)
     outline = [np.asarray(loop, dtype=np.float64) for loop in loops]
@@ -126,7 +131,7 @@ def flat_body(
 
 
 def _along(loop: Floats, spacing: float) -> Floats:
-    """Points (n, 2) on a closed outline, about `spacing` apart, its corners among them."""
+    """Points (n, 2) on a closed outline, about `spacing` apart, including its corners."""
     sides = zip(loop, np.roll(loop, -1, axis=0), strict=True)
     return np.concatenate(
         [
@@ -137,7 +142,7 @@ def _along(loop: Floats, spacing: float) -> Floats:
 
 
 def _is_inside(points: Floats, outline: list[Floats]) -> NDArray[np.bool_]:
-    """Which of (n, 2) points a ray to the right crosses the outline from an odd number of times."""
+    """True for points (n, 2) from which a ray to the right crosses the outline an odd number of times."""
     crossings = np.zeros(len(points), dtype=np.int64)
     for loop in outline:
         for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True):
@@ -312,4 +317,5 @@ FOREIGN_MESHES: dict[str, Maker] = {
         )
     },
 }
-"""49 of them. `python -m lab drop-test --sweep` lists their smallest dihedral angles: 0.02 to 20 degrees."""
+"""The 49 meshes by name. `python -m lab drop-test --sweep` lists their smallest dihedral angles: 0.02 to 20
+degrees."""

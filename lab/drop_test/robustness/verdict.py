@@ -38,12 +38,12 @@ class Ending:
     """Measurements at the end of a trial."""
 
     tets: int
-    failure: str | None  # why it froze; None where it did not
+    failure: str | None  # why it froze; None if it did not
     is_finite: bool
-    flipped: int  # tetrahedra inside out
+    flipped: int  # inverted tetrahedra
     speed: float  # root mean square over mass [m/s]
-    fastest: float  # that it can be, by the height it was dropped from [m/s]; infinite where it was wrecked
-    distance: float = 0.0  # from the rest shape, where it was wrecked, in its size
+    fastest: float  # largest speed of the fall [m/s]; infinite for a strongly deformed start
+    distance: float = 0.0  # from the rest shape after a strongly deformed start, in its size
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:

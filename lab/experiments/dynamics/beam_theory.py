@@ -1,7 +1,7 @@
 """First natural frequencies of a beam after Timoshenko (1921), by Ritz's method with Legendre polynomials.
 
-Deflection w and turn t of the sections hold the energy 1/2 int E I (dt/dx)^2 + kappa G A (dw/dx - t)^2 dx
-and, at the angular frequency o, as much in motion: o^2/2 int rho A w^2 + rho I t^2 dx.
+With deflection w and rotation t of the sections, the elastic energy is 1/2 int E I (dt/dx)^2 + kappa G A
+(dw/dx - t)^2 dx. At the angular frequency o, the kinetic energy is o^2/2 int rho A w^2 + rho I t^2 dx.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def timoshenko_frequency(beam: Beam, *, is_held: bool) -> float:
     weights = weights * beam.length / 2
     values = legendre.legvander(at, DEGREE)
     slopes = np.stack([legendre.legval(at, legendre.legder(row)) for row in np.eye(DEGREE + 1)], axis=1)
-    if is_held:  # what is zero at the clamp: polynomials times the distance from it
+    if is_held:  # zero at the clamp: polynomials times the distance from it
         slopes = slopes * (at + 1)[:, None] + values
         values = values * (at + 1)[:, None]
     slopes = slopes * 2 / beam.length

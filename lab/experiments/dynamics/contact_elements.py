@@ -15,11 +15,11 @@ def contact_forces(
 ) -> list[float]:
     """Force on a plane that was lifted above the lowest vertex, for each lift [N].
 
-    No vertex may be below the plane, and the plane may only push. The vertices that could touch it are few:
-    with the matrix of what a force on each does to all of them, the least energy is one of least squares
-    without negative forces.
+    No vertex may be below the plane, and the plane only pushes. Few vertices can touch it. With the matrix of
+    the displacements that a force on each causes at all of them, the least energy is a least squares problem
+    with non-negative forces.
     Args:
-        held: vertices that stay where they are.
+        held: fixed vertices.
         lifts: [m].
     """
     from scipy.optimize import nnls

@@ -1,8 +1,8 @@
 """Energy budget of a falling, bending bar (not in the thesis).
 
-A bar held at one end is let go from the horizontal, falls, and swings about its bent shape. What gravity
-gives is what it holds in motion and strain, and what the dampers on its edges take: all three are computed
-here, in float64, from positions and velocities alone.
+A bar fixed at one end is released from the horizontal, falls, and swings about its bent shape. The work of
+gravity must equal kinetic and strain energy plus the loss in the dampers of its edges. All are computed here,
+in float64, from positions and velocities only.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 DAMPING = 150.0  # N s/m
 WITH_ENERGY = ("st_venant_kirchhoff", "neo_hookean")
 GRAVITY = 9.81
-PART = 0.5  # of the stable substep: leapfrog's own energy swings with the square of the step
+PART = 0.5  # of the stable substep: leapfrog's energy oscillates with the square of the step
 FRAMES = 120
 UNDAMPED, DAMPED = 1e-3, 1e-3
-"""Largest part of what gravity gave that may be missing or too much, without damping and with it."""
+"""Largest error of the budget over the work of gravity, without damping and with it."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -87,8 +87,10 @@ def _edges(mesh: TetMesh, positions: Floats) -> Floats:
 
 
 def _energy_density(law: LawName, F: Floats) -> Floats:
-    """Of deformations (m, 3, 3) [J/m^3]. For a law without energy that of Hooke's law, which is the same in
-    the strains F F^T and F^T F."""
+    """Energy density of deformations (m, 3, 3) [J/m^3].
+
+    For a law without energy it is that of Hooke's law, which is the same in the strains F F^T and F^T F.
+    """
     mu, lam = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
     if law == "neo_hookean":  # Smith, de Goes and Kim 2018, eq. 14 with the constants of their section 3.4
         m, bulk = 4 / 3 * mu, lam + 5 / 6 * mu

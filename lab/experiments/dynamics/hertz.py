@@ -1,7 +1,7 @@
 """An elastic sphere pressed on a rigid plane: force against depth, after Hertz 1881 (not in the thesis).
 
 The oracles are Hertz's formula, for a smooth sphere and small depths, and finite elements with contact on the
-same mesh. The mesh is drawn to where it touches: of an even one, too few vertices do.
+same mesh. The mesh is refined at the contact: in an even mesh, too few vertices touch.
 """
 
 from __future__ import annotations
@@ -35,19 +35,21 @@ from lab.experiments.experiment import (
 )
 from lab.experiments.judgement import judged_but_for
 
-COARSE, FINE = 6, 8  # pieces along the radius
+COARSE, FINE = 6, 8  # cells along the radius
 ELEMENTS = "finite elements"
 QUICK_LAWS, FULL_LAWS = ("virial", "neo_hookean", "springs"), (*TETRAHEDRAL, "springs", "volume_springs")
 EXPONENT, EXPONENT_TOLERANCE = 1.5, 0.1
 FROM_HERTZ = 0.1
 """Largest difference from Hertz at any depth. Finite elements leave 8 %: few vertices touch at first."""
 SAME_MESH = 0.03
-"""Largest difference from finite elements at the smallest depth. They are for small strain; under the contact
-it is about half of the root of depth over radius, 4 to 10 %."""
+"""Largest difference from finite elements at the smallest depth. They are for small strain, which below the
+contact is about half of the root of depth over radius, 4 to 10 %."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Some laws and finite elements on the graded mesh, these on an even one too; all, and finer, if full."""
+    """Points: some laws and finite elements on the graded mesh, the latter also on an even one; in full, all,
+    and finer.
+    """
     laws = QUICK_LAWS if effort is Effort.QUICK else FULL_LAWS
     rows = [(law, COARSE, GRADED, "floor") for law in (*laws, ELEMENTS)]
     rows += [(ELEMENTS, COARSE, 0.0, "floor")]

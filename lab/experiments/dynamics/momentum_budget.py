@@ -62,7 +62,7 @@ def measure(point: Point) -> Numbers:
     changes = np.zeros((FRAMES + 1, 2))
     turning = np.ones(FRAMES + 1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # told by -1
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # reported by -1
         for frame in range(1, FRAMES + 1):
             world.step(dt, substeps)
             if body.is_frozen:
@@ -124,7 +124,7 @@ def conclude(results: Results) -> Section:
                 axes.plot(numbers["times"], numbers["turning"], style, label=name)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angular momentum, over that at the start [1]")
-        axes.set_ylim(-0.1, 2.0)  # what goes beyond has run away
+        axes.set_ylim(-0.1, 2.0)  # beyond it the body has failed
         figure.legend(loc="outside right upper")
 
     return Section(

@@ -1,7 +1,7 @@
 """First natural frequencies of a cantilever and a free beam, under every law (not in the thesis).
 
-A beam at rest gets a small velocity in the shape of its first mode, and swings; its frequency is read where
-its deflection goes through zero. The oracles are Timoshenko's beam, and finite elements on the same mesh.
+A beam at rest gets a small velocity in the shape of its first mode, and vibrates. Its frequency is read from
+the zeros of its deflection. The oracles are Timoshenko's beam, and finite elements on the same mesh.
 """
 
 from __future__ import annotations
@@ -49,11 +49,12 @@ ELEMENTS = "finite elements"
 SAME_MESH = 0.01
 """Largest difference of a law on tetrahedra from finite elements on the same mesh with the same masses."""
 EXTRAPOLATED = 0.02
-"""The same of the theory from what two meshes promise for a fine one. Finite elements leave 1.4 % here."""
+"""Largest difference between theory and the extrapolation from two meshes. Finite elements leave 1.4 %
+here."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every law on the coarse mesh, two on a finer one too, and finite elements on these."""
+    """Points: every law on the coarse mesh, two on a finer one too, and finite elements on these."""
     laws: list[Point] = [{"law": law, "cells": FINE} for law in ("virial", "springs")]
     laws += [{"law": law, "cells": COARSE} for law in laws_of(effort)]
     elements: list[Point] = [{"law": ELEMENTS, "cells": cells} for cells in (COARSE, FINE)]
@@ -65,7 +66,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Frequencies of both beams [Hz], 0 if they fail; a swing over the one a period before."""
+    """Frequencies of both beams [Hz], 0 if they fail; an amplitude over that one period before."""
     mesh = beam_mesh(point["cells"])
     numbers: Numbers = {"tets": len(mesh.tets)}
     for support in SUPPORTS:
@@ -79,7 +80,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Laws against finite elements on the same mesh, and two meshes against the theory."""
+    """Judge laws against finite elements on the same mesh, and two meshes against theory."""
     findings = [_finding(results, support, claim) for support, claim in SUPPORTS.items()]
     tables = [_table(results, support) for support in SUPPORTS]
     fine = results.one(law="virial", cells=FINE)
@@ -150,7 +151,7 @@ def _excess(results: Results, support: str, cells: int) -> str:
 
 
 def _extrapolated(results: Results, support: str, law: LawName = "virial") -> float:
-    """Frequency for cells without size from the two finest meshes, with an error of second order."""
+    """Frequency extrapolated to cells of zero size from the two finest meshes, with a second-order error."""
     rows = sorted((point["cells"], numbers[support]) for point, numbers in results.where(law=law))
     (coarse, low), (fine, high) = rows[-2:]
     return float((fine**2 * high - coarse**2 * low) / (fine**2 - coarse**2))

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 RADIUS = 0.5  # m
 MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 GRADED = 0.6
-"""By which the mesh is drawn to its lowest point: edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
+"""Refinement towards the lowest point: edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
 DEPTHS = (0.005, 0.01, 0.02, 0.04)  # over the radius
 FRICTIONLESS, BRAKE = 0.0, 100.0  # 1, 1/s
 DT, LOWERING, RESTING = 0.005, 10, 30  # s; steps to each depth, and at rest there
@@ -29,7 +29,8 @@ def hertz_force(depth: float) -> float:
 def graded_sphere(resolution: int, grading: float) -> TetMesh:
     """A ball, with smaller elements near its lowest point.
 
-    A Moebius map of the ball onto itself draws it down: it keeps spheres spheres and angles as they are.
+    A Moebius map of the ball onto itself moves vertices down. It maps spheres to spheres and preserves
+    angles.
     """
     ball = sphere(1.0, resolution)
     x, a = ball.vertices, np.array([0.0, 0.0, -grading])
@@ -39,12 +40,12 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Vertices above half of the radius, which are held."""
+    """Vertices above half of the radius, which are fixed."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
 def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
-    """What holds the cap when it was lowered by each depth [N], from the positions in float64."""
+    """Force that holds the cap after lowering it by each depth [N], from the positions in float64."""
     held, ground = cap(mesh), float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=held)
@@ -62,7 +63,7 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
-    """The same with a plane that rises, from the impulse that it reports."""
+    """The same force with a plane that rises, from the impulse that it reports."""
     ground = float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
@@ -80,7 +81,7 @@ def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def _descent() -> list[list[float]]:
-    """How far down in each step [m], for each depth: on the way there, and at rest."""
+    """Descent in each step [m], for each depth: on the way there, and at rest."""
     starts = (0.0, *DEPTHS[:-1])
     return [
         [

@@ -1,4 +1,4 @@
-"""A beam that swings in its first bending mode, under any law."""
+"""A beam that vibrates in its first bending mode, under any law."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 MATERIAL = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)
 BEAM = Beam(LENGTH, WIDTH, HEIGHT, YOUNG, POISSON, DENSITY)
 NEEDS_DAMPING = {law: 20.0 if law == "volume_springs" else 5.0 for law in WITHOUT_ENERGY}
-"""N s/m: what keeps these beams together for two periods."""
+"""Damping [N s/m] with which these beams last for two periods."""
 AMPLITUDE = 0.01 * LENGTH  # strains stay below 0.2 %
 FRAMES = 60  # a period of the theory
 
 
 def beam_mesh(cells: int) -> TetMesh:
-    """With so many cells along the height, all of them cubes."""
+    """Mesh of the beam with the given number of cubic cells along the height."""
     return box((LENGTH, WIDTH, HEIGHT), (10 * cells, 3 * cells // 2, cells))
 
 
 def mode_shape(mesh: TetMesh, support: str) -> tuple[Floats, NDArray[np.int64]]:
-    """Of the first mode, (n, 3), and which vertices are held."""
+    """Shape of the first mode, (n, 3), and the fixed vertices."""
     along = mesh.vertices[:, 0] / LENGTH + 0.5
     shape = np.zeros_like(mesh.vertices)
     shape[:, 2] = first_shape(along, is_held=support == "cantilever")
@@ -44,7 +44,7 @@ def theory(support: str) -> float:
 
 
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
-    """Frequency [Hz], and a swing over the one a period before. 0 where it breaks."""
+    """Frequency [Hz], and an amplitude over that one period before. Both are 0 if the beam fails."""
     shape, held = mode_shape(mesh, support)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     material = replace(MATERIAL, damping=NEEDS_DAMPING.get(law, 0.0))
@@ -60,7 +60,7 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     substeps = world.stable_substeps(dt)
     mode = body.masses * shape[:, 2] / (body.masses @ shape[:, 2] ** 2)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # told by a frequency of 0
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # reported by a frequency of 0
         while len(crossings) < 5 and len(deflections) < 8 * FRAMES and not body.is_frozen:
             world.step(dt, substeps)
             before, now = deflections[-1], float(mode @ (body.positions()[:, 2] - mesh.vertices[:, 2]))

@@ -1,7 +1,7 @@
 """A pressure pulse runs through a long bar, under every law (not in the thesis).
 
-A displacement along the bar, half of a bell at its free end, is let go from rest: by d'Alembert half of it
-runs away as a bell, at sqrt(E / rho) where the bar is thin against the bell's width.
+A displacement along the bar, half a bell at its free end, is released from rest. By d'Alembert, half of it
+travels away as a bell, at sqrt(E / rho) if the bar is thin compared with the bell's width.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ SPEED = float(np.sqrt(YOUNG / DENSITY))
 FRAMES = 60
 SHOWN = 5
 TOLERANCE = 0.01
-"""What the mesh may do to the speed, at two cells across."""
+"""Largest relative error of the speed due to the mesh, at two cells across."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every law at a Poisson's ratio of 0.3, those that know stress at 0 too; some on a finer mesh."""
+    """Points: every law at a Poisson's ratio of 0.3, those with stress at 0 too; some on a finer mesh."""
     rows: list[Point] = [{"law": law, "poisson": POISSONS[0], "cells": 2} for law in laws_of(effort)]
     rows += [{"law": law, "poisson": POISSONS[1], "cells": 2} for law in TETRAHEDRAL]
     if effort is Effort.FULL:
@@ -50,7 +50,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Speed of the pulse [m/s], how straight its way is, and its shape at some times."""
+    """Speed of the pulse [m/s], deviation from a constant speed, and its shape at some times."""
     cells = point["cells"]
     mesh = box((LENGTH, THICKNESS, THICKNESS), (round(LENGTH / THICKNESS) * cells, cells, cells))
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
@@ -92,7 +92,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _peak(places: Floats, profile: Floats) -> float:
-    """Where a bell is highest: of a parabola through what is above 0.7 of the largest value [m]."""
+    """Position of the maximum of a bell: that of a parabola through values above 0.7 of the largest [m]."""
     top = int(profile.argmax())
     low, high = top, top
     while low > 0 and profile[low - 1] > 0.7 * profile[top]:
@@ -106,7 +106,7 @@ def _peak(places: Floats, profile: Floats) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Laws on tetrahedra keep to the speed; those along edges have one of their own."""
+    """Judge: laws on tetrahedra have the correct speed, those along edges have their own."""
     rows = results.where()
     known = {(p["law"], p["poisson"], p["cells"]): n["speed"] / SPEED for p, n in rows}
     errors = [abs(known[law, poisson, 2] - 1) for law in TETRAHEDRAL for poisson in POISSONS]
@@ -180,7 +180,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(known: dict[tuple[str, float, int], float]) -> str:
-    """The mesh where a finer one is nearer to the theory, else the model."""
+    """Reason: the mesh if a finer one is closer to theory, else the model."""
     coarse, fine = (
         max(abs(known.get((law, POISSONS[0], cells), 0.0) - 1) for law in TETRAHEDRAL) for cells in (2, 4)
     )

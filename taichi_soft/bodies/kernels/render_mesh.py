@@ -8,8 +8,8 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Vertices in the ring around a render vertex: eight triangles, which is more than most vertices have, and
-six, which most have. Blocks with small rings only come first."""
+"""Vertices in the ring around a render vertex: room for eight triangles, or in the first blocks for six. Most
+render vertices have six."""
 
 STRIDE = (1 + RING) * LANES
 """Table entries of a block."""

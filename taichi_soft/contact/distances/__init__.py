@@ -1,1 +1,1 @@
-"""What bodies hit: signed distances of points from solids."""
+"""Signed distances of points from the solids that bodies hit."""

@@ -1,4 +1,4 @@
-"""All points near a piece of the z axis about the origin."""
+"""A capsule: all points within a radius of a segment of the z axis, centred on the origin."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def capsule_distance(parameters, x):
-    """Signed distance [m] and normal; along x on the axis. Parameters: radius, half its length."""
+    """Signed distance [m] and normal; the normal is x on the axis. Parameters: radius, half length [m]."""
     z = ti.max(-parameters[1], ti.min(parameters[1], x[2]))
     length, normal = length_and_direction(ti.Vector([x[0], x[1], x[2] - z]), ti.Vector([1.0, 0.0, 0.0]))
     return length - parameters[0], normal

@@ -8,10 +8,10 @@ RESTITUTION_SPEED = 0.5
 
 @ti.func
 def resolve_floor(x, v, h, floor):
-    """Position and velocity after contact, for a particle that this substep took to x with v.
+    """Position and velocity after contact of a particle that this substep moved to x with velocity v.
 
-    The impulse acts before the drift: what it takes from the velocity, it takes from the path, or a
-    particle that friction holds would creep.
+    The impulse acts before the drift, so it shortens the path as well. Otherwise a particle held by friction
+    would creep.
     Args:
         x: new position [m].
         v: new velocity [m/s].

@@ -1,15 +1,16 @@
-"""Ground over a regular grid, two triangles to a cell, solid all the way down.
+"""Ground over a regular grid, with two triangles per cell, solid down to infinity.
 
-Within half a cell of the ground distances are those from the triangles round the nearest node. What lies
-further off is only bounded: a ray may go that far, however steep the ground is there.
+Within half a cell of the ground, distances are exact: from the triangles around the nearest node. Farther
+away they are lower bounds, so that a ray can advance by them on ground of any slope.
 """
 
 from taichi_soft.contact.distances.direction import length_and_direction
-from taichi_soft.contact.distances.triangle import nearest_on_triangle
+from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 NEAREST = 1e-3
-"""Cells from the ground below which rounding turns the way to it, and its own normal serves."""
+"""Distance from the ground, in cells, below which rounding spoils the direction to it. The ground's own
+normal is used instead."""
 
 
 @ti.func
@@ -25,7 +26,7 @@ def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
     s, t = u - i, v - j
     near = _height(samples, resolution, offset, i, j)
     far = _height(samples, resolution, offset, i + 1, j + 1)
-    # The diagonal of a cell runs from its first to its last node.
+    # The diagonal of a cell runs from its first node to its last.
     side = _height(samples, resolution, offset, i + int(s >= t), j + int(s < t))
     rise = ti.Vector([far - side, side - near])
     if s >= t:
@@ -36,7 +37,7 @@ def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
 
 @ti.func
 def _range_round_node(samples: ti.template(), resolution, offset, i, j):
-    """Lowest and highest node of the four cells round node (i, j)."""
+    """Lowest and highest node of the four cells around node (i, j)."""
     low = _height(samples, resolution, offset, i, j)
     high = low
     for k in range(9):
@@ -48,22 +49,22 @@ def _range_round_node(samples: ti.template(), resolution, offset, i, j):
 
 
 @ti.func
-def _way_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, p, longest):
-    """From the nearest point of the four cells round node (i, j) to p, where it is shorter than `longest`.
+def _vector_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, p, longest):
+    """Vector from the nearest point of the four cells around node (i, j) to p, if shorter than `longest`.
 
     p is relative to the node.
     """
-    way = ti.Vector([0.0, 0.0, longest])
+    vector = ti.Vector([0.0, 0.0, longest])
     base = _height(samples, resolution, offset, i, j)
     own_a, own_b = i - int(p[0] < 0.0), j - int(p[1] < 0.0)
     for k in range(8):
-        # First the cell that p is over; the others only where they may hold something nearer.
+        # First the cell below p; then the others, if they can contain a nearer point.
         turn_a, turn_b, is_upper = k // 4, k // 2 % 2, k % 2
         a = own_a + turn_a * (2 * (i - own_a) - 1)
         b = own_b + turn_b * (2 * (j - own_b) - 1)
         beside = ti.Vector([turn_a * p[0], turn_b * p[1]])
         is_cell = a >= 0 and b >= 0 and a < resolution[0] - 1 and b < resolution[1] - 1
-        if is_cell and beside.norm_sqr() < way.norm_sqr():
+        if is_cell and beside.norm_sqr() < vector.norm_sqr():
             c, d = a + 1 - is_upper, b + is_upper  # the corner beside the diagonal
             first = ti.Vector([(a - i) * spacing, (b - j) * spacing, 0.0])
             side = ti.Vector([(c - i) * spacing, (d - j) * spacing, 0.0])
@@ -72,17 +73,18 @@ def _way_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, 
             last = first + ti.Vector([spacing, spacing, 0.0])
             last[2] = _height(samples, resolution, offset, a + 1, b + 1) - base
             found = p - nearest_on_triangle(p, first, side, last)
-            if found.norm_sqr() < way.norm_sqr():
-                way = found
-    return way
+            if found.norm_sqr() < vector.norm_sqr():
+                vector = found
+    return vector
 
 
 @ti.func
 def height_field_distance(samples: ti.template(), parameters, resolution, offset, x):
-    """Signed distance [m], or less, and normal. Outside the rectangle there is nothing: see below.
+    """Lower bound of the signed distance [m], and normal.
 
-    Beside it, above its border, the distance is that from the border at least; below, at least half a cell,
-    so that bodies touch no walls there and neighbouring fields join without a seam.
+    Nothing is solid outside the rectangle. Beside it and above the border, the distance is at least that from
+    the border. Beside it and below the border, it is at least half a cell, so that bodies touch no walls
+    there and adjacent fields join without a seam.
     Parameters: spacing, lowest and highest node [m], cosine of the steepest slope.
     """
     spacing, lowest, highest, cosine = parameters[0], parameters[1], parameters[2], parameters[3]
@@ -99,15 +101,15 @@ def height_field_distance(samples: ti.template(), parameters, resolution, offset
     side, ground_gap, field_gap = 1.0, x[2] - high, x[2] - highest
     if x[2] < height:
         side, ground_gap, field_gap = -1.0, low - x[2], lowest - x[2]
-    # What lies outside the four cells round the nearest node is at least this far away.
+    # All ground outside the four cells around the nearest node is at least this far away.
     off_node = ti.Vector([u[0] - i, u[1] - j])
     border = spacing * (1.0 - ti.max(ti.abs(off_node[0]), ti.abs(off_node[1])))
     distance = ti.max(border, field_gap, ti.abs(x[2] - height) * cosine)
     if ground_gap < distance:
         p = ti.Vector([off_node[0] * spacing, off_node[1] * spacing, 0.0])
         p[2] = x[2] - _height(samples, resolution, offset, i, j)
-        way = _way_from_ground(samples, resolution, offset, i, j, spacing, p, 2.0 * distance)
-        length, direction = length_and_direction(way, normal)
+        vector = _vector_from_ground(samples, resolution, offset, i, j, spacing, p, 2.0 * distance)
+        length, direction = length_and_direction(vector, normal)
         if length < distance and length > NEAREST * spacing:
             normal = side * direction
         distance = ti.min(distance, length)
@@ -118,7 +120,7 @@ def height_field_distance(samples: ti.template(), parameters, resolution, offset
         slanted = length_and_direction(outwards + distance * normal, across)[1]
         if side < 0.0:
             distance, slanted = ti.max(distance, 0.5 * spacing), across
-        # The nearest point of the rectangle sees all of it within a right angle from `outwards`.
+        # Seen from the rectangle's nearest point, all of it lies at 90 degrees or more from `outwards`.
         distance = ti.sqrt(away * away + distance * distance)
         side, normal = 1.0, slanted
     return side * distance, normal

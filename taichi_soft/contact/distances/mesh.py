@@ -1,13 +1,13 @@
-"""A solid given by its signed distance on a grid, which is all that is left of its mesh."""
+"""A solid given by its signed distance on a grid, without its mesh."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
 
 MARGIN = 2
-"""Cells between the box of the mesh and the border of its grid, at least."""
+"""Smallest distance between the box of the mesh and the border of its grid, in cells."""
 
 FLATTEST = 1e-3
-"""Slope of the distance below which it has no direction: at the middle of a solid."""
+"""Gradient of the distance, per cell, below which it has no direction, as at the centre of a solid."""
 
 
 @ti.func
@@ -38,12 +38,12 @@ def _interpolated(samples: ti.template(), resolution, offset, u):
 
 @ti.func
 def mesh_distance(samples: ti.template(), parameters, resolution, offset, x):
-    """Signed distance [m] and normal, to a fraction of a cell.
+    """Signed distance [m] and normal, accurate to a fraction of a cell.
 
-    Interpolated distances are a little too long near edges and corners, but so is the way to the surface that
+    Interpolated distances are slightly too long near edges and corners. So is the path to the surface that
     they describe: a step by the distance ends at most a tenth of a cell inside.
-    Outside the grid the way to it and the distance from there are two sides of a triangle with no sharp angle
-    between them; and the solid's box lies `MARGIN` cells within.
+    Outside the grid, the distance combines the path to the grid and the distance from there, which meet at an
+    angle of 90 degrees or more. The solid's box lies `MARGIN` cells inside the grid.
     Parameters: first node of the grid (3), cell [m].
     """
     cell = parameters[3]

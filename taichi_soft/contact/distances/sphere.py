@@ -6,6 +6,6 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def sphere_distance(parameters, x):
-    """Signed distance [m] and normal; upwards at the centre. Parameters: radius."""
+    """Signed distance [m] and normal; the normal is z at the centre. Parameters: radius [m]."""
     length, normal = length_and_direction(x, ti.Vector([0.0, 0.0, 1.0]))
     return length - parameters[0], normal

@@ -1,1 +1,1 @@
-"""Who is near whom, and what passes between them."""
+"""Broad phase, narrow phase and contact solvers."""

@@ -1,40 +1,48 @@
-"""Which vertices of an island are near which triangles of other bodies, or of their own.
+"""Broad phase: find the vertices of an island that are near triangles of other bodies, or of their own.
 
-For two bodies whose boxes overlap, the vertices of one that may be near the other go into a grid, and the
-triangles of the other look round in it. Each body has a margin, and what is found holds until one of its
-vertices is farther than that from where it was.
+If the boxes of two bodies overlap, the vertices of one that can be near the other are sorted into a grid, and
+each triangle of the other queries it. Each body has a margin: its candidates stay valid until one of its
+vertices has travelled farther than that.
+
+Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.candidates import (
     LONGEST,
     SHORTEST,
-    forget_candidates,
-    keep,
+    clear_candidates,
+    insert_candidate,
     list_candidates,
-    note_lost,
+    record_lost,
 )
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import is_held
+from taichi_soft.contact.kernels.hull_points import is_held
 from taichi_soft.contact.kernels.parting import are_parting
-from taichi_soft.contact.kernels.vertex_grid import MOST_EDGES, boxes_overlap, cell_of, fill_grid, find_box
+from taichi_soft.contact.kernels.vertex_grid import (
+    MAX_QUERY_EDGES,
+    boxes_overlap,
+    cell_of,
+    fill_grid,
+    update_boxes,
+)
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
-FORESIGHT = 1.25
-"""A search is to hold for so many times the way of a body's fastest vertex until the end of the step."""
+SEARCH_MARGIN = 1.25
+"""Margin of a search over the path of a body's fastest vertex until the end of the step."""
 
 
 SELF_DISTANCE = 1.5
-"""Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
+"""Distance at rest, in mean edges, below which a vertex and a triangle of one body never collide."""
 
 
 @ti.func
 def _is_self_neighbour(state: ti.template(), p, corners, edge):
-    """Whether a vertex and a triangle of one body are near each other at rest."""
+    """True if a vertex and a triangle of one body are near each other at rest."""
     a = state.rest_position[corners[0]]
     b = state.rest_position[corners[1]]
     c = state.rest_position[corners[2]]
@@ -58,14 +66,14 @@ def _search_triangle(
     margin,
     thickness,
 ):
-    """Give a triangle of `other` to the vertices of `body` within `margin` [m] of it.
+    """Add a triangle of `other` to the candidates of the vertices of `body` within `margin` [m] of it.
 
-    Those in the grid lie between `lowest` and `highest`. Where the two are joined, what the joint holds is
-    left out: it is to stay where it is.
+    The grid spans from `lowest` to `highest`. Particles that a joint between the two bodies holds are
+    skipped, so that contact does not act against the joint.
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
-    if (upper - lower).max() <= MOST_EDGES * ti.max(state.soft.body_surface[other].z, 1e-6):
+    if (upper - lower).max() <= MAX_QUERY_EDGES * ti.max(state.body_surface[other].z, 1e-6):
         corners = state.touching.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
@@ -76,7 +84,7 @@ def _search_triangle(
         low, high = cell_of(lower, lowest, cells, cell), cell_of(upper, lowest, cells, cell)
         for cz in range(low.z, high.z + 1):
             for cy in range(low.y, high.y + 1):
-                row = table[0] + (cz * cells.y + cy) * cells.x  # cells along x lie side by side
+                row = table[0] + (cz * cells.y + cy) * cells.x  # cells along x are contiguous
                 first, last = state.soft.cell_first[row + low.x], state.soft.cell_first[row + high.x + 1]
                 for item in range(first, last):
                     x = state.soft.cell_position[item]
@@ -86,20 +94,20 @@ def _search_triangle(
                     if wanted and is_joined == 1:
                         wanted = is_joint_there | is_held(state, p) == 0
                     if wanted and other == body:
-                        edge = state.soft.body_surface[other].z
+                        edge = state.body_surface[other].z
                         wanted = not _is_self_neighbour(state, p, corners, edge)
                     if wanted:
                         weights = closest_point_on_triangle(x, a, b, c)
                         gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
                         if gap < margin:
-                            lost = keep(state.soft, k, triangle, gap)
+                            lost = insert_candidate(state.soft, k, triangle, gap)
                             if lost < NO_CONTACT:
-                                note_lost(state, body, lost, thickness)
+                                record_lost(state, body, lost, thickness)
 
 
 @ti.func
 def _search_pair(state: ti.template(), body, other, margin, thickness):
-    """Vertices of `body` near triangles of `other`, within `margin` [m]; they touch at `thickness` [m]."""
+    """Find vertices of `body` within `margin` [m] of triangles of `other`. They touch at `thickness` [m]."""
     outer = state.touching.body_outer[body]
     table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
     count, lowest, highest, cells, cell = fill_grid(state, table, body, other, margin)
@@ -134,17 +142,17 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
 
 @ti.real_func
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
-    """Find the candidates of a body's vertices, after `begin_search` of all its island."""
-    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
+    """Find the candidates of a body's vertices, after `begin_search` of all bodies of its island."""
+    lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     thickest = ti.cast(0.0, ti.f32)
-    for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        other = state.contact.island_body[j]
-        thickness = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+    for j in range(state.islands.first[island], state.islands.first[island + 1]):
+        other = state.islands.body[j]
+        thickness = 0.5 * (state.body_surface[body].y + state.body_surface[other].y)
         thickest = ti.max(thickest, thickness)
         margin = thickness + state.soft.body_reach[body] + state.soft.body_reach[other]
         wanted = state.soft.body_touches_itself[body] == 1
         if other != body:
-            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
+            their_lower, their_upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
             wanted = may_touch(state, body, other) and boxes_overlap(
                 lower - margin, upper + margin, their_lower, their_upper
             )
@@ -157,78 +165,85 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
 
 @ti.func
 def has_contact_pairs(state: ti.template(), island):
-    """Whether anything in an island may touch a body (1)."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    return int(last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1)
+    """1 if a body of an island can touch another, or itself."""
+    first, last = state.islands.first[island], state.islands.first[island + 1]
+    return int(last - first > 1 or state.soft.body_touches_itself[state.islands.body[first]] == 1)
 
 
 @ti.func
-def is_outdated(state: ti.template(), island, given, h):
-    """Whether a body of an island may be farther than it was searched for after another substep (1).
+def is_outdated(state: ti.template(), island, impact_speed, h):
+    """1 if a body of an island can leave its margin in the next substep. Exploding bodies are ignored, so
+    that they cause no searches of others.
 
-    What explodes does not count, or others would be searched again because of it.
     Args:
-        given: speed that its bodies may get from others [m/s].
+        impact_speed: speed that its bodies can gain from impacts [m/s].
         h: substep [s].
     """
     outdated, farthest, nearest_lost = 0, ti.cast(0.0, ti.f32), ti.cast(NO_CONTACT, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
-        if state.contact.is_exploding[body] == 0:
-            speed = ti.max(given, state.contact.body_speed_beside[body])
-            gone = state.soft.body_gone[body] + h * speed
-            farthest = ti.max(farthest, gone)
-            nearest_lost = ti.min(nearest_lost, state.soft.body_lost[body] - gone)
-            if not (gone <= state.soft.body_reach[body]):
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
+        if state.islands.is_exploding[body] == 0:
+            speed = ti.max(impact_speed, state.islands.body_speed_beside[body])
+            travelled = state.soft.body_gone[body] + h * speed
+            farthest = ti.max(farthest, travelled)
+            nearest_lost = ti.min(nearest_lost, state.soft.body_lost[body] - travelled)
+            if not (travelled <= state.soft.body_reach[body]):
                 outdated = 1
     return outdated | int(nearest_lost < farthest)
 
 
 @ti.real_func
-def begin_search(state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32):
-    """Forget (1) the candidates of a body, and find the boxes that `search_body` looks at.
+def begin_search(
+    state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32
+):
+    """Clear the candidates of a body if `forgets` is 1, and update the boxes and the margin for
+    `search_body`.
 
     Args:
-        given: speed that it may get from others [m/s].
+        impact_speed: speed that it can gain from impacts [m/s].
         h, left: substep, and time until the end of the step [s].
     """
     if forgets == 1:
-        forget_candidates(state, body)
-    find_box(state, body)
-    speed, edge = state.contact.body_speed_beside[body], state.soft.body_surface[body].z
-    speed *= 1.0 - state.contact.is_exploding[body]
-    way = ti.min(ti.max(FORESIGHT * left * speed, SHORTEST * edge), LONGEST * edge)
-    state.soft.body_reach[body] = ti.max(way, h * speed) + h * given
+        clear_candidates(state, body)
+    update_boxes(state, body)
+    speed, edge = state.islands.body_speed_beside[body], state.body_surface[body].z
+    speed *= 1.0 - state.islands.is_exploding[body]
+    reach = ti.min(ti.max(SEARCH_MARGIN * left * speed, SHORTEST * edge), LONGEST * edge)
+    state.soft.body_reach[body] = ti.max(reach, h * speed) + h * impact_speed
     state.soft.body_gone[body] = 0.0
     state.soft.body_lost[body] = NO_CONTACT
 
 
 @ti.real_func
-def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
-    """Note how far a body is from where it was searched, beside the way [m] that its island `shared`.
+def update_displacement(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
+    """Update the distance that each vertex has travelled since the last search, minus the displacement
+    `shared` by the island [m].
 
-    The length of its path would be much more: a pile of soft bodies is never quite still.
+    This is the distance between two positions, not the length of the path, which grows even in a heap at
+    rest.
     """
     particles = state.body_particles[body]
     farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0] & ROW_BITS
     while first < particles[1]:
-        count, gone = particles[1] - first, ti.Vector.zero(ti.f32, LANES)
+        count, travelled = particles[1] - first, ti.Vector.zero(ti.f32, LANES)
         for lane in range(LANES):
-            way = state.particle_position[first + lane] - state.soft.searched_position[first + lane] - shared
-            gone[lane] = ti.select(lane < count, way.norm(), 0.0)
+            displacement = (
+                state.particle_position[first + lane] - state.soft.searched_position[first + lane] - shared
+            )
+            travelled[lane] = ti.select(lane < count, displacement.norm(), 0.0)
         if count >= LANES:
             for lane in range(LANES):
-                state.soft.particle_gone[first + lane] = gone[lane]
+                state.soft.particle_gone[first + lane] = travelled[lane]
         else:
             lane = 0
             while lane < count:
-                state.soft.particle_gone[first + lane] = gone[lane]
+                state.soft.particle_gone[first + lane] = travelled[lane]
                 lane = row_behind(lane)
-        farthest = ti.max(farthest, gone)
+        farthest = ti.max(farthest, travelled)
         first = (first + LANES) & ROW_BITS  # as `row_behind`, block by block
     state.soft.body_gone[body] = farthest.max()
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-            way = (state.particle_position[p] - state.soft.searched_position[p] - shared).norm()
-            state.soft.particle_gone[p] = way
-            state.soft.body_gone[body] = ti.max(state.soft.body_gone[body], way)
+            displacement = (state.particle_position[p] - state.soft.searched_position[p] - shared).norm()
+            state.soft.particle_gone[p] = displacement
+            state.soft.body_gone[body] = ti.max(state.soft.body_gone[body], displacement)

@@ -1,19 +1,22 @@
-"""Candidates: the triangles that each vertex is near, until bodies have moved too far."""
+"""Candidates: the triangles near each vertex, which stay valid until bodies have moved too far.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.contact.fields import FOUND, NO_CONTACT, SLOTS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 SHORTEST, LONGEST = 0.1, 0.3
-"""Mean edges: for which way of a body's fastest vertex a search holds, at least and at most."""
+"""Smallest and largest margin of a search, in mean edges."""
 
 
 @ti.real_func
-def forget_candidates(state: ti.template(), body: ti.i32):
-    """Drop the candidates of a body's vertices, but for what its search needs to go on with their contacts.
+def clear_candidates(state: ti.template(), body: ti.i32):
+    """Clear the candidates of a body's vertices. Store the impulses of its contacts for the next search.
 
-    A search that began without the impulses of the last substep would let all sag a little, once a step, and
-    a heap would never cease to tremble.
+    Each search restarts from these impulses. Without them, bodies would sag a little once a step, and a heap
+    would never come to rest.
     """
     outer = state.touching.body_outer[body]
     vertex = outer[0]
@@ -34,7 +37,7 @@ def forget_candidates(state: ti.template(), body: ti.i32):
 
 @ti.func
 def _farthest_found(soft: ti.template(), k):
-    """Row of what is farthest of all that was found for a vertex."""
+    """Row of the farthest triangle found for a vertex."""
     farthest = k * FOUND
     row = farthest + 1
     while row < k * FOUND + soft.found_count[k]:
@@ -45,10 +48,10 @@ def _farthest_found(soft: ti.template(), k):
 
 
 @ti.func
-def keep(soft: ti.template(), k, triangle, distance):
-    """Put a triangle among the nearest of a vertex.
+def insert_candidate(soft: ti.template(), k, triangle, distance):
+    """Insert a triangle into the list of the nearest to a vertex.
 
-    Returns: the distance of the one that found no place [m].
+    Returns: the distance of the one that did not fit [m].
     """
     row, lost = k * FOUND + soft.found_count[k], ti.cast(NO_CONTACT, ti.f32)
     if soft.found_count[k] == FOUND:
@@ -63,22 +66,23 @@ def keep(soft: ti.template(), k, triangle, distance):
 
 
 @ti.func
-def note_lost(state: ti.template(), body, distance, thickness):
-    """Note that something `distance` [m] from a vertex of a body found no room.
+def record_lost(state: ti.template(), body, distance, thickness):
+    """Record that a triangle `distance` [m] from a vertex of a body did not fit into its list.
 
-    What touches at `thickness` [m] need not be looked for again before that is used up.
+    Bodies touch at `thickness` [m]. A new search is not needed before the rest of the distance is used up.
     """
-    way = ti.max(distance - thickness, 2.0 * SHORTEST * state.soft.body_surface[body].z)
-    state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], way)
+    allowance = ti.max(distance - thickness, 2.0 * SHORTEST * state.body_surface[body].z)
+    state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], allowance)
 
 
 @ti.func
 def list_candidates(state: ti.template(), body, thickness):
-    """Make candidates of what was found for the vertices of a body, which go on with their contacts.
+    """Convert the triangles found for the vertices of a body to candidates, with the impulses of their
+    contacts.
 
-    Where that is more than there is room for, those that found most give up what is farthest.
+    If they exceed the body's slots, the vertices with the most drop their farthest.
     Args:
-        thickness: the greatest at which it touches another body [m].
+        thickness: largest thickness at which the body touches another [m].
     """
     outer = state.touching.body_outer[body]
     total, vertex = 0, outer[0]
@@ -90,7 +94,7 @@ def list_candidates(state: ti.template(), body, thickness):
     for k in range(outer[0], outer[1]):
         while is_too_much and state.soft.found_count[k] > SLOTS:
             farthest, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
-            note_lost(state, body, state.soft.found_distance[farthest], thickness)
+            record_lost(state, body, state.soft.found_distance[farthest], thickness)
             state.soft.found_triangle[farthest] = state.soft.found_triangle[last]
             state.soft.found_distance[farthest] = state.soft.found_distance[last]
             state.soft.found_count[k] = state.soft.found_count[k] - 1
@@ -100,7 +104,7 @@ def list_candidates(state: ti.template(), body, thickness):
             triangle = state.soft.found_triangle[row]
             corners = state.touching.triangle_vertices[triangle]
             other = state.particle_body[corners[0]]
-            mutual = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+            mutual = 0.5 * (state.body_surface[body].y + state.body_surface[other].y)
             state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])
             state.soft.slot_triangle[slot] = triangle
             state.soft.slot_spare[slot] = state.soft.found_distance[row] - mutual

@@ -1,8 +1,11 @@
-"""Particles of one body against the colliders, in one thread."""
+"""Collide the particles of one body with the colliders, in one thread.
+
+Groups of fields: reads hull; writes colliders.
+"""
 
 from taichi_soft.contact.distances.distance import signed_distance
-from taichi_soft.contact.distances.kinds import ShapeKind
-from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
+from taichi_soft.contact.distances.shape_kind import ShapeKind
+from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.contact.kernels.restitution import resolved_velocity
@@ -10,39 +13,58 @@ from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-MOST_TOUCHES = 4
-"""Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
+MAX_TOUCHES = 4
+"""Colliders that one particle can touch in turn within a substep; then it stops."""
 
 
-DEEP = 2.0
-"""Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
-inside of it are looked at as well: a blow drives them through those that have stopped."""
+INNER_CHECK_PATH = 2.0
+"""Path of a body's fastest particle in the rest of the step, in mean edges, above which inner particles are
+checked too. Hard impacts drive them past outer particles that were stopped."""
 
-UNSEEN = 1e30
-"""Clearance of particles inside of a body, where it is slow [m]."""
+UNCHECKED = 1e30
+"""Clearance [m] of inner particles that need no check."""
 
 
 @ti.func
-def in_frame(contact: ti.template(), c, x, time):
-    """A point in the frame that a collider has `time` [s] after the start of the step."""
-    position = contact.collider_position[c] + contact.collider_velocity[c] * time
-    return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
+def set_travelled(state: ti.template(), body, travelled):
+    """Store the distance that a body has travelled since near colliders were listed [m]."""
+    state.colliders.gone[body] = travelled
+
+
+@ti.func
+def react_on_collider(state: ti.template(), row, arm, impulse):
+    """Apply the opposite of a particle's impulse to a collider.
+
+    Args:
+        row: that of the body and the collider.
+        arm: from the collider's position to the particle [m].
+    """
+    state.colliders.impulse[row] = state.colliders.impulse[row] - impulse
+    state.colliders.angular_impulse[row] = state.colliders.angular_impulse[row] - arm.cross(impulse)
+
+
+@ti.func
+def in_frame(colliders: ti.template(), c, x, time):
+    """A point in the frame of a collider `time` [s] after the start of the step."""
+    position = colliders.position[c] + colliders.velocity[c] * time
+    return turned_back(spun(colliders.rotation[c], colliders.spin[c] * time), x - position)
 
 
 @ti.func
 def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
-    """Lower the clearance of particles to that from one collider, less what it may come nearer [m].
+    """Reduce the clearance of particles to that from one collider, minus the distance it can approach [m].
 
     Args:
-        first, end: rows of outer particles where `outer_only` is 1, otherwise particles.
+        first, end: rows of outer particles if `outer_only` is 1, otherwise particles.
+        since, left: time since the start of the step, and until its end [s].
     """
-    contact = state.contact
-    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
-    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
-    position = contact.collider_position[c] + contact.collider_velocity[c] * since
-    rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
-    margin = contact.collider_surface[c].z + contact.collider_speed[c] * left
-    # Most bodies are near the floor, a plane: its distance takes a few instructions.
+    colliders = state.colliders
+    kind, parameters = colliders.kind[c], colliders.parameters[c]
+    resolution, offset = colliders.resolution[c], colliders.offset[c]
+    position = colliders.position[c] + colliders.velocity[c] * since
+    rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
+    margin = colliders.surface[c].z + colliders.speed[c] * left
+    # Fast path for planes: most bodies are near the floor only.
     plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
     is_plane = kind == ShapeKind.PLANE
     for k in range(first, end):
@@ -53,24 +75,24 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
         distance = plane.dot(beside)
         if not is_plane:
             x = turned_back(rotation, beside)
-            distance, _ = signed_distance(contact.samples, kind, parameters, resolution, offset, x)
-        contact.particle_clearance[p] = ti.min(contact.particle_clearance[p], distance - margin)
+            distance, _ = signed_distance(colliders.samples, kind, parameters, resolution, offset, x)
+        colliders.particle_clearance[p] = ti.min(colliders.particle_clearance[p], distance - margin)
 
 
 @ti.func
-def _stays_clear(contact: ti.template(), c, lower, upper, since, left):
-    """True if a collider keeps away from a box until the end of the step.
+def _stays_clear(colliders: ti.template(), c, lower, upper, since, left):
+    """True if a collider stays clear of a box until the end of the step.
 
-    Also for planes, whose own boxes have no end. No distance function returns more than the distance.
+    This also works for planes, whose own boxes are infinite. Distance functions are lower bounds.
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
-    distance = distance_from(contact, c, in_frame(contact, c, center, since))
-    return distance - contact.collider_speed[c] * left > half_diagonal
+    distance = distance_from(colliders, c, in_frame(colliders, c, center, since))
+    return distance - colliders.speed[c] * left > half_diagonal
 
 
 @ti.real_func
 def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
-    """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
+    """List the colliders within `reach` [m] of a body's particles, and each particle's clearance from them.
 
     Args:
         since, left: time since the start of the step, and until its end [s].
@@ -81,29 +103,29 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.touching.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
-    is_deep = reach > DEEP * state.body_edge[body]
+    is_deep = reach > INNER_CHECK_PATH * state.body_edge[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
             x = state.particle_position[p]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
-    row = body * state.contact.capacity.colliders
-    mine = state.contact.body_filter[body]
+    row = body * state.colliders.capacity.colliders
+    mine = state.colliders.body_filter[body]
     count = 0
-    for c in range(state.contact.collider_count[None]):
-        theirs = state.contact.collider_filter[c]
+    for c in range(state.colliders.count[None]):
+        theirs = state.colliders.filter[c]
         wanted = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
-        if state.contact.collider_kind[c] != NO_COLLIDER and wanted:
-            low, high = state.contact.collider_lower[c], state.contact.collider_upper[c]
+        if state.colliders.kind[c] != NO_COLLIDER and wanted:
+            low, high = state.colliders.lower[c], state.colliders.upper[c]
             apart = 0
             for i in ti.static(range(3)):
                 apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
-            if apart == 0 and not _stays_clear(state.contact, c, lower, upper, since, left):
-                state.contact.near[row + count] = c
+            if apart == 0 and not _stays_clear(state.colliders, c, lower, upper, since, left):
+                state.colliders.near[row + count] = c
                 count += 1
-    state.contact.near_count[body] = count
-    state.contact.reach[body] = reach
-    state.contact.gone[body] = 0.0
+    state.colliders.near_count[body] = count
+    state.colliders.reach[body] = reach
+    state.colliders.gone[body] = 0.0
     if count > 0:
         _measure_clearances(state, body, row, count, reach, since, left, is_deep)
 
@@ -112,113 +134,117 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
     """Store the clearance of each particle from the first `count` near colliders, 1 or more.
 
-    Planes stop all particles: inner ones of a body that folds would otherwise go below the floor.
+    Planes stop all particles: otherwise inner particles of a body that folds could go below the floor.
     """
-    contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
+    colliders, outer, particles = state.colliders, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        contact.particle_clearance[p] = UNSEEN
-    touches_by_points = False  # of its hull, and by no particle
+        colliders.particle_clearance[p] = UNCHECKED
+    touches_by_points = False  # of its hull, not by particles
     if ti.static(state.capacity.contact.hull):
         touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
     if is_deep and not touches_by_points:
         for i in range(count):
-            if contact.collider_kind[contact.near[row + i]] != ShapeKind.PLANE:
-                _measure_clearance(state, contact.near[row + i], particles[0], particles[1], 0, since, left)
+            if colliders.kind[colliders.near[row + i]] != ShapeKind.PLANE:
+                _measure_clearance(state, colliders.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
-            if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
-                contact.particle_clearance[p] = UNSEEN
+            if colliders.particle_clearance[p] < 0.0:  # it entered unchecked: do not eject it at once
+                colliders.particle_clearance[p] = UNCHECKED
     for k in range(outer[0], outer[1]):
-        contact.particle_clearance[state.touching.outer_particle[k]] = reach
+        colliders.particle_clearance[state.touching.outer_particle[k]] = reach
     for i in range(count):
-        c = contact.near[row + i]
-        if contact.collider_kind[c] == ShapeKind.PLANE and not touches_by_points:
+        c = colliders.near[row + i]
+        if colliders.kind[c] == ShapeKind.PLANE and not touches_by_points:
             _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
         else:
             _measure_clearance(state, c, outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
-def forget_contacts(state: ti.template(), body: ti.i32):
-    """Start a step: no impulses yet, and where there is any collider, nobody knows which are near."""
-    row = body * state.contact.capacity.colliders
-    while row < (body + 1) * state.contact.capacity.colliders:
-        state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
+def clear_contacts(state: ti.template(), body: ti.i32):
+    """Clear the impulses of the last step and the list of near colliders."""
+    row = body * state.colliders.capacity.colliders
+    while row < (body + 1) * state.colliders.capacity.colliders:
+        state.colliders.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.colliders.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.colliders.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.colliders.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
         row = row_behind(row)
-    state.contact.near_count[body] = 0
-    state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
-    state.contact.gone[body] = 0.0
+    state.colliders.near_count[body] = 0
+    state.colliders.reach[body] = ti.select(state.colliders.count[None] == 0, 1e30, -1.0)
+    state.colliders.gone[body] = 0.0
 
 
 @ti.func
 def collide_particle(state: ti.template(), body, p, h, since):
-    """Collide a particle on the way that its velocity has moved it in a substep.
+    """Collide a particle on the path that its velocity has just moved it along.
 
-    A particle that touches nothing is not written: the result does not depend on which colliders are listed.
+    A particle that touches nothing is not written, so the result does not depend on which colliders are
+    listed.
     Args:
         h: substep [s].
         since: time from the start of the fixed step to that of the substep [s].
     """
     v = state.particle_velocity[p]
-    way = h * v
-    x = state.particle_position[p] - way
-    row = body * state.contact.capacity.colliders
-    left = ti.cast(1.0, ti.f32)  # part of the substep still to go
+    path = h * v
+    x = state.particle_position[p] - path
+    row = body * state.colliders.capacity.colliders
+    left = ti.cast(1.0, ti.f32)  # fraction of the substep that remains
     touches, is_open = 0, 1
     while is_open == 1:
-        earliest, which = ti.cast(NEVER, ti.f32), -1
+        earliest, which = ti.cast(NO_TOUCH, ti.f32), -1
         distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
-        # After a touch the path lies in the surface to rounding, which is no second touch.
+        # After a touch, the path lies in the surface up to rounding: that is no second touch.
         slack = ti.select(touches == 0, 0.0, TOUCHING)
-        for k in range(state.contact.near_count[body]):
-            c = state.contact.near[row + k]
-            a = in_frame(state.contact, c, x, since + (1.0 - left) * h)
-            b = in_frame(state.contact, c, x + way, since + h)
-            part, near, far, n = first_touch(state.contact, c, a, b, slack)
+        for k in range(state.colliders.near_count[body]):
+            c = state.colliders.near[row + k]
+            a = in_frame(state.colliders, c, x, since + (1.0 - left) * h)
+            b = in_frame(state.colliders, c, x + path, since + h)
+            part, near, far, n = first_touch(state.colliders, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
         if which < 0:
             is_open = 0
         else:
-            c = state.contact.near[row + which]
+            c = state.colliders.near[row + which]
             after = since + h
-            centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
-            spin = state.contact.collider_spin[c]
-            n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
-            place = x + way - beyond * n
-            surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
-            surface = state.contact.collider_surface[c]
+            centre = state.colliders.position[c] + state.colliders.velocity[c] * after
+            spin = state.colliders.spin[c]
+            n = turned(spun(state.colliders.rotation[c], spin * after), normal)
+            place = x + path - beyond * n
+            surface_velocity = state.colliders.velocity[c] + spin.cross(place - centre)
+            surface = state.colliders.surface[c]
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
-            push = v_out - v
+            change = v_out - v
             left = left * (1.0 - earliest)
             rest = ti.select(rests_at(distance), distance, 0.5 * TOUCHING)
             lift = ti.max(rest - distance, 0.0)
-            before = x + way
-            x += earliest * way + lift * n
-            # What contact takes from the velocity it takes from the way left.
-            way = (1.0 - earliest) * way + (rest - beyond - lift) * n + left * h * (push - n * push.dot(n))
+            before = x + path
+            x += earliest * path + lift * n
+            # Contact shortens the remaining path as it reduces the velocity.
+            path = (
+                (1.0 - earliest) * path + (rest - beyond - lift) * n + left * h * (change - n * change.dot(n))
+            )
             touches += 1
-            if touches == MOST_TOUCHES:
-                way = ti.Vector.zero(ti.f32, 3)
+            if touches == MAX_TOUCHES:
+                path = ti.Vector.zero(ti.f32, 3)
                 is_open = 0
-            end = x + way
+            end = x + path
             mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
-            impulse = -mass * push
+            impulse = -mass * change
             if surface.y >= 0.0:
                 add_normal_impulse(
-                    state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
+                    state.colliders, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
                 )
-            # With what the shift of the path, which v takes no part in, does to the angular momentum.
+            # The path also shifts without a change of v; that changes the angular momentum.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
-            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
-            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
-            state.contact.particle_touches[p] = 1
+            state.colliders.impulse[row + c] = state.colliders.impulse[row + c] + impulse
+            moment = state.colliders.angular_impulse[row + c] + angular_impulse
+            state.colliders.angular_impulse[row + c] = moment
+            state.particle_touches[p] = 1
             if ti.static(state.capacity.implicit):
                 if state.particle_contact[p] == 0:
                     state.particle_contact[p] = c + 1
             v = v_out
     if touches > 0:
-        state.particle_position[p] = x + way
+        state.particle_position[p] = x + path
         state.particle_velocity[p] = v

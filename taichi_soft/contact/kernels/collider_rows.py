@@ -1,10 +1,13 @@
-"""What the caller says of colliders, into their fields."""
+"""Write the callers' colliders to their fields, and read impulses.
+
+Groups of fields: writes colliders.
+"""
 
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 20
-"""Position, quaternion, velocity, spin, both corners of the box round the way, highest speed."""
+"""Position, quaternion, velocity, angular velocity, both corners of the swept box, highest speed."""
 
 
 @ti.func
@@ -13,40 +16,40 @@ def _vector(rows: ti.template(), c, at):
 
 
 @ti.kernel
-def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Where all colliders are and how they move, rows (n, `MOTION_WIDTH`)."""
+def write_collider_motion(colliders: ti.template(), rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Write poses and motion of all colliders from rows (n, `MOTION_WIDTH`)."""
     c = 0
     while c < rows.shape[0]:
-        contact.collider_position[c] = _vector(rows, c, 0)
-        contact.collider_rotation[c] = ti.Vector([rows[c, 3], rows[c, 4], rows[c, 5], rows[c, 6]])
-        contact.collider_velocity[c] = _vector(rows, c, 7)
-        contact.collider_spin[c] = _vector(rows, c, 10)
-        contact.collider_lower[c] = _vector(rows, c, 13)
-        contact.collider_upper[c] = _vector(rows, c, 16)
-        contact.collider_speed[c] = rows[c, 19]
+        colliders.position[c] = _vector(rows, c, 0)
+        colliders.rotation[c] = ti.Vector([rows[c, 3], rows[c, 4], rows[c, 5], rows[c, 6]])
+        colliders.velocity[c] = _vector(rows, c, 7)
+        colliders.spin[c] = _vector(rows, c, 10)
+        colliders.lower[c] = _vector(rows, c, 13)
+        colliders.upper[c] = _vector(rows, c, 16)
+        colliders.speed[c] = rows[c, 19]
         c = row_behind(c)
 
 
 @ti.kernel
-def write_samples(contact: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """The grid of one solid, from row `begin` on."""
+def write_samples(colliders: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """Write the grid of one solid from row `begin` on."""
     for i in range(samples.shape[0]):
-        contact.samples[begin + i] = samples[i]
+        colliders.samples[begin + i] = samples[i]
 
 
 @ti.kernel
 def sum_collider_impulses(
-    contact: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
+    colliders: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Impulse and angular impulse of the last step on each collider by all bodies, (n, 6) [N s, N m s]."""
+    """Sum the impulses of all bodies on each collider in the last step, (n, 6) [N s, N m s]."""
     ti.loop_config(serialize=True)
     for c in range(out.shape[0]):
         linear, angular = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
         body = 0
         while body < body_count:
-            row = body * contact.capacity.colliders + c
-            linear += contact.impulse[row]
-            angular += contact.angular_impulse[row]
+            row = body * colliders.capacity.colliders + c
+            linear += colliders.impulse[row]
+            angular += colliders.angular_impulse[row]
             body = row_behind(body)
         for i in ti.static(range(3)):
             out[c, i] = linear[i]
@@ -54,11 +57,11 @@ def sum_collider_impulses(
 
 
 @ti.kernel
-def forget_collider(contact: ti.template(), body_count: ti.i32, c: ti.i32):
-    """Clear what bodies gave a collider and how fast they may leave it: its row is another collider's now."""
+def forget_collider(colliders: ti.template(), body_count: ti.i32, c: ti.i32):
+    """Clear the impulses and rebound speeds of a row before another collider uses it."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
-        row = body * contact.capacity.colliders + c
-        contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
-        contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
-        contact.rebound[row] = 0.0
+        row = body * colliders.capacity.colliders + c
+        colliders.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        colliders.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        colliders.rebound[row] = 0.0

@@ -1,16 +1,18 @@
-"""Signed distance of a closed mesh on the nodes of a grid, in cells: node (i, j, k) is at (i, j, k)."""
+"""Signed distance of a closed mesh on the nodes of a grid. Unit: cells; node (i, j, k) is at (i, j, k)."""
 
-from taichi_soft.contact.distances.triangle import nearest_on_triangle
+from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 STEPS = 4096
-"""To a cell, of the lattice that seen along z the vertices are moved to. In whole numbers a line through a
-node passes every edge on one side, the same for both triangles, so no crossing is lost or counted twice."""
+"""Lattice steps per cell, to which x and y of the vertices are rounded. In integers, a line along z through a
+node passes every edge on the same side for both its triangles, so that each crossing counts exactly once."""
 
 
 @ti.func
 def _side(ax, ay, bx, by, x, y):
-    """Twice the area of a, b and (x, y); where it is 0, whether a hair to the right of them is left of ab."""
+    """Twice the area of a, b and (x, y), and whether (x, y) is left of ab. If the area is 0, a point slightly
+    to the right decides.
+    """
     area = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     is_left = area > 0
     if area == 0:
@@ -24,7 +26,7 @@ def accumulate_crossings(
     heights: ti.types.ndarray(dtype=ti.f64, ndim=2),
     crossings: ti.types.ndarray(dtype=ti.i32, ndim=3),
 ):
-    """Count on each node how often the surface is crossed between it and the next one up.
+    """Count for each node how often the surface crosses the segment to the next node up.
 
     Args:
         lattice: x and y of the corners of each triangle in steps, (f, 3, 2).
@@ -42,19 +44,19 @@ def accumulate_crossings(
                 area_a, left_a = _side(bx, by, cx, cy, x, y)
                 area_b, left_b = _side(cx, cy, ax, ay, x, y)
                 area_c, left_c = _side(ax, ay, bx, by, x, y)
-                # A triangle that is one point from here has no inside; its neighbours count the crossing.
+                # A triangle seen edge-on has no area; its neighbours count the crossing.
                 is_seen = area_a + area_b + area_c != 0
                 if is_seen and left_a == left_b and left_b == left_c:
                     a, b, c = ti.cast(area_a, ti.f64), ti.cast(area_b, ti.f64), ti.cast(area_c, ti.f64)
                     z = (a * heights[f, 0] + b * heights[f, 1] + c * heights[f, 2]) / (a + b + c)
                     below = ti.cast(ti.ceil(z), ti.i32) - 1
-                    # Whole numbers add up to the same in every order.
+                    # The sum of integers does not depend on their order.
                     ti.atomic_add(crossings[i, j, below], ti.select(left_a, 1, -1))
 
 
 @ti.func
 def _box_gap_squared(boxes: ti.template(), node, p):
-    """Squared distance of p from a box of the tree, 0 inside."""
+    """Squared distance of p from a box of the tree; 0 inside."""
     squared = 0.0
     for axis in ti.static(range(3)):
         gap = ti.max(boxes[node, axis] - p[axis], p[axis] - boxes[node, 3 + axis], 0.0)
@@ -69,7 +71,7 @@ def _corner(corners: ti.template(), f, k):
 
 @ti.func
 def _nearest_squared(corners: ti.template(), boxes: ti.template(), p, reach_squared):
-    """Squared distance of p from the nearest triangle that is nearer than the reach, or that."""
+    """Squared distance of p from the nearest triangle, or `reach_squared` if none is nearer."""
     leaves = boxes.shape[0] // 2
     nearest = reach_squared
     node = 1
@@ -82,7 +84,7 @@ def _nearest_squared(corners: ti.template(), boxes: ti.template(), p, reach_squa
                 f = node - leaves
                 a, b, c = _corner(corners, f, 0), _corner(corners, f, 1), _corner(corners, f, 2)
                 nearest = ti.min(nearest, (p - nearest_on_triangle(p, a, b, c)).norm_sqr())
-            # On to the sibling of the nearest ancestor, itself included, that is a left child.
+            # Continue with the sibling of the nearest left child among this node and its ancestors.
             while node % 2 == 1:
                 node = node // 2
             if node > 0:
@@ -97,12 +99,12 @@ def compute_grid_distances(
     windings: ti.types.ndarray(dtype=ti.i32, ndim=3),
     distances: ti.types.ndarray(dtype=ti.f32, ndim=3),
 ):
-    """Exact distances of all nodes from the nearest triangle, negative inside.
+    """Compute exact distances of all nodes from the nearest triangle, negative inside.
 
     Args:
-        corners: of the triangles, (f, 3, 3).
-        boxes: of a binary tree over them, (2 n, 6), see `triangle_tree`.
-        windings: crossings; receives how often the surface winds round each node.
+        corners: corners of the triangles, (f, 3, 3).
+        boxes: boxes of a binary tree over them, (2 n, 6), see `triangle_tree`.
+        windings: crossings; receives the winding number of the surface around each node.
         distances: (nx, ny, nz).
     """
     for row in range(distances.shape[0] * distances.shape[1]):
@@ -116,4 +118,4 @@ def compute_grid_distances(
             p = ti.Vector([ti.cast(i, ti.f32), ti.cast(j, ti.f32), ti.cast(k, ti.f32)])
             distance = ti.sqrt(_nearest_squared(corners, boxes, p, reach * reach))
             distances[i, j, k] = ti.select(winding > 0, -distance, distance)
-            reach = distance + 1.001  # the next node is one cell on
+            reach = distance + 1.001  # the next node is one cell away

@@ -1,14 +1,16 @@
-"""Impulses between points of hulls and triangles between such: what `contact_solver` does for particles.
+"""Impulses between hull points and triangles of hull points, as `contact_solver` does for particles.
 
-A particle is a point that carries itself. Corners of one triangle may hang on the same particles: an impulse
-at one moves the others too, by `HullFields.slot_mobility`.
+A particle is a point that carries itself. Corners of one triangle can share carriers: an impulse at one then
+also moves the others, by `HullFields.slot_mobility`.
+
+Groups of fields: writes hull, soft.
 """
 
-from taichi_soft.contact.kernels.hull import (
+from taichi_soft.contact.kernels.hull_points import (
+    apply_point_impulse,
     inv_mass_at,
     mark_touched,
     motion_of,
-    push_point,
     shared_mobility,
     shift_point,
 )
@@ -17,8 +19,8 @@ from taichi_soft.core.runtime import ti
 
 
 @ti.func
-def note_mobility(state: ti.template(), slot, p, corners):
-    """Of a contact: inverse mass of its point, and what impulses at the corners make of each other."""
+def precompute_mobility(state: ti.template(), slot, p, corners):
+    """Compute the inverse mass of a contact's point and the mobilities between its triangle's corners."""
     state.soft.slot_inv_mass[slot][0] = inv_mass_at(state, p)
     for i in ti.static(range(3)):
         for k in ti.static(range(i + 1)):
@@ -29,7 +31,7 @@ def note_mobility(state: ti.template(), slot, p, corners):
 
 @ti.func
 def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
-    """As `contact_solver` solves one contact. Returns: whether the two are pressed together (1)."""
+    """Solve one contact, as `contact_solver` does. Returns: 1 if the two are pressed together."""
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
     m, mobility = soft.slot_inv_mass[slot][0], state.hull.slot_mobility[slot]
@@ -43,20 +45,20 @@ def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, fr
     impulse, corner_impulses = ti.Vector.zero(ti.f32, 3), ti.Matrix.zero(ti.f32, 3, 3)
 
     normal_impulse = soft.slot_normal_impulse[slot]
-    push = normal_impulse
+    normal_change = normal_impulse
     if is_first == 0:
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
         approach = v.dot(normal) - weights.dot(corner_v @ normal)
         total = m + weights.dot(mobility @ weights)
         wanted_impulse = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
-        push = wanted_impulse - normal_impulse
+        normal_change = wanted_impulse - normal_impulse
         normal_impulse = wanted_impulse
         soft.slot_normal_impulse[slot] = normal_impulse
-    if is_finite(push * normal):
-        given = -push * weights.outer_product(normal)
-        impulse += push * normal
+    if is_finite(normal_change * normal):
+        given = -normal_change * weights.outer_product(normal)
+        impulse += normal_change * normal
         corner_impulses += given
-        v += m * push * normal
+        v += m * normal_change * normal
         corner_v += mobility @ given
 
     friction_impulse = soft.slot_friction_impulse[slot]
@@ -75,28 +77,28 @@ def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, fr
             impulse += change
             corner_impulses -= shares.outer_product(change) - (levers @ change).outer_product(face)
 
-    push_point(state, p, impulse)
+    apply_point_impulse(state, p, impulse)
     for i in ti.static(range(3)):
         on_corner = ti.Vector([corner_impulses[i, 0], corner_impulses[i, 1], corner_impulses[i, 2]])
-        push_point(state, corners[i], on_corner)
+        apply_point_impulse(state, corners[i], on_corner)
     return int(normal_impulse > 0.0)
 
 
 @ti.func
-def push_points_apart(state: ti.template(), p, corners, slot, way):
-    """Move apart what is too near by `way` [m], without giving it a velocity."""
+def separate_points(state: ti.template(), p, corners, slot, distance):
+    """Move a pair apart by `distance` [m], without changing velocities."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
     total = state.soft.slot_inv_mass[slot][0] + weights.dot(state.hull.slot_mobility[slot] @ weights)
     if total > 0.0:
-        impulse = way / total * normal
+        impulse = distance / total * normal
         shift_point(state, p, impulse)
         for i in ti.static(range(3)):
             shift_point(state, corners[i], -weights[i] * impulse)
 
 
 @ti.func
-def mark_points(state: ti.template(), p, corners):
-    """Note that something holds the carriers of a point and of a triangle's corners."""
+def mark_points_touched(state: ti.template(), p, corners):
+    """Mark the carriers of a point and of a triangle's corners as touched."""
     mark_touched(state, p)
     for i in ti.static(range(3)):
         mark_touched(state, corners[i])

@@ -1,9 +1,11 @@
-"""Bodies that were placed inside each other: moved apart before they touch.
+"""Move apart bodies that were placed inside each other, before they touch.
 
-Contact keeps a vertex on its side of a surface. Bodies placed inside each other would be held there for good.
-So each step first looks for bodies that the placed ones overlap. Bodies that overlap do not touch. The end of
-the step moves them apart as rigid bodies, at a limited speed. Their velocities stay as they are, except for
-the relative velocity with which they approach. Bodies that are clear of each other touch again.
+Contact keeps a vertex on its side of a surface, so bodies placed inside each other would stay there for good.
+Each step therefore first checks which bodies the newly placed ones overlap. Overlapping bodies do not touch.
+The end of the step moves them apart as rigid bodies, at a limited speed. Their velocities change only by the
+relative velocity of approach. As soon as they are clear of each other, they can touch again.
+
+Groups of fields: reads colliders, hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
@@ -11,7 +13,7 @@ from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.fields import MAX_PARTNERS, NO_COLLIDER
 from taichi_soft.contact.kernels.collide import in_frame
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import motion_of, place_points
+from taichi_soft.contact.kernels.hull_points import motion_of, place_points
 from taichi_soft.contact.kernels.vertex_grid import boxes_overlap
 from taichi_soft.contact.overlap import INSET
 from taichi_soft.control.kernels.joints import are_joined
@@ -20,28 +22,28 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 PARTING_RATE = 2.0
-"""Relative speed at which two bodies part [1/s], over the largest side of the smaller one."""
+"""Relative speed at which two bodies move apart, over the largest side of the smaller one [1/s]."""
 
 OUTSET = 0.5
-"""Thicknesses by which overlapping bodies must be clear of each other before they touch: then contact has
-next to nothing to push out."""
+"""Clearance, in thicknesses, at which overlapping bodies can touch again. Contact then has hardly any
+penetration to correct."""
 
-PULL = 0.05
-"""Part of the way to its middle by which a triangle's corners are drawn in to look for overlap."""
+INWARD_SHIFT = 0.05
+"""Fraction by which the corners of a triangle are moved towards its centre for the overlap test."""
 
-SAME_PLACE = 1e-3
-"""Distance of two centres, over the largest side, below which the slots choose the direction of parting."""
+MIN_CENTER_DISTANCE = 1e-3
+"""Distance of two centres, over the largest side, below which the slots choose the direction."""
 
 
 @ti.func
 def _is_joined_or_filtered(state: ti.template(), a, b):
-    """Whether two bodies may overlap by design (1)."""
+    """1 if two bodies can overlap by design."""
     return int(not may_touch(state, a, b)) | are_joined(state, a, b)
 
 
 @ti.func
 def _mobility(state: ti.template(), body):
-    """Inverse mass of a body that can move as a whole [1/kg]; 0 where it is pinned or does not move."""
+    """Inverse mass of a body that can move as a whole [1/kg]; 0 if it is pinned or cannot move."""
     particles = state.body_particles[body]
     mass, is_free, p = ti.cast(0.0, ti.f32), int(state.body_status[body] == ACTIVE), particles[0]
     while p < particles[1]:
@@ -53,10 +55,10 @@ def _mobility(state: ti.template(), body):
 
 @ti.func
 def _side_of_edge(p, q, a, b):
-    """The side of an edge from a to b on which the origin of a plane is: 1 or -1.
+    """Side of an edge from a to b on which the origin of a plane lies: 1 or -1.
 
-    Both triangles of an edge compute the same product, by the numbers `p` and `q` of its particles, and get
-    opposite answers. So a ray passes through one of the two, whatever the rounding.
+    Both triangles of an edge compute the same product, ordered by the numbers `p` and `q` of its particles,
+    with opposite signs. So a ray passes through exactly one of the two, whatever the rounding.
     """
     is_turned = p > q
     first, second = ti.select(is_turned, b, a), ti.select(is_turned, a, b)
@@ -66,7 +68,9 @@ def _side_of_edge(p, q, a, b):
 
 @ti.real_func
 def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
-    """Whether the surface of a body goes round a point (1): a ray leaves it more often than it enters."""
+    """1 if the surface of a body encloses a point: a ray from it leaves the surface more often than it
+    enters.
+    """
     right, up = ti.Vector([0.8164966, -0.5773503, 0.0]), ti.Vector([0.4082483, 0.5773503, -0.7071068])
     triangles, leaves = state.touching.body_triangles[body], 0
     t = triangles[0]
@@ -90,13 +94,13 @@ def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
 
 @ti.real_func
 def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f32) -> ti.i32:
-    """Whether what is `depth` [m] below the surface of a body, or above where negative, is in another (1).
+    """1 if a point `depth` [m] below the surface of a body (above if negative) is inside another.
 
-    Sheets and ropes have no inside: their particles themselves count.
+    Sheets and ropes have no inside: their particles are tested.
     """
     found = 0
     blocks, triangles = state.body_blocks[body], state.touching.body_triangles[body]
-    lower, upper = state.contact.body_lower[other], state.contact.body_upper[other]
+    lower, upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
     if state.body_blocks[other][0] < state.body_blocks[other][1]:
         if blocks[0] < blocks[1]:
             t = triangles[0]
@@ -110,7 +114,7 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
                 for i in range(4):
                     x = middle
                     if i < 3:
-                        x += (1.0 - PULL) * (state.particle_position[corners[i]] - (a + b + c) / 3.0)
+                        x += (1.0 - INWARD_SHIFT) * (state.particle_position[corners[i]] - (a + b + c) / 3.0)
                     if found == 0 and boxes_overlap(x, x, lower, upper):
                         found = _encloses(state, other, x)
                 t = row_behind(t)
@@ -127,10 +131,10 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
 
 @ti.func
 def _overlap(state: ti.template(), a, b):
-    """Whether two bodies overlap (1): by more than a little, or once they are being parted, at all."""
-    depth = INSET * ti.min(state.soft.body_surface[a].z, state.soft.body_surface[b].z)
-    if state.soft.overlap[a] == OVERLAPPING or state.soft.overlap[b] == OVERLAPPING:
-        depth = -OUTSET * 0.5 * (state.soft.body_surface[a].y + state.soft.body_surface[b].y)
+    """1 if two bodies overlap by more than `INSET`, or at all while they are being moved apart."""
+    depth = INSET * ti.min(state.body_surface[a].z, state.body_surface[b].z)
+    if state.body_overlap[a] == OVERLAPPING or state.body_overlap[b] == OVERLAPPING:
+        depth = -OUTSET * 0.5 * (state.body_surface[a].y + state.body_surface[b].y)
     found = _reaches_into(state, a, b, depth)
     if found == 0:
         found = _reaches_into(state, b, a, depth)
@@ -147,14 +151,14 @@ def _add_partner(soft: ti.template(), body, other):
 
 @ti.real_func
 def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
-    """Find the bodies that one which was just placed, or is being parted, overlaps."""
+    """Find the bodies that overlap a body that was just placed or is being moved apart."""
     mobility = _mobility(state, body)
-    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        other = state.contact.island_body[i]
-        is_new = other > body or (other < body and state.soft.overlap[other] == CLEAR)
+    lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        other = state.islands.body[i]
+        is_new = other > body or (other < body and state.body_overlap[other] == CLEAR)
         if is_new and _is_joined_or_filtered(state, body, other) == 0:
-            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
+            their_lower, their_upper = state.body_bounds_lower[other], state.body_bounds_upper[other]
             if boxes_overlap(lower, upper, their_lower, their_upper):
                 if mobility + _mobility(state, other) > 0.0 and _overlap(state, body, other) == 1:
                     _add_partner(state.soft, body, other)
@@ -164,30 +168,30 @@ def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
 @ti.real_func
 def find_overlaps(state: ti.template(), island: ti.i32):
     """Find the overlapping bodies of an island, before its step."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     placed, row = 0, first
     while row < last:
-        body = state.contact.island_body[row]
-        placed += int(state.soft.overlap[body] != CLEAR)
+        body = state.islands.body[row]
+        placed += int(state.body_overlap[body] != CLEAR)
         if state.soft.partner_count[body] != 0:
             state.soft.partner_count[body] = 0
         row = row_behind(row)
     if placed > 0:
         for i in range(first, last):
-            place_points(state, state.contact.island_body[i])
+            place_points(state, state.islands.body[i])
         for i in range(first, last):
-            if state.soft.overlap[state.contact.island_body[i]] != CLEAR:
-                _find_partners(state, island, state.contact.island_body[i])
+            if state.body_overlap[state.islands.body[i]] != CLEAR:
+                _find_partners(state, island, state.islands.body[i])
         for i in range(first, last):
-            body = state.contact.island_body[i]
-            if state.soft.overlap[body] != CLEAR:
+            body = state.islands.body[i]
+            if state.body_overlap[body] != CLEAR:
                 overlaps = state.soft.partner_count[body] > 0
-                state.soft.overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
+                state.body_overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
 
 
 @ti.func
 def are_parting(state: ti.template(), body, other):
-    """Whether two bodies overlap and do not touch yet (1). One with too many partners touches no body."""
+    """1 if two bodies overlap and cannot touch yet. A body with too many partners touches no other body."""
     count = state.soft.partner_count[body]
     found = int(ti.max(count, state.soft.partner_count[other]) > MAX_PARTNERS)
     for k in range(ti.min(count, MAX_PARTNERS)):
@@ -197,7 +201,7 @@ def are_parting(state: ti.template(), body, other):
 
 @ti.func
 def _measure(state: ti.template(), body):
-    """Write where the centre of a body is and was, its velocity, and its largest side."""
+    """Compute centre, displacement, velocity and largest side of a body."""
     particles, outer = state.body_particles[body], state.body_outer[body]
     x0 = state.particle_position[particles[0]]
     mass = ti.cast(0.0, ti.f32)
@@ -220,28 +224,30 @@ def _measure(state: ti.template(), body):
     state.soft.mobility[body] = _mobility(state, body)
     state.soft.parting_shift[body] = ti.Vector.zero(ti.f32, 3)
     state.soft.parting_kick[body] = ti.Vector.zero(ti.f32, 3)
-    state.contact.calm[body] = 0.0
+    state.body_calm_time[body] = 0.0
 
 
 @ti.func
-def _place_of_slot(body):
-    """A point of a square for each slot, no two alike: Roberts' sequence R2."""
+def _point_of_slot(body):
+    """Point of a unit square, different for each slot: Roberts' sequence R2."""
     u, v = 0.7548777 * body, 0.5698403 * body
     return ti.Vector([u - ti.floor(u), v - ti.floor(v), 0.0])
 
 
 @ti.func
 def _parting_direction(soft: ti.template(), a, b):
-    """From the centre of one body to that of another; of two at one place by their slots, level."""
+    """Direction from the centre of one body to that of the other. If the centres coincide, a horizontal
+    direction chosen by the slots.
+    """
     away = soft.center[a] - soft.center[b]
-    if away.norm() < SAME_PLACE * ti.min(soft.size[a], soft.size[b]):
-        away = _place_of_slot(a) - _place_of_slot(b)
+    if away.norm() < MIN_CENTER_DISTANCE * ti.min(soft.size[a], soft.size[b]):
+        away = _point_of_slot(a) - _point_of_slot(b)
     return away / ti.max(away.norm(), 1e-30)
 
 
 @ti.func
 def _part_pair(soft: ti.template(), a, b, gravity, dt):
-    """Add what one pair needs to the displacements and velocities of both. Momentum stays."""
+    """Add the displacements and velocity changes of a pair to those of its bodies. Momentum is conserved."""
     n = _parting_direction(soft, a, b)
     mine, total = soft.mobility[a], soft.mobility[a] + soft.mobility[b]
     share = mine / total
@@ -266,13 +272,13 @@ def _part_pair(soft: ti.template(), a, b, gravity, dt):
 def _shift_beside_colliders(
     state: ti.template(), body: ti.i32, shift: ti.math.vec3, dt: ti.f32
 ) -> ti.math.vec3:
-    """The part of a displacement [m] that brings no particle of a body deeper into a collider."""
+    """Reduce a displacement [m] so that it moves no particle of a body deeper into a collider."""
     s = shift
-    for c in range(state.contact.collider_count[None]):
-        mine, theirs = state.contact.body_filter[body], state.contact.collider_filter[c]
+    for c in range(state.colliders.count[None]):
+        mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
         touches = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
-        if touches and state.contact.collider_kind[c] != NO_COLLIDER:
-            rotation = spun(state.contact.collider_rotation[c], state.contact.collider_spin[c] * dt)
+        if touches and state.colliders.kind[c] != NO_COLLIDER:
+            rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * dt)
             for k in range(state.touching.body_outer[body][0], state.touching.body_outer[body][1]):
                 x, _ = motion_of(state, state.touching.outer_particle[k])
                 before, _ = _distance(state, c, x, dt)
@@ -285,14 +291,14 @@ def _shift_beside_colliders(
 def _distance(state: ti.template(), c, x, time):
     """Distance of a point from a collider's skin [m], and the normal in the collider's frame."""
     distance, normal = signed_distance(
-        state.contact.samples,
-        state.contact.collider_kind[c],
-        state.contact.collider_parameters[c],
-        state.contact.collider_resolution[c],
-        state.contact.collider_offset[c],
-        in_frame(state.contact, c, x, time),
+        state.colliders.samples,
+        state.colliders.kind[c],
+        state.colliders.parameters[c],
+        state.colliders.resolution[c],
+        state.colliders.offset[c],
+        in_frame(state.colliders, c, x, time),
     )
-    return distance - state.contact.collider_surface[c].z, normal
+    return distance - state.colliders.surface[c].z, normal
 
 
 @ti.real_func
@@ -310,28 +316,27 @@ def _move_body(state: ti.template(), body: ti.i32, dt: ti.f32):
 @ti.real_func
 def part_bodies(state: ti.template(), island: ti.i32, dt: ti.f32):
     """Move the overlapping bodies of an island apart, after its step of `dt` [s]."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     overlapping, row = 0, first
     while row < last:
-        overlapping += state.soft.partner_count[state.contact.island_body[row]]
+        overlapping += state.soft.partner_count[state.islands.body[row]]
         row = row_behind(row)
     if overlapping > 0:
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             if state.soft.partner_count[body] > 0:
                 _measure(state, body)
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             for k in range(ti.min(state.soft.partner_count[body], MAX_PARTNERS)):
                 other = state.soft.partner[body * MAX_PARTNERS + k]
                 if body < other:
                     _part_pair(state.soft, body, other, state.gravity[None], dt)
         for i in range(first, last):
-            _move_body(state, state.contact.island_body[i], dt)
+            _move_body(state, state.islands.body[i], dt)
 
 
 @ti.kernel
 def mark_placed(state: ti.template(), body: ti.i32):
-    """Let the next step look for bodies that a body overlaps, where bodies touch each other."""
-    if ti.static(state.capacity.contact.soft):
-        state.soft.overlap[body] = JUST_PLACED
+    """Make the next step check which bodies a body overlaps."""
+    state.body_overlap[body] = JUST_PLACED

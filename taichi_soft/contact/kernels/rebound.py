@@ -1,9 +1,11 @@
-"""Restitution of a whole body: how fast its centre of mass leaves a collider, at most.
+"""Restitution of a whole body: limit the speed at which its centre of mass leaves a collider.
 
-An elastic body stores the energy of an impact and gives it back, whatever becomes of the vertices that touch.
-So Newton's law holds for the centre of mass: from a collider that it came near with a speed v, it goes away
-with e v. What contact would give beyond that is taken off again, the same change of velocity for all of the
-body, and never more than contact gave: a collider does not pull.
+An elastic body stores the energy of an impact and returns it, independently of the contact law of the
+vertices. So Newton's law of restitution is applied to the centre of mass: a body that approaches a collider
+with speed v leaves it with e v. Any excess is removed by the same change of velocity for all particles, but
+never by more than contact has added: a collider does not pull.
+
+Groups of fields: writes colliders.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
@@ -11,47 +13,48 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-LEAST_REBOUND = 0.1
-"""Speed [m/s] that is always left to the centre of mass: a body that was pressed flat rises again."""
+MIN_REBOUND = 0.1
+"""Speed [m/s] that the centre of mass always keeps, so that a flattened body rises again."""
 
 
 @ti.func
 def begin_rebounds(state: ti.template(), body):
-    """Before the impulses of the last step are cleared: contacts that ended in it are over."""
-    row = body * state.contact.capacity.colliders
-    while row < (body + 1) * state.contact.capacity.colliders:
-        lasts = ti.abs(state.contact.impulse[row]).max() > 0.0
-        leave = ti.select(lasts, state.contact.rebound[row], 0.0)
-        state.contact.rebound[row] = leave
-        state.contact.prev_rebound[row] = leave
+    """Reset the rebound speeds of contacts that ended, before the impulses of the last step are cleared."""
+    row = body * state.colliders.capacity.colliders
+    while row < (body + 1) * state.colliders.capacity.colliders:
+        lasts = ti.abs(state.colliders.impulse[row]).max() > 0.0
+        leave = ti.select(lasts, state.colliders.rebound[row], 0.0)
+        state.colliders.rebound[row] = leave
+        state.colliders.prev_rebound[row] = leave
         row = row_behind(row)
 
 
 @ti.func
-def take_back_rebounds(state: ti.template(), body):
-    """The step is made again."""
-    row = body * state.contact.capacity.colliders
-    while row < (body + 1) * state.contact.capacity.colliders:
-        state.contact.rebound[row] = state.contact.prev_rebound[row]
+def restore_rebounds(state: ti.template(), body):
+    """Restore the rebound speeds before a step is retried."""
+    row = body * state.colliders.capacity.colliders
+    while row < (body + 1) * state.colliders.capacity.colliders:
+        state.colliders.rebound[row] = state.colliders.prev_rebound[row]
         row = row_behind(row)
 
 
 @ti.func
-def add_normal_impulse(contact: ti.template(), row, normal_impulse, normal, before, surface):
-    """Note how a collider pressed a particle.
+def add_normal_impulse(colliders: ti.template(), row, normal_impulse, normal, before, surface):
+    """Accumulate the normal impulse of a collider on a particle, for the restitution of the body.
 
     Args:
         normal_impulse: impulse along the normal [N s].
-        before, surface: velocities along the normal, of the particle until then and of the surface [m/s].
+        before, surface: velocities along the normal, of the particle before the impulse and of the surface
+            [m/s].
     """
-    contact.normal_impulse[row] = contact.normal_impulse[row] + normal_impulse * normal
+    colliders.normal_impulse[row] = colliders.normal_impulse[row] + normal_impulse * normal
     rates = ti.Vector([normal_impulse, normal_impulse * surface, normal_impulse * (surface - before)])
-    contact.normal_impulse_rates[row] = contact.normal_impulse_rates[row] + rates
+    colliders.normal_impulse_rates[row] = colliders.normal_impulse_rates[row] + rates
 
 
 @ti.func
 def _momentum_along(state: ti.template(), first, end, n):
-    """Mass [kg] of particles that move, and their momentum along `n` [kg m/s]."""
+    """Mass [kg] of the free particles, and their momentum along `n` [kg m/s]."""
     masses, momenta = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
     for block in range((end - first + LANES - 1) // LANES):
         row = (first + block * LANES) & ROW_BITS
@@ -65,30 +68,30 @@ def _momentum_along(state: ti.template(), first, end, n):
 
 @ti.func
 def limit_rebounds(state: ti.template(), body, time):
-    """Take from a body what the presses of a substep give its centre of mass beyond the restitution.
+    """Remove the velocity of the centre of mass beyond the restitution, after the collisions of a substep.
 
     Args:
-        time: since the start of the fixed step [s].
+        time: time since the start of the fixed step [s].
     """
     particles = state.body_particles[body]
-    first = body * state.contact.capacity.colliders
-    for k in range(state.contact.near_count[body]):
-        c = state.contact.near[first + k]
+    first = body * state.colliders.capacity.colliders
+    for k in range(state.colliders.near_count[body]):
+        c = state.colliders.near[first + k]
         row = first + c
-        rates = state.contact.normal_impulse_rates[row]
-        normal_impulse = state.contact.normal_impulse[row].norm()
+        rates = state.colliders.normal_impulse_rates[row]
+        normal_impulse = state.colliders.normal_impulse[row].norm()
         if normal_impulse > 0.0:
-            n = state.contact.normal_impulse[row] / normal_impulse
+            n = state.colliders.normal_impulse[row] / normal_impulse
             mass, along = _momentum_along(state, particles[0], particles[1], n)
             speed = along / mass - rates.y / rates.x
             approach = normal_impulse / mass - speed
-            leave = state.contact.rebound[row]
+            leave = state.colliders.rebound[row]
             if leave == 0.0:
-                # Where a body strikes because it turns, its centre may leave though it did not come near.
-                leave = ti.max(LEAST_REBOUND, rates.z / rates.x - approach)
+                # If a rotating body strikes, its centre can move away without having approached.
+                leave = ti.max(MIN_REBOUND, rates.z / rates.x - approach)
             if approach > RESTITUTION_SPEED:
-                leave = ti.max(leave, state.contact.collider_surface[c].y * approach)
-            state.contact.rebound[row] = leave
+                leave = ti.max(leave, state.colliders.surface[c].y * approach)
+            state.colliders.rebound[row] = leave
             excess = ti.min(mass * (speed - leave), normal_impulse)
             if excess > 0.0:
                 moment = ti.Vector.zero(ti.f32, 3)
@@ -96,10 +99,10 @@ def limit_rebounds(state: ti.template(), body, time):
                     if state.particle_inv_mass[p] > 0.0:
                         moment += state.particle_mass[p] * state.particle_position[p]
                         state.particle_velocity[p] = state.particle_velocity[p] - excess / mass * n
-                arm = moment / mass - state.contact.collider_position[c]
-                arm -= state.contact.collider_velocity[c] * time
-                state.contact.impulse[row] = state.contact.impulse[row] + excess * n
-                turn = state.contact.angular_impulse[row] + excess * arm.cross(n)
-                state.contact.angular_impulse[row] = turn
-            state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
-            state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
+                arm = moment / mass - state.colliders.position[c]
+                arm -= state.colliders.velocity[c] * time
+                state.colliders.impulse[row] = state.colliders.impulse[row] + excess * n
+                turn = state.colliders.angular_impulse[row] + excess * arm.cross(n)
+                state.colliders.angular_impulse[row] = turn
+            state.colliders.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
+            state.colliders.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)

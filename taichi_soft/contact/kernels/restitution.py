@@ -1,4 +1,4 @@
-"""What contact does to the velocity of a particle: inelastic or restituting, with Coulomb friction."""
+"""Velocity of a particle after contact: inelastic or with restitution, and with Coulomb friction."""
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.core.runtime import ti
@@ -10,11 +10,11 @@ def resolved_velocity(v, normal, surface_velocity, friction, restitution):
 
     Args:
         v: velocity before [m/s].
-        normal: of the surface, outward, of unit length.
-        surface_velocity: of the surface at the contact [m/s].
-        friction: coefficient, 0 or more. What the surface takes from the normal velocity bounds what it may
-            take from the tangential one.
-        restitution: 0 to 1, for impacts faster than `RESTITUTION_SPEED`; below 0 as 0.
+        normal: outward normal of the surface, of unit length.
+        surface_velocity: velocity of the surface at the contact [m/s].
+        friction: coefficient, 0 or more. Friction times the change of the normal velocity bounds the change
+            of the tangential one.
+        restitution: 0 to 1, for impacts faster than `RESTITUTION_SPEED`; negative values count as 0.
     """
     relative = v - surface_velocity
     approach = -relative.dot(normal)

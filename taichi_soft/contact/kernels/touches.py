@@ -1,7 +1,9 @@
-"""Who touched whom in a step, and with what impulse: added up pair by pair where somebody records it.
+"""Record which bodies touched in a step, and their impulses, summed per pair while contacts are recorded.
 
-An island has its own part of the table of pairs, so that the threads share nothing; within it a pair is found
-by hashing. What is read is cleared, and nothing else writes there.
+Each island has its own part of the table of pairs, so that threads share nothing. Pairs are found in it by
+hashing. Reading a row clears it; other rows stay empty.
+
+Groups of fields: reads colliders, hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
@@ -11,12 +13,12 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 OF_COLLIDER, OF_BODY = 0, 1
-"""What the second one of a pair is."""
+"""Kind of the second member of a pair."""
 
 
 @ti.func
 def _find_pair(soft: ti.template(), first, count, a, b):
-    """Row of two bodies in the part of the table that begins at `first`, or -1 where that is full."""
+    """Row of two bodies in the part of the table from `first` on, or -1 if that is full."""
     start = (a * 40503 + b) & 0x7FFFFFFF
     row, tried = -1, 0
     while row < 0 and tried < count:
@@ -34,9 +36,9 @@ def _find_pair(soft: ti.template(), first, count, a, b):
 @ti.func
 def add_touches(state: ti.template(), island):
     """Add the impulses of a substep between the bodies of an island to the rows of their pairs."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     for i in range(first, last):
-        body = state.contact.island_body[i]
+        body = state.islands.body[i]
         first_slot = state.touching.body_outer[body][0] * SLOTS
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
@@ -46,7 +48,7 @@ def add_touches(state: ti.template(), island):
                 a, b = ti.min(body, other), ti.max(body, other)
                 row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
                 if row < 0:
-                    state.soft.pairs_lost[None] = 1  # the same from whichever thread
+                    state.soft.pairs_lost[None] = 1  # all threads write the same value
                 else:
                     on_vertex = (
                         normal_impulse * state.soft.slot_normal[slot] + state.soft.slot_friction_impulse[slot]
@@ -56,9 +58,9 @@ def add_touches(state: ti.template(), island):
 
 
 @ti.func
-def forget_touches(state: ti.template(), island):
-    """Clear the rows of an island: its step is made again."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+def clear_touches(state: ti.template(), island):
+    """Clear the rows of an island before its step is retried."""
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     row = first * PAIR_ROWS
     while row < last * PAIR_ROWS:
         state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
@@ -81,13 +83,13 @@ def read_touches(
     who: ti.types.ndarray(dtype=ti.i32, ndim=2),
     impulses: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Status of all bodies; and which pairs touched in the last step, in no particular but a fixed order.
+    """Read the status of all bodies, and the pairs that touched in the last step, in a fixed order.
 
     Args:
-        status: (bodies + 2,), as of the last call, or 0; then not 0 where the table had no room for all
-            pairs, and how many rows were written.
+        status: (bodies + 2,): the statuses of the last call, or 0. Receives the present ones, then not 0 if
+            the table was too small for all pairs, then the number of rows written.
         who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
-        impulses: (rows, 3) that the first gave the second [N s].
+        impulses: (rows, 3): impulse of the first on the second [N s].
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -97,9 +99,9 @@ def read_touches(
             before, now = status[body], state.body_status[body]
             status[body] = now
             if ti.static(state.capacity.contact.colliders > 0):
-                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # others have impulses of old
-                    for c in range(state.contact.collider_count[None]):
-                        impulse = state.contact.impulse[body * state.contact.capacity.colliders + c]
+                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # those of others are outdated
+                    for c in range(state.colliders.count[None]):
+                        impulse = state.colliders.impulse[body * state.colliders.capacity.colliders + c]
                         if ti.abs(impulse).max() > 0.0 and is_finite(impulse):
                             _write_touch(who, impulses, count, body, OF_COLLIDER, c, impulse)
                             count += 1

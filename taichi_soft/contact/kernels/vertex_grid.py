@@ -1,21 +1,24 @@
-"""A grid of the vertices of one body that may be near another one."""
+"""A grid of the vertices of one body that can be near another.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CELL = 1.5
-"""Edge of a cell of the grid over the mean edge of the triangles that look round in it. From 1 to 2 makes no
-difference in a heap."""
+"""Edge of a grid cell over the mean edge of the triangles that query it. Values from 1 to 2 are equally fast
+in a heap."""
 
 
-MOST_EDGES = 64.0
-"""Mean edges along one axis through which one triangle looks round. One that an exploding body has drawn out
-over kilometres is left out, or the step that ends with that body frozen would take hours."""
+MAX_QUERY_EDGES = 64.0
+"""Largest extent of one triangle's query along an axis, in mean edges. Triangles that an exploding body
+stretches over kilometres are skipped: otherwise the step that freezes it would take hours."""
 
 
 @ti.func
 def cell_of(x, lowest, cells, cell):
-    """Cell of a grid which a point lies in, or the nearest, whatever the point."""
+    """Cell that contains a point, or the nearest one."""
     return ti.min(ti.max(ti.cast((x - lowest) / cell, ti.i32), 0), cells - 1)
 
 
@@ -26,13 +29,13 @@ def _row_of(at, cells):
 
 @ti.func
 def boxes_overlap(lower, upper, other_lower, other_upper):
-    """Whether two boxes, each by two corners, have a point in common."""
+    """True if two boxes, each given by two corners, have a point in common."""
     return ti.max(other_lower - upper, lower - other_upper).max() <= 0.0
 
 
 @ti.func
-def find_box(state: ti.template(), body):
-    """Boxes round the surface of a body, and round each of its triangles, as they are now."""
+def update_boxes(state: ti.template(), body):
+    """Update the boxes around the surface of a body and around each of its triangles."""
     outer = state.touching.body_outer[body]
     lower = state.particle_position[state.touching.outer_particle[outer[0]]]
     upper = lower
@@ -48,8 +51,8 @@ def find_box(state: ti.template(), body):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             state.soft.searched_position[p] = state.particle_position[p]
             state.soft.particle_gone[p] = 0.0
-    state.contact.body_lower[body] = lower
-    state.contact.body_upper[body] = upper
+    state.body_bounds_lower[body] = lower
+    state.body_bounds_upper[body] = upper
     triangles = state.touching.body_triangles[body]
     t = triangles[0]
     while t < triangles[1]:
@@ -64,12 +67,12 @@ def find_box(state: ti.template(), body):
 
 @ti.func
 def _choose_cells(size, count, smallest):
-    """Cells along each axis of a grid, at most four for each of one or more points, and their edge [m].
+    """Cells along each axis of a grid, at most four per point, and their edge [m].
 
     Args:
-        size: of the grid, vec3 [m], not negative: it would have no end.
-        count: of the points.
-        smallest: edge that is wanted [m].
+        size: size of the grid, vec3 [m], not negative: the loop would not end.
+        count: number of points, 1 or more.
+        smallest: smallest edge of a cell [m].
     """
     cell = smallest
     cells = size / cell + 1.0
@@ -77,7 +80,7 @@ def _choose_cells(size, count, smallest):
         cell *= 1.25
         cells = size / cell + 1.0
     found = ti.cast(cells, ti.i32)
-    # What explodes may be anywhere, and what is not finite nowhere.
+    # Vertices of an exploding body can be very far away, or not finite.
     if found.min() < 1 or not cells.x * cells.y * cells.z <= 4.0 * count:
         found = ti.Vector.one(ti.i32, 3)
     return found, cell
@@ -85,11 +88,11 @@ def _choose_cells(size, count, smallest):
 
 @ti.func
 def fill_grid(state: ti.template(), table, body, other, margin):
-    """Put the vertices of a body that are within `margin` [m] of another's box into a grid.
+    """Sort the vertices of a body within `margin` [m] of another's box into a grid.
 
-    Returns: how many there are; the box round them; cells along each axis, and their edge [m].
+    Returns: their number; the box around them; cells along each axis, and their edge [m].
     """
-    lower, upper = state.contact.body_lower[other] - margin, state.contact.body_upper[other] + margin
+    lower, upper = state.body_bounds_lower[other] - margin, state.body_bounds_upper[other] + margin
     lowest, highest = upper, lower
     outer = state.touching.body_outer[body]
     count = 0
@@ -99,7 +102,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
             state.soft.item[table[1] + count] = k
             count += 1
             lowest, highest = ti.min(lowest, x), ti.max(highest, x)
-    cells, cell = ti.Vector.one(ti.i32, 3), ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
+    cells, cell = ti.Vector.one(ti.i32, 3), ti.max(CELL * state.body_surface[other].z, 1e-6)
     if count > 0:
         cells, cell = _choose_cells(highest - lowest, count, cell)
         last = table[0] + cells.x * cells.y * cells.z
@@ -113,7 +116,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
                 k = state.soft.item[i]
                 x = state.particle_position[state.touching.outer_particle[k]]
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
-                # It counts up, and then down again to the first.
+                # The first pass counts up, the second down again to the first row.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
                 if pass_number == 1:

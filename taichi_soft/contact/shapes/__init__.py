@@ -1,4 +1,4 @@
-"""Solids that bodies collide with: what they are, what kernels need of them and how they look."""
+"""Solids that bodies collide with: parameters, data for kernels, and surfaces to draw."""
 
 from taichi_soft.contact.shapes.box import BoxShape
 from taichi_soft.contact.shapes.capsule import CapsuleShape

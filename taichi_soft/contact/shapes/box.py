@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import SEAM, Shape, Triangles, about_origin, as_length, triangles_of
 from taichi_soft.core.checks import as_array
 from taichi_soft.core.serialisation import serialised
@@ -17,10 +17,10 @@ from taichi_soft.meshing.arrays import read_only
 @serialised("size")
 @dataclass(frozen=True, eq=False)
 class BoxShape(Shape):
-    """A box about the origin, edges along the axes.
+    """A box about the origin, with edges along the axes.
 
     Args:
-        size: length of its edges along x, y, z, (3,) [m].
+        size: lengths of its edges along x, y, z, (3,) [m].
     Raises: OptionError.
     """
 
@@ -43,7 +43,7 @@ class BoxShape(Shape):
         return about_origin(np.asarray(self.size) / 2)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: to the nearest face.
+        """Depth of points below the nearest face, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -52,7 +52,7 @@ class BoxShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Two triangles for each face."""
+        """Return two triangles per face."""
         import trimesh  # half a second that a game need not wait for
 
         return triangles_of(trimesh.creation.box(np.asarray(self.size)))

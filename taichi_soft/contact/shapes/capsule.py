@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length, triangles_of
 from taichi_soft.core.serialisation import serialised
 
@@ -15,11 +15,12 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius", "length")
 @dataclass(frozen=True, eq=False)
 class CapsuleShape(Shape):
-    """All points within `radius` of a piece of the z axis about the origin.
+    """All points within `radius` of a segment of the z axis, centred on the origin.
 
     Args:
-        radius: of cylinder and caps [m].
-        length: between the centres of the caps [m], 0 or more; the whole is `length + 2 * radius` long.
+        radius: radius of cylinder and caps [m].
+        length: distance between the centres of the caps [m], 0 or more. The capsule is `length + 2 * radius`
+            long.
     Raises: OptionError.
     """
 
@@ -40,7 +41,7 @@ class CapsuleShape(Shape):
         return about_origin([self.radius, self.radius, self.length / 2 + self.radius])
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+        """Depth of points inside, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -51,7 +52,7 @@ class CapsuleShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Triangles whose vertices lie on the capsule."""
+        """Return triangles whose vertices lie on the capsule."""
         import trimesh  # half a second that a game need not wait for
 
         return triangles_of(trimesh.creation.capsule(self.length, self.radius, count=(32, 32)))

@@ -1,4 +1,4 @@
-"""What a caller calls a mesh, made into the closed surface of a solid."""
+"""Convert a caller's mesh to the closed surface of a solid."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from taichi_soft.meshing.advice import scene_hint, with_install_hint
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices
 
 FLATTEST = 1e-9
-"""Volume over longest side cubed, below which a surface encloses nothing but rounding."""
+"""Volume over the cube of the longest side, below which the enclosed volume is rounding only."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedMesh:
-    """Triangles that part inside from outside."""
+    """Triangles that separate inside from outside."""
 
-    vertices: FloatArray  # (n, 3) [m], no two alike
+    vertices: FloatArray  # (n, 3) [m], all different
     triangles: IntArray  # (f, 3), counterclockwise seen from outside
 
     @property
@@ -32,10 +32,10 @@ class ClosedMesh:
 
 
 def closed_mesh(source: Any) -> ClosedMesh:
-    """The surface of a trimesh.Trimesh or TetMesh, or of a pair (vertices, triangles).
+    """Return the surface of a trimesh.Trimesh or TetMesh, or of a pair (vertices, triangles).
 
-    Vertices at the same place become one, and triangles that this makes into lines go.
-    Raises: MeshError for anything else, and where the surface is open, faces inward or encloses nothing.
+    Vertices at the same position are merged. Triangles that this reduces to a line are removed.
+    Raises: MeshError for anything else, and if the surface is open, faces inward or encloses no volume.
     """
     vertices, triangles = _arrays(source)
     points = as_points(vertices)
@@ -65,7 +65,7 @@ def _arrays(source: Any) -> tuple[Any, Any]:
 
 
 def _require_closed(triangles: IntArray, numbers: NDArray[Any]) -> None:
-    """Each edge is run through as often one way as the other: then the surface has no border."""
+    """Check that each edge is used equally often in both directions: then the surface has no border."""
     ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     pairs, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
     uses = np.bincount(edge.reshape(-1), minlength=len(pairs))

@@ -1,4 +1,4 @@
-"""The signed distance of a closed mesh on a grid round it."""
+"""The signed distance of a closed mesh on a grid around it."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from taichi_soft.core.errors import MeshError
 from taichi_soft.core.runtime import init
 from taichi_soft.meshing.advice import with_install_hint
 
-USUAL_CELLS = 64
-"""Along the longest side of the mesh, where nobody says."""
+DEFAULT_CELL_COUNT = 64
+"""Default number of cells along the longest side of the mesh."""
 
-MOST_NODES = 2_000_000
-"""Of a grid: 8 MB, and some seconds to fill."""
+MAX_NODES = 2_000_000
+"""Nodes of a grid, at most: 8 MB, and a few seconds to fill."""
 
-MOST_LOST = 0.1
-"""Share of the surface behind which the grid may show no solid: sharp edges lose their outer cells on any."""
+MAX_LOST = 0.1
+"""Fraction of the surface behind which the grid may show no solid. Any grid loses the outer cells of sharp
+edges."""
 
 DEPTHS = (0.5, 1.0)
-"""Cells behind the surface where the solid is looked for."""
+"""Depths below the surface, in cells, at which the grid is checked for solid."""
 
 SHALLOWEST = 0.05
-"""Cells inside, less than which is no solid to rely on."""
+"""Depth, in cells, below which a sample does not count as solid."""
 
-# Of ten points spread evenly over a triangle.
+# Barycentric coordinates of ten points spread evenly over a triangle.
 SHARES: NDArray[np.float64] = (
     np.array([[i + 1 / 3, j + 1 / 3, 10 / 3 - i - j] for i in range(4) for j in range(4 - i)]) / 4
 )
@@ -41,41 +42,44 @@ SHARES: NDArray[np.float64] = (
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Nodes at equal distances along all axes."""
+    """A grid with equal spacing along all axes."""
 
-    origin: NDArray[np.float64]  # of the first node (3,) [m]
+    origin: NDArray[np.float64]  # first node (3,) [m]
     cell: float  # [m]
     resolution: tuple[int, int, int]  # nodes
 
 
-def grid_round(mesh: ClosedMesh, cell: Any) -> Grid:
-    """The grid of a mesh; None takes the usual cell. Raises: OptionError, MeshError for too many nodes."""
+def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
+    """Return the grid for a mesh. If `cell` is None, choose the default cell.
+
+    Raises: OptionError for a bad cell, MeshError for too many nodes.
+    """
     low, high = mesh.bounds
     longest = float((high - low).max())
-    size = longest / USUAL_CELLS if cell is None else as_length(cell, "cell")
+    size = longest / DEFAULT_CELL_COUNT if cell is None else as_length(cell, "cell")
     counts = _node_counts(high - low, size)
-    if counts.prod() > MOST_NODES:
+    if counts.prod() > MAX_NODES:
         larger = size
-        while _node_counts(high - low, larger).prod() > MOST_NODES:
+        while _node_counts(high - low, larger).prod() > MAX_NODES:
             larger *= 1.02
         raise MeshError(
-            f"cell={size:g} m makes {counts.prod():,.0f} nodes over {longest:g} m, more than {MOST_NODES:,}: "
-            f"take cell={1.01 * larger:.3g} or cut the mesh into several shapes"
+            f"cell={size:g} m makes {counts.prod():,.0f} nodes over {longest:g} m, more than {MAX_NODES:,}: "
+            f"use cell={1.01 * larger:.3g} or cut the mesh into several shapes"
         )
     x, y, z = (int(count) for count in counts)
     return Grid((low + high) / 2 - size * (counts - 1) / 2, size, (x, y, z))
 
 
 def _node_counts(size: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    # A side of a whole number of cells but for rounding has just as many.
+    # Rounded, so that a side of a whole number of cells gets no cell more.
     counts: NDArray[np.float64] = np.ceil(np.round(size / cell, 6)) + 1 + 2 * MARGIN
     return counts
 
 
 def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
-    """Distances of the nodes, negative inside, (nx, ny, nz) [m]. Starts Taichi if nobody has.
+    """Compute the distances of the nodes, negative inside, (nx, ny, nz) [m]. Starts Taichi if necessary.
 
-    Inside is what the surface winds round, once or more.
+    A node is inside if the surface winds around it once or more.
     Raises: MeshError for a part that is inside out, or for walls too thin for the grid.
     """
     init()
@@ -89,7 +93,7 @@ def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
     compute_grid_distances(ordered, boxes, windings, distances)
     if windings.min() < 0:
         raise MeshError(
-            f"a part of the mesh is inside out, round {_place(windings, grid)} m: turn it by "
+            f"a part of the mesh is inside out, around {_place(windings, grid)} m: turn it by "
             f"{with_install_hint('mesh.fix_normals()', 'networkx', 'scipy')}"
         )
     _require_thickness(corners, distances, grid)
@@ -104,7 +108,7 @@ def _place(windings: NDArray[np.int32], grid: Grid) -> list[float]:
 
 
 def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float32], grid: Grid) -> None:
-    """Raises: MeshError where behind too much of the surface the grid shows no solid."""
+    """Raises: MeshError if the grid shows no solid behind too much of the surface."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
     corners, normals, areas = corners[areas > 0], normals[areas > 0], areas[areas > 0]
@@ -115,7 +119,7 @@ def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float
         for depth in DEPTHS:
             lost[:, column] &= _interpolated(distances, places + depth * inwards) > -SHALLOWEST
     share = float((lost.mean(axis=1) * areas).sum() / areas.sum())
-    if share > MOST_LOST:
+    if share > MAX_LOST:
         worst = corners[lost.mean(axis=1).argmax()].mean(axis=0)
         place = (grid.origin + grid.cell * worst).round(6).tolist()
         raise MeshError(
@@ -125,7 +129,7 @@ def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float
 
 
 def _interpolated(distances: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Trilinear, at places within the grid (n, 3) in cells."""
+    """Interpolate trilinearly at places (n, 3) within the grid, in cells."""
     base = np.floor(places).astype(np.int64)
     value = np.zeros(len(places))
     for corner in product((0, 1), repeat=3):

@@ -1,4 +1,4 @@
-"""Distance grids kept on disk: what was computed once need not be computed at the next start of a game."""
+"""A cache of distance grids on disk, so that a game computes each grid only once."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from taichi_soft.contact.shapes.closed_mesh import ClosedMesh
 from taichi_soft.contact.shapes.distance_grid import Grid
 
 VERSION = b"taichi-soft distance grid 1"
-"""Changes with the file and with what the numbers in it mean."""
+"""Changes with the format of the file and with the meaning of its numbers."""
 
 DIGEST = hashlib.sha256().digest_size
 
 
 def cache_folder() -> Path:
-    """$TAICHI_SOFT_CACHE, or `taichi-soft` where this system keeps caches of this user."""
+    """Return $TAICHI_SOFT_CACHE, or the folder `taichi-soft` among this user's caches."""
     chosen = os.environ.get("TAICHI_SOFT_CACHE")
     if chosen:
         return Path(chosen)
@@ -36,7 +36,7 @@ def cache_folder() -> Path:
 
 
 def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
-    """Different for whatever changes the numbers."""
+    """Hash of everything that affects the numbers."""
     digest = hashlib.sha256(VERSION)
     for array in (mesh.vertices.astype("<f8"), mesh.triangles.astype("<i4"), np.array([grid.cell], "<f8")):
         digest.update(len(array).to_bytes(8, "little") + array.tobytes())
@@ -44,7 +44,7 @@ def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
 
 
 def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
-    """Distances (nx, ny, nz) [m], or None where there are none or they are damaged."""
+    """Return distances (nx, ny, nz) [m], or None if the file is missing or damaged."""
     try:
         content = _path(key).read_bytes()
     except OSError:
@@ -56,12 +56,12 @@ def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
 
 
 def write_grid(key: str, distances: NDArray[np.float32]) -> None:
-    """Keep distances. Where that is not possible they are computed again next time, and nothing is said."""
+    """Store distances. If that fails, they are silently computed again next time."""
     payload = distances.astype("<f4").tobytes()
     path = _path(key)
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # In one piece, so that no other process sees half of it.
+        # Replace the file in one operation, so that no other process reads half of it.
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:

@@ -1,4 +1,4 @@
-"""Ground given by its height over a grid."""
+"""Ground given by heights on a grid."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import LONGEST, Shape, Triangles, as_length
 from taichi_soft.core.checks import as_array
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import read_only
 
-MOST_NODES = 20_000_000
-"""Of a grid: 80 MB. A square of 4,097 nodes fits."""
+MAX_NODES = 20_000_000
+"""Nodes of a grid, at most: 80 MB. A square of 4,097 x 4,097 nodes fits."""
 
 
 @serialised("heights", "spacing")
 @dataclass(frozen=True, eq=False)
 class HeightFieldShape(Shape):
-    """Ground over a rectangle centred on the origin, solid from the surface down without end.
+    """Ground over a rectangle centred on the origin, solid from the surface down to infinity.
 
-    Each cell is two triangles, parted from its node (i, j) to its node (i + 1, j + 1). Beside the rectangle
-    there is nothing: no walls.
+    The diagonal from node (i, j) to node (i + 1, j + 1) splits each cell into two triangles. The rectangle
+    has no walls: beside it nothing is solid.
     Args:
-        heights: over node (i, j), the first index along x, (nx, ny) [m].
-        spacing: between neighbouring nodes along both axes [m].
+        heights: heights of the nodes (i, j), with i along x, (nx, ny) [m].
+        spacing: distance between neighbouring nodes along both axes [m].
     Raises: OptionError for fewer than two nodes along an axis, too many of them, or heights that are not
-        finite.
+    finite.
     """
 
     kind = ShapeKind.HEIGHT_FIELD
@@ -38,9 +38,9 @@ class HeightFieldShape(Shape):
 
     def __post_init__(self) -> None:
         heights = as_array(self.heights, "heights", (None, None), "m").astype(np.float32)
-        if min(heights.shape) < 2 or heights.size > MOST_NODES:
+        if min(heights.shape) < 2 or heights.size > MAX_NODES:
             raise OptionError(
-                f"heights must have 2 nodes or more along each axis and at most {MOST_NODES:,} in all, "
+                f"heights must have 2 nodes or more along each axis and at most {MAX_NODES:,} in all, "
                 f"got shape {heights.shape}"
             )
         if not np.abs(heights).max() <= LONGEST:
@@ -75,14 +75,14 @@ class HeightFieldShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]; without end downwards."""
+        """Lower and upper corner, (2, 3) [m]; infinite downwards."""
         half = (np.array(np.shape(self.heights)) - 1) * self.spacing / 2
         top = float(np.max(self.heights))
         corners: NDArray[np.float64] = read_only(np.array([[*-half, -np.inf], [*half, top]]))
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; no more than that.
+        """Lower bound of the depth of points inside, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -102,7 +102,7 @@ class HeightFieldShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """The ground itself: two triangles for each cell, facing up."""
+        """Return the ground: two triangles per cell, facing up."""
         nx, ny, _ = self.resolution
         i, j = np.indices((nx, ny))
         low = self.bounds[0]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.closed_mesh import ClosedMesh, closed_mesh
-from taichi_soft.contact.shapes.distance_grid import Grid, distance_grid, grid_round
+from taichi_soft.contact.shapes.distance_grid import Grid, distance_grid, grid_around
 from taichi_soft.contact.shapes.grid_cache import grid_key, read_grid, write_grid
 from taichi_soft.contact.shapes.shape import SEAM, Shape, Triangles
 from taichi_soft.core.errors import OptionError
@@ -18,26 +18,26 @@ from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 
 
-def _again(vertices: FloatArray, triangles: IntArray, cell: float) -> MeshShape:
+def _rebuild(vertices: FloatArray, triangles: IntArray, cell: float) -> MeshShape:
     return MeshShape((vertices, triangles), cell=cell)
 
 
-@serialised("vertices", "triangles", "cell", make=_again)
+@serialised("vertices", "triangles", "cell", make=_rebuild)
 @dataclass(frozen=True, eq=False, init=False)
 class MeshShape(Shape):
-    """The solid inside a closed mesh, as its signed distance on a grid tells it.
+    """The solid inside a closed mesh, stored as its signed distance on a grid.
 
-    Distances are right to a fraction of a cell; edges are rounded off by as much, and what is thinner than
-    two cells may be lost: a mesh that would lose a tenth of its surface is refused.
+    Distances are accurate to a fraction of a cell, and edges are rounded by as much. Parts thinner than two
+    cells can be lost: a mesh that would lose a tenth of its surface is refused.
     Args:
         mesh: a trimesh.Trimesh, a TetMesh (its surface at rest) or (vertices (n, 3) [m], triangles (m, 3)),
-            counterclockwise seen from outside. Parts may overlap.
-        cell: of the grid [m], of which at most 2,000,000 nodes fit; None takes a 64th of the longest side.
-        cache: keep the grid on disk, in $TAICHI_SOFT_CACHE or the user's cache folder, for the next time.
-    Raises: MeshError for a mesh that is open, inside out, flat, not finite or too thin for the cell, with the
-        way out; OptionError for a cell out of range.
+            counterclockwise seen from outside. Parts can overlap.
+        cell: spacing of the grid [m], which can have up to 2,000,000 nodes; None: a 64th of the longest side.
+        cache: store the grid on disk for the next start, in $TAICHI_SOFT_CACHE or the user's cache folder.
+    Raises: MeshError for a mesh that is open, inside out, flat, not finite or too thin for the cell, with a
+    suggested fix; OptionError for a cell out of range.
 
-    Computing a grid takes Taichi, which is started if nobody has, and a tenth of a second to some seconds.
+    Computing a grid starts Taichi if necessary, and takes from 0.1 s to a few seconds.
     """
 
     kind = ShapeKind.MESH
@@ -52,9 +52,9 @@ class MeshShape(Shape):
         if not isinstance(cache, bool):
             raise OptionError(f"cache must be True or False, got {cache!r}")
         closed = closed_mesh(mesh)
-        grid = grid_round(closed, cell)
-        distances = _kept_distances(closed, grid) if cache else distance_grid(closed, grid)
-        # Through __dict__, past the lock of a frozen class.
+        grid = grid_around(closed, cell)
+        distances = _cached_distances(closed, grid) if cache else distance_grid(closed, grid)
+        # Through __dict__, because the class is frozen.
         self.__dict__.update(
             vertices=read_only(closed.vertices),
             triangles=read_only(closed.triangles),
@@ -78,7 +78,7 @@ class MeshShape(Shape):
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """Signed distance of each node [m], the last axis running fastest, float32 (k,)."""
+        """Signed distance of each node [m], last axis fastest, float32 (k,)."""
         return self._samples
 
     @property
@@ -88,7 +88,7 @@ class MeshShape(Shape):
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; from its grid.
+        """Depth of points inside, from the grid, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -106,11 +106,11 @@ class MeshShape(Shape):
         return np.where(outside, -np.inf, depths)
 
     def surface(self) -> Triangles:
-        """The mesh itself, which the grid follows to a fraction of a cell."""
+        """Return the mesh itself, which the grid follows to a fraction of a cell."""
         return self.vertices, self.triangles
 
 
-def _kept_distances(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
+def _cached_distances(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
     key = grid_key(mesh, grid)
     distances = read_grid(key, grid)
     if distances is None:

@@ -1,4 +1,4 @@
-"""An endless plane."""
+"""An infinite plane."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length
 from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import OptionError
@@ -18,10 +18,10 @@ from taichi_soft.meshing.arrays import read_only
 @serialised("normal")
 @dataclass(frozen=True, eq=False)
 class PlaneShape(Shape):
-    """A plane through the origin; everything below it is solid.
+    """A plane through the origin, solid below.
 
     Args:
-        normal: away from the solid, (3,), of any length.
+        normal: direction away from the solid, (3,), of any length.
     Raises: OptionError for a normal without direction.
     """
 
@@ -41,11 +41,11 @@ class PlaneShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Infinite to all sides, (2, 3)."""
+        """Infinite in all directions, (2, 3)."""
         return about_origin((np.inf, np.inf, np.inf))
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+        """Depth of points inside, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -54,7 +54,7 @@ class PlaneShape(Shape):
         return depths
 
     def surface(self, size: float = 20.0) -> Triangles:
-        """A square of edge `size` [m] about the origin.
+        """Return a square about the origin.
 
         Args:
             size: edge of the square [m]; 20 m by default.

@@ -1,4 +1,4 @@
-"""What all shapes have in common."""
+"""The base class of all shapes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.core.checks import as_number
 from taichi_soft.meshing.arrays import read_only
 
@@ -17,28 +17,28 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Vertices (n, 3) [m] and triangles (m, 3), counterclockwise seen from outside."""
 
 SHORTEST, LONGEST = 1e-6, 1e6
-"""Lengths of a shape [m] within which float32 resolves it."""
+"""Lengths of a shape [m] that float32 resolves."""
 
 
 SEAM = 1e-4
-"""Skin [m] on what has flat faces and edges. Where two of them meet flush, what lies on one is inside the
-other by more than rounding, or it would slip into the seam between them."""
+"""Skin [m] on shapes with flat faces and edges. At a flush joint of two of them, a body on one then lies
+deeper in the other than rounding errors, and cannot slip into the joint."""
 
 
 class Shape(ABC):
-    """A solid in a frame of its own, immutable. Not made by itself: see `SphereShape` and its neighbours."""
+    """An immutable solid in its own frame. Abstract: use `SphereShape` and the other shapes."""
 
     kind: ClassVar[ShapeKind]
     seam: ClassVar[float] = 0.0
-    """Skin [m] beside the collider's thickness."""
+    """Skin [m] in addition to the collider's thickness."""
 
     @abstractmethod
     def _values(self) -> tuple[float, ...]:
-        """The numbers that the kind's distance function reads, at most 8."""
+        """Return the parameters of the kind's distance function, at most 8 numbers."""
 
     @cached_property
     def parameters(self) -> NDArray[np.float32]:
-        """What the distance function reads, float32 (8,)."""
+        """Parameters of the distance function, float32 (8,)."""
         values = self._values()
         padded: NDArray[np.float32] = read_only(
             np.array([*values, *[0.0] * (8 - len(values))], dtype=np.float32)
@@ -47,22 +47,22 @@ class Shape(ABC):
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Nodes of the grid along each axis; zeros where there is none."""
+        """Nodes of the grid along each axis; zeros without a grid."""
         return (0, 0, 0)
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """Values on the nodes of the grid, the last axis running fastest, float32 (k,)."""
+        """Values on the nodes of the grid, last axis fastest, float32 (k,)."""
         return _NO_SAMPLES
 
     @property
     @abstractmethod
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of the solid in its own frame, (2, 3) [m]; infinite where it has no end."""
+        """Lower and upper corner in its own frame, (2, 3) [m]; infinite for an unbounded solid."""
 
     @abstractmethod
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: about the way out.
+        """Depth of points below the surface, (n,) [m], negative outside; approximate for some shapes.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -70,24 +70,24 @@ class Shape(ABC):
 
     @abstractmethod
     def surface(self) -> Triangles:
-        """What to draw: vertices (n, 3) [m] and triangles (m, 3), counterclockwise seen from outside."""
+        """Return vertices (n, 3) [m] and triangles (m, 3) to draw, counterclockwise seen from outside."""
 
 
 _NO_SAMPLES: NDArray[Any] = read_only(np.zeros(0, dtype=np.float32))
 
 
 def as_length(value: Any, name: str, low: float = SHORTEST) -> float:
-    """`value` as a length of a shape [m]. Raises: OptionError."""
+    """Return `value` as a length of a shape [m]. Raises: OptionError."""
     return as_number(value, name, low, LONGEST, f"a length from {low:g} to {LONGEST:g} m")
 
 
 def about_origin(half: Any) -> NDArray[np.float64]:
-    """Bounds of what reaches `half` (3,) to both sides of the origin."""
+    """Bounds of a solid that extends by `half` (3,) to both sides of the origin."""
     corner = np.array(half, dtype=np.float64)
     bounds: NDArray[np.float64] = read_only(np.array([-corner, corner]))
     return bounds
 
 
 def triangles_of(mesh: Any) -> Triangles:
-    """Vertices and triangles of a trimesh.Trimesh."""
+    """Return vertices and triangles of a trimesh.Trimesh."""
     return np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int32)

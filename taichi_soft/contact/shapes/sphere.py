@@ -1,4 +1,4 @@
-"""A ball."""
+"""A sphere."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length, triangles_of
 from taichi_soft.core.serialisation import serialised
 
@@ -15,7 +15,7 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius")
 @dataclass(frozen=True, eq=False)
 class SphereShape(Shape):
-    """A ball about the origin.
+    """A sphere about the origin.
 
     Args:
         radius: [m], above 0.
@@ -37,7 +37,7 @@ class SphereShape(Shape):
         return about_origin([self.radius] * 3)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+        """Depth of points inside, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -46,7 +46,7 @@ class SphereShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """1,280 triangles whose vertices lie on the sphere."""
-        import trimesh  # half a second that a game need not wait for
+        """Return 1,280 triangles whose vertices lie on the sphere."""
+        import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.icosphere(subdivisions=3, radius=self.radius))

@@ -1,4 +1,4 @@
-"""Boxes round triangles, round pairs of them, pairs of pairs and so on."""
+"""A binary tree of bounding boxes over triangles."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from numpy.typing import NDArray
 
 from taichi_soft.meshing import spatial_order
 
-NOWHERE = 1e15
-"""Of the boxes of leaves without triangle: nothing is near them, and its square fits float32."""
+FAR_AWAY = 1e15
+"""Coordinate [m] of empty leaves, far from everything; its square fits float32."""
 
 
 def triangle_tree(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The triangles (f, 3, 3) in the order of the leaves, and the boxes.
+    """Return the triangles (f, 3, 3) in the order of the leaves, and the boxes.
 
-    Boxes are lower and upper corners (2 n, 6), n a power of two: the root is 1, the children of i are 2 i
-    and 2 i + 1, the leaves n to 2 n - 1 hold one triangle each or none.
+    Boxes are lower and upper corners, (2 n, 6), with n a power of two. Box 1 is the root, the children of i
+    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 hold one triangle each or none.
     """
     ordered = corners[spatial_order(corners.mean(axis=1))]
     count = 1 << (len(ordered) - 1).bit_length()
-    low = np.full((count, 3), NOWHERE, dtype=np.float32)
-    high = -low  # empty, and the other way round, so that it adds nothing to its parent
+    low = np.full((count, 3), FAR_AWAY, dtype=np.float32)
+    high = -low  # lower above upper: an empty box does not enlarge its parent
     low[: len(ordered)], high[: len(ordered)] = ordered.min(axis=1), ordered.max(axis=1)
     levels = [np.hstack([low, high])]
     while count > 1:

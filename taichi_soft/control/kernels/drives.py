@@ -13,7 +13,7 @@ from taichi_soft.core.runtime import ti
 
 
 @ti.func
-def push_particles(state: ti.template(), body, seconds):
+def apply_external_forces(state: ti.template(), body, seconds):
     """Apply forces and linear damping to the velocities of one body for `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:
@@ -30,7 +30,7 @@ def push_particles(state: ti.template(), body, seconds):
 
 
 @ti.real_func
-def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
+def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
     """Apply wind to the velocities of one body for `h` [s], triangle by triangle.
 
     A vertex receives its third of 1/4 rho c_d A |v_n| v_n implicitly, so that it never exceeds the wind's

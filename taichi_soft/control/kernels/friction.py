@@ -6,4 +6,4 @@ from taichi_soft.core.runtime import ti
 @ti.kernel
 def write_friction(state: ti.template(), body: ti.i32, friction: ti.f32):
     """Write the Coulomb coefficient of one body against other bodies."""
-    state.soft.body_surface[body][0] = friction
+    state.body_surface[body][0] = friction

@@ -4,18 +4,16 @@ Each is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper
 pull, so that the grab does not overshoot for any stiffness. Each particle of the patch has a share of the
 force; the shares have the sum 1. A force above the strength of the patch acts on the whole body in
 proportion to mass, which causes no deformation.
+
+Groups of fields: writes grabs.
 """
-
-from typing import Any
-
-import numpy as np
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import GRABBED
-from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, REAL, Below, FieldGroup, declare
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_inertia
 
 MOST_GRABS, PATCH_ROWS = 16, 128
@@ -28,39 +26,35 @@ PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
 """Columns of `write_grab` and `read_grab`."""
 
 
-@holds_fields
-class GrabFields:
+ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
+"""Groups of rows in a snapshot."""
+
+
+class GrabFields(FieldGroup):
     """All grabs of a world, each with the rows of its patch."""
 
-    def __init__(self, real: Any) -> None:
-        """Allocate; contents are zero."""
-        self.body = ti.field(ti.i32, MOST_GRABS)  # index plus 1, 0 if unused
-        self.corners = ti.Vector.field(CORNERS, ti.i32, MOST_GRABS)
-        self.weights = ti.Vector.field(CORNERS, real, MOST_GRABS)  # of the corners
-        self.target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
-        self.spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
-        self.limits = ti.Vector.field(3, real, MOST_GRABS)
-        self.force = ti.Vector.field(3, real, MOST_GRABS)  # in the last substep [N]
-        self.count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
-        self.particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
-        self.share = ti.field(real, MOST_GRABS * PATCH_ROWS)
-
-    def clear(self, loader: Loader) -> None:
-        """Remove all grabs, because an earlier world may have left invalid particles."""
-        for numbers in (self.body, self.count, self.particle, self.share):
-            loader.fill(numbers, np.zeros(0))
-        for places in (self.corners, self.weights):
-            loader.fill(places, np.zeros((0, CORNERS)))
-        for rows in (self.target, self.spring, self.limits, self.force):
-            loader.fill(rows, np.zeros((0, 3)))
-
-    def carried(self) -> list[list[Any]]:
-        """Fields that the next step depends on: per grab, per grab in use, and per row of the patches."""
-        return [
-            [self.body],
-            [self.corners, self.weights, self.target, self.spring, self.limits, self.force, self.count],
-            [self.particle, self.share],
-        ]
+    owner = "control"
+    body = declare(  # index plus 1, 0 if unused
+        MOST_GRABS, ti.i32, start=0, keep=ALL_GRABS, below=Below(BODY, 1), native=True
+    )
+    corners = declare(
+        MOST_GRABS, ti.i32, CORNERS, start=0, keep=USED_GRABS, below=Below(PARTICLE), native=True
+    )
+    weights = declare(  # of the corners
+        MOST_GRABS, REAL, CORNERS, start=0, keep=USED_GRABS, most=FINITE, native=True
+    )
+    target = declare(MOST_GRABS, REAL, 3, unit="m", start=0, keep=USED_GRABS, most=FINITE, native=True)
+    spring = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)  # `write_grab`
+    limits = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
+    # In the last substep.
+    force = declare(MOST_GRABS, REAL, 3, unit="N", start=0, keep=USED_GRABS, native=True)
+    count = declare(  # rows of the patch
+        MOST_GRABS, ti.i32, start=0, keep=USED_GRABS, below=Below(beside=PATCH_ROWS + 1), native=True
+    )
+    particle = declare(
+        MOST_GRABS * PATCH_ROWS, ti.i32, start=0, keep=PATCHES, below=Below(PARTICLE), native=True
+    )
+    share = declare(MOST_GRABS * PATCH_ROWS, REAL, start=0, keep=PATCHES, most=FINITE, native=True)
 
 
 @ti.func

@@ -11,15 +11,16 @@ Remaining gaps are closed no faster than the bodies can follow.
 
 The impulse on the point is distributed so that it acts at the particle's position. So momentum and angular
 momentum are conserved even with a gap.
-"""
 
-from typing import Any
+Groups of fields: reads islands; writes joints.
+"""
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
+from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.rows import row_behind
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.runtime import ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
 """Largest number of joints of a world, and of particles of all joints."""
@@ -40,33 +41,37 @@ MOST_SHIFT = 0.5
 to the tetrahedron, the joint does not conserve angular momentum exactly."""
 
 
-@holds_fields
-class JointFields:
+MOST_WEIGHT = 1e3
+"""Largest weight of an end that a snapshot may have."""
+
+ALL_JOINTS, USED_JOINT_ROWS, JOINT_ENDS = "joints", "rows of joints", "ends of joints"
+"""Groups of rows in a snapshot."""
+
+
+class JointFields(FieldGroup):
     """Joints and their rows, packed in the order of creation.
 
     End k of row r has the index r ENDS + k.
     """
 
-    def __init__(self, particles: int) -> None:
-        """Allocate; contents are zero."""
-        self.bodies = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # indices plus 1, 0 if unused
-        self.rows = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # range of rows
-        self.draw_speed = ti.field(ti.f32, MOST_JOINTS)  # largest closing speed of a gap [m/s]
-        self.impulse = ti.Vector.field(3, ti.f32, MOST_JOINTS)  # on the first body in the last step [N s]
-        self.particle = ti.field(ti.i32, JOINT_ROWS * ENDS)
-        self.weight = ti.field(ti.f32, JOINT_ROWS * ENDS)
-        self.share = ti.field(ti.f32, JOINT_ROWS * ENDS)  # share of the impulse in the last substep
-        self.row_impulse = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # on the first end, in the last substep
-        self.approach = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # target rate of change of the gap [m/s]
-        self.is_held = ti.field(ti.i32, particles)  # 1 if it is the first end of a row
-
-    def carried(self) -> list[list[Any]]:
-        """Fields that the next step depends on: per joint, per row in use, and per end of a row."""
-        return [
-            [self.bodies, self.rows, self.draw_speed, self.impulse],
-            [self.row_impulse],
-            [self.particle, self.weight, self.share],
-        ]
+    owner, when = "control", "has_contact"
+    bodies = declare(  # indices plus 1, 0 if unused
+        MOST_JOINTS, ti.i32, 2, start=0, keep=ALL_JOINTS, below=Below(BODY, 1), native=True
+    )
+    rows = declare(  # range of rows
+        MOST_JOINTS, ti.i32, 2, keep=ALL_JOINTS, below=Below(beside=JOINT_ROWS + 1), native=True
+    )
+    # Largest closing speed of a gap.
+    draw_speed = declare(MOST_JOINTS, ti.f32, unit="m/s", keep=ALL_JOINTS, most=FINITE)
+    # On the first body in the last step.
+    impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
+    particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
+    weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
+    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # of the last impulse
+    # On the first end, in the last substep.
+    row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
+    approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap
+    is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if it is the first end of a row
 
 
 @ti.func
@@ -136,23 +141,23 @@ def solve_joints(
         common: mean velocity of the bodies of the island [m/s].
     Returns: the highest speed of a particle of a joint [m/s], absolute and relative to `common`.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     is_joined, member = 0, first
     while member < last:
-        is_joined = is_joined | (state.body_drives[state.contact.island_body[member]] & JOINED)
+        is_joined = is_joined | (state.body_drives[state.islands.body[member]] & JOINED)
         member = row_behind(member)
     highest, highest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     sweeps = ti.select(is_joined != 0, SWEEPS + 2, 0)
     for sweep in range(sweeps):
         back = sweep % 2
         for i in range(first, last):
-            body = state.contact.island_body[_turned(i, first, last, back)]
+            body = state.islands.body[_turned(i, first, last, back)]
             for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
                 # Ignore joints to a body that failed, so that it cannot damage others.
                 is_exploding = (
-                    state.contact.is_exploding[body] + state.contact.is_exploding[ti.max(ends[1] - 1, 0)]
+                    state.islands.is_exploding[body] + state.islands.is_exploding[ti.max(ends[1] - 1, 0)]
                 )
                 if ends[0] == body + 1 and is_exploding == 0:
                     if sweep == 0 and is_first == 1:

@@ -10,20 +10,21 @@ and d = a for a push along the axis. With velocities v after the forces of a sub
 The pattern is a rigid motion, so a motor deforms only the region between its particles and the rest of the
 body. The particles have the target speed after the substep's forces, unless that exceeds the limit. An axis
 that rotates with the particles keeps its position in the rest shape.
+
+Groups of fields: writes motors.
 """
 
-from typing import Any
-
-import numpy as np
-
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.runtime import ti
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
 """Largest number of motors of a world, and of particles of all motors."""
+
+ALL_MOTORS, USED_MOTORS, MOTOR_PARTICLES = "motors", "used motors", "particles of motors"
+"""Groups of rows in a snapshot."""
 
 MOST_CHANGE = 0.25
 """Largest change of a particle's velocity per substep, over the speed of sound in its body. Faster changes
@@ -46,26 +47,23 @@ class MotorRow:
     limit: ti.f32  # largest torque [N m] or force [N]
 
 
-@holds_fields
-class MotorFields:
+class MotorFields(FieldGroup):
     """All motors of a world."""
 
-    def __init__(self, bodies: int) -> None:
-        """Allocate; contents are zero."""
-        self.motor = MotorRow.field(shape=MOST_MOTORS)  # type: ignore[attr-defined]
-        self.particle = ti.field(ti.i32, MOTOR_ROWS)
-        self.is_driven = ti.field(ti.i32, bodies)  # 1 if a motor drives it
-        self.impulse = ti.field(ti.f32, MOST_MOTORS)  # in the last step [N m s] or [N s]
-
-    def clear(self, loader: Loader) -> None:
-        """Remove all motors."""
-        loader.fill(self.motor.body, np.zeros(0))
-        loader.fill(self.is_driven, np.zeros(0))
-        loader.fill(self.impulse, np.zeros(0))
-
-    def carried(self) -> list[list[Any]]:
-        """Results of each motor. The inputs of the next step are stored in Python."""
-        return [[self.impulse]]
+    owner = "control"
+    motor = declare(
+        MOST_MOTORS,
+        MotorRow,
+        start=0,
+        native_keep=ALL_MOTORS,
+        below={"body": Below(BODY, 1)},
+        most=FINITE,
+        native=True,
+    )
+    particle = declare(MOTOR_ROWS, ti.i32, native_keep=MOTOR_PARTICLES, below=Below(PARTICLE), native=True)
+    is_driven = declare(BODY, ti.i32, start=0, native=True)  # 1 if a motor drives it
+    # In the last step, times the lever of a motor that turns.
+    impulse = declare(MOST_MOTORS, ti.f32, unit="N s", start=0, keep=USED_MOTORS, most=FINITE, native=True)
 
 
 @ti.func
@@ -157,8 +155,8 @@ def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_f
                 motor = state.motors.motor[number]
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
-                if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
-                    state.contact.calm[body] = 0.0  # keeps a slow start from counting as rest
+                if motor.speed != 0.0 and motor.limit > 0.0 and state.body_calm_time[body] != 0.0:
+                    state.body_calm_time[body] = 0.0  # keeps a slow start from counting as rest
 
 
 @ti.kernel

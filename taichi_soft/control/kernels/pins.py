@@ -1,15 +1,22 @@
 """Pinned particles: their inverse mass is zero, and their velocity is prescribed.
 
-`particle_aim` is its motion in the next step: none (`STILL`), to its target (`TO_TARGET`), none after it has
-reached its target, with its velocity still to clear (`ARRIVED`), or with a frame (`WITH_FRAME` plus its
-row), in whose axes the target is given.
+`particle_aim` is its motion in the next step; with a frame, the target is given in the frame's axes.
 """
 
-from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS, SKIPPING
+from taichi_soft.bodies.status import (
+    ACTIVE,
+    ARRIVED,
+    ASLEEP,
+    FEELS_REACTION,
+    FROZEN,
+    MOVES_PINS,
+    SKIPPING,
+    STILL,
+    TO_TARGET,
+    WITH_FRAME,
+)
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-
-STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
 
 
 @ti.kernel

@@ -1,4 +1,7 @@
-"""Loads of a body on frames, grabs and joints."""
+"""Loads of a body on frames, grabs and joints.
+
+Groups of fields: writes grabs, joints.
+"""
 
 from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.joints import ENDS, MOST_JOINTS

@@ -1,7 +1,6 @@
 """Move a whole body, or set its velocity, as a rigid body between two steps."""
 
-from taichi_soft.bodies.status import JUST_PLACED
-from taichi_soft.control.kernels.pins import TO_TARGET
+from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -109,5 +108,4 @@ def jump(
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
-            if ti.static(state.capacity.contact.soft):
-                state.soft.overlap[body] = JUST_PLACED
+            state.body_overlap[body] = JUST_PLACED

@@ -1,9 +1,9 @@
-"""Calls of Taichi from any thread.
+"""Call Taichi from any thread.
 
-Taichi takes what one thread compiles for what all do, and two threads that compile at once for one. It starts
-and allocates fields in one and the same thread only: its binary asserts that. Here each kernel and each
-number in a field is a turn of one thread, for which others wait. A thread of our own starts Taichi and
-allocates fields, as whichever thread comes first may end soon.
+Taichi cannot compile in two threads at once, and one thread can use what another is still compiling. Its
+binary asserts that it is started and allocates fields in the same thread. Here each kernel call and each
+access to a number of a field excludes other threads. A thread of our own starts Taichi and allocates fields,
+because a caller's thread may end soon.
 
 Needless once Taichi can be used from several threads: https://github.com/taichi-dev/taichi/issues/2022 is
 open, and https://github.com/taichi-dev/taichi/issues/4542 has the assertion; main branch has both faults.
@@ -30,10 +30,10 @@ _home = 0  # identity of that thread
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
-    """Make kernels and numbers in fields turns of one thread.
+    """Let only one thread at a time call kernels and access numbers of fields.
 
     Args:
-        lay_out_now: calls Taichi's own function, which lays out fields, with its argument.
+        lay_out_now: calls Taichi's own function that lays out fields, with its argument.
     """
     compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
     ti.lang.impl.PyTaichi.inside_kernel = property(
@@ -46,20 +46,21 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
         make(self, snode)
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
-    accessor.__init__ = make_in_turn  # its kernels go where Taichi adds others with the GIL released
+    accessor.__init__ = make_in_turn  # its kernels are stored where Taichi adds others with the GIL released
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
 
 
 def must_go_home() -> bool:
-    """True if there are fields to lay out and this is not our own thread."""
+    """True if fields have to be laid out and this is not our own thread."""
     root = ti.lang.impl._root_fb
     return not (root.finalized or root.empty) and threading.get_ident() != _home
 
 
 def at_home(function: Callable[[], Result]) -> Result:
-    """Call a function in our own thread. On Ctrl-C, let it finish what it does, half of which would be the
-    end of all worlds."""
+    """Call a function in our own thread. On Ctrl-C, wait for its end: stopping it halfway would break all
+    worlds.
+    """
     found: Future[Result] = Future()
 
     def work() -> None:
@@ -82,14 +83,13 @@ def at_home(function: Callable[[], Result]) -> Result:
 
 def _serve() -> None:
     global _home
-    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+    if _is_served.acquire(blocking=False):  # or another thread, if Ctrl-C interrupted its start
         _home = threading.get_ident()
         while True:
             _jobs.get()()
 
 
 def leave_home() -> None:
-    """Forget the thread, in a process that was forked before Taichi started: it has none of the other's
-    threads."""
+    """Forget the thread in a process that was forked before Taichi started: threads are not copied."""
     global _is_served
     _is_served = threading.Lock()

@@ -1,7 +1,7 @@
-"""Check of indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and without a line for each hash.
+"""Check indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and print nothing for each hash.
 
-Taichi's bounds check skips the body of a `ti.real_func`. With `debug` it also prints a line for each whole
-number that overflows, which hashes do on purpose.
+Taichi's bounds check skips the body of a `ti.real_func`. With `debug` it also prints a line for each integer
+that overflows, which hashes do on purpose.
 
 Needless once Taichi runs `check_out_of_bound` on real functions, and once
 https://github.com/taichi-dev/taichi/issues/8725 is closed (an option for the report of overflows); main
@@ -14,8 +14,9 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def check_real_functions() -> None:
-    """Assert each index in a real function before its row is used. A wrong index becomes 0, so that the
-    process survives to report it."""
+    """Assert each index in a real function before it is used. A wrong index becomes 0, so that the process
+    survives to report it.
+    """
     impl = ti.lang.impl
     plain = impl.subscript
 
@@ -43,6 +44,6 @@ def let_whole_numbers_overflow() -> None:
         try:
             return plain(self, config, *arguments)
         finally:
-            config.debug = True  # the launch reads it, and raises what was found
+            config.debug = True  # the launch reads it, and raises the error
 
     program.compile_kernel = compiled

@@ -1,4 +1,4 @@
-"""Digests of kernels: of all that the code of a kernel depends on.
+"""Digests of kernels, of everything that their code depends on.
 
 Part of `known_kernels`, and needless with it.
 """
@@ -20,13 +20,14 @@ PACKAGE = Path(__file__).resolve().parents[2]
 
 
 class UnknownPartError(Exception):
-    """A kernel depends on something of which no digest can be made."""
+    """A kernel depends on an object that has no digest."""
 
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Digest of the package's own files, the interpreter and NumPy: they decide how a kernel's source is
-    read."""
+    """Digest of the package's own files, the interpreter and NumPy, which decide how a kernel's source is
+    read.
+    """
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
         found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
@@ -34,12 +35,12 @@ def digest_of_sources() -> str:
 
 
 def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) -> str:
-    """Digest of a kernel and of what it is compiled for.
+    """Digest of a kernel and of its compile-time arguments.
 
     Args:
-        function: the Python function. options: Taichi's options on which code depends. arguments: a pair for
-        each. The second is True for a template argument, and the first is its value then;
-            otherwise the first is that by which Taichi distinguishes such arguments.
+        function: the Python function. options: Taichi's options that change code. arguments: a pair for each.
+            The second is True for a template argument, and the first is then its value; otherwise the first
+            is the feature by which Taichi distinguishes such arguments.
     Raises: UnknownPartError.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
@@ -62,7 +63,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Add to `parts` everything in a template argument on which code can depend."""
+    """Add to `parts` everything in a template argument that can change code."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))
@@ -73,7 +74,7 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
     if id(value) in seen:
         parts.append(f"again {seen[id(value)][0]}")
         return
-    seen[id(value)] = len(seen), value  # kept, or another could get its identity
+    seen[id(value)] = len(seen), value  # keeps it alive: another object could get its identity
     if hasattr(value, "snode") and hasattr(value, "vars"):
         parts.append(_field_text(value))
     elif hasattr(value, "field_dict"):  # a field of structures
@@ -105,7 +106,7 @@ _field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 def _field_text(field: Any) -> str:
-    """Type, size and place of a field. They do not change once it is laid out."""
+    """Type, size and address of a field. They do not change after it is laid out."""
     if field not in _field_texts:
         places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
         size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
@@ -117,8 +118,9 @@ _places: dict[tuple[int, int], str] = {}
 
 
 def _place_of(node: Any) -> str:
-    """Place of a number of a field in memory: its own, and those of the nodes around it. It depends on the
-    sizes of other fields too."""
+    """Address of a number of a field: its own, and those of the nodes around it. It depends on the sizes of
+    other fields too.
+    """
     tree, first = node.get_snode_tree_id(), node.id
     if (tree, first) not in _places:
         path = []

@@ -1,7 +1,6 @@
-"""Keys of Taichi's cache on disk that are the same on every machine, and others in every version of the
-package.
+"""Keys of Taichi's disk cache that are equal on every machine, and different in every version of the package.
 
-Taichi compiles into each parallel loop how many threads may run it: as many as the machine has. The number is
+Taichi compiles the number of threads that can run a parallel loop into it: that of the machine. The number is
 part of the key too. Another machine would not find the kernel, or would run it on too few threads.
 
 Needless once Taichi reads the number of threads when a loop starts, and takes a part of the key from its
@@ -17,21 +16,21 @@ from typing import Any
 from taichi_soft.core.taichi_workarounds.importing import ti
 
 _MOST_THREADS = 1 << 20
-"""Threads that a kernel may use: no machine has as many."""
+"""Threads that a kernel can use: more than any machine has."""
 
 
 def let_any_number_of_threads_run() -> None:
-    """Compile `_MOST_THREADS` into each loop. Taichi uses those threads that it has started."""
+    """Compile `_MOST_THREADS` into each loop. Taichi uses the threads that it has started."""
     builder, given = ti._lib.core.ASTBuilder, threading.local()
     parallelize = builder.parallelize
 
-    def give(self: Any, threads: int) -> None:  # 1 where the next loop is to be serial
+    def give(self: Any, threads: int) -> None:  # 1 if the next loop is serial
         given.within = ti.lang.impl.get_runtime().compiling_callable
         parallelize(self, threads)
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # Finding the end of a loop can compile a real function, which has loops of its own.
+            # Finding the end of a loop can compile a real function with further loops.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:
@@ -49,7 +48,7 @@ def let_any_number_of_threads_run() -> None:
 def keep_kernels_apart(version: str) -> None:
     """Use another key in each version of the package. Call it once Taichi runs.
 
-    The number of threads in the key becomes one that no machine reaches, made of the version.
+    The number of threads in the key is replaced by a number made from the version, larger than any machine's.
     """
     ti.lang.impl.current_cfg().cpu_max_num_threads = (
         _MOST_THREADS + zlib.crc32(version.encode()) % _MOST_THREADS
@@ -57,7 +56,7 @@ def keep_kernels_apart(version: str) -> None:
 
 
 def code_options() -> str:
-    """List all options of the running Taichi on which code depends."""
+    """List all options of the running Taichi that change code."""
     config = ti.lang.impl.current_cfg()
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
@@ -66,7 +65,7 @@ def code_options() -> str:
 
 @contextmanager
 def not_kept() -> Iterator[None]:
-    """Keep kernels that are compiled within out of Taichi's cache."""
+    """Keep kernels compiled inside this context out of Taichi's cache."""
     config = ti.lang.impl.current_cfg()
     usual, config.offline_cache = config.offline_cache, False
     try:

@@ -1,16 +1,17 @@
-"""Kernels that an earlier process compiled, found without walking through their source.
+"""Find kernels of an earlier process without processing their source.
 
-Taichi keeps compiled kernels on disk under a hash of what it makes of their source. To get at that hash it
-walks through the source of each kernel at every start, which takes most of a start with a full cache.
+Taichi stores compiled kernels on disk under a hash of its intermediate code. To compute that hash, it
+processes the source of each kernel at every start, which takes most of a start with a full cache.
 
-Here a kernel that is known from earlier is made with a short body instead. That body holds a digest of all
-that the kernel's source depends on. When the process ends that compiled the kernel, its code is put into the
-file of the short body. There Taichi finds it, by the hash of the short body, which takes next to no time.
+Here a known kernel is created with a short body instead. That body contains a digest of everything that the
+kernel's source depends on. When the process that compiled the kernel ends, the kernel's code is stored in the
+file of the short body. There Taichi finds it by the hash of the short body, which is quick to compute.
 
-The short body sets a flag. If Taichi does not find the file, it compiles that body, and the flag shows it
-after the launch. Nothing else has happened then: the kernel is made from its source and launched.
+The short body sets a flag. If Taichi does not find the file, it compiles the short body itself, and the flag
+shows this after the launch. Nothing else has happened then: the kernel is created from its source and
+launched.
 
-Needless once Taichi looks for a kernel before it walks through its source, as its fork Quadrants does
+Needless once Taichi looks for a kernel before it processes its source, as its fork Quadrants does
 (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). Main branch does not; it was planned in
 https://github.com/taichi-dev/taichi/issues/4401.
 """
@@ -36,24 +37,24 @@ kernels = ti.lang.kernel_impl
 Make = Callable[..., None]
 
 INDEX = "taichi_soft.json"
-"""File beside Taichi's own, with the digests of kernels that can be found."""
+"""File next to Taichi's own, with the digests of known kernels."""
 
 FLAG = "__flag"
-"""Name in the short body of the field that it sets."""
+"""Name, in the short body, of the field that it sets."""
 
 HEADER = 1 << 17
-"""Bytes at the front of Taichi's file of a kernel, among which the names of its functions stand."""
+"""Bytes at the front of Taichi's file of a kernel that contain the names of its functions."""
 
 
 class KnownKernels:
-    """Known kernels in one folder of Taichi's."""
+    """Known kernels in one of Taichi's folders."""
 
     def __init__(self, folder: Path, options: str) -> None:
         """Read the index of a folder.
 
         Args:
-            folder: in which Taichi keeps kernels.
-            options: as `digest_of` takes them.
+            folder: folder in which Taichi stores kernels.
+            options: as for `digest_of`.
         """
         self.folder, self.options = folder, options
         self._known = self._read()
@@ -68,10 +69,10 @@ class KnownKernels:
             return set()
 
     def keep(self, names: dict[str, str]) -> None:
-        """Put the code of kernels into the files of their short bodies. Taichi has written all files.
+        """Store the code of kernels in the files of their short bodies, after Taichi has written all files.
 
         Args:
-            names: by digest, names of the kernels that were made from their source.
+            names: by digest, names of the kernels that were created from their source.
         """
         files = self._files_of({*names.values(), *map(_short_name_of, names)})
         kept = []
@@ -95,25 +96,24 @@ class KnownKernels:
 
 
 class FirstLaunches:
-    """First launches of all kernels of a process: each kernel is found among those known, or made from its
-    source."""
+    """First launches of all kernels of a process: each kernel is either known or created from its source."""
 
     def __init__(self) -> None:
         self._known: KnownKernels | None = None
         self._flag: Any = None
-        self._made: list[tuple[Any, Any, str]] = []  # kernel, what Taichi tells its arrays apart by, digest
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its arrays, digest
 
     def make_flag(self) -> None:
-        """Make the field that short bodies set, as Taichi starts."""
+        """Create the field that short bodies set, when Taichi starts."""
         self._flag = ti.field(ti.i32, ())
 
     def open(self, known: KnownKernels) -> None:
-        """Look for kernels among those known from now on."""
+        """Start to look for kernels among the known ones."""
         self._known = known
 
     @contextmanager
     def making_anew(self, functions: set[Any]) -> Iterator[None]:
-        """Make these kernels from their source within, even if they are known or were made before."""
+        """Create kernels from their source inside this context, even if they are known or exist already."""
         known, self._known = self._known, None
         made = [vars(function)["_primal"] for function in functions]  # Taichi's own object behind each
         before = [(kernel, kernel.compiled_kernels) for kernel in made]
@@ -127,7 +127,7 @@ class FirstLaunches:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:
-        """Replace the function with which Taichi makes a kernel."""
+        """Replace the function with which Taichi creates a kernel."""
         plain = kernels.Kernel.materialize
 
         def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
@@ -137,24 +137,24 @@ class FirstLaunches:
         kernels.Kernel.materialize = materialize
 
     def close(self) -> None:
-        """Let Taichi keep a file with a short body for each kernel that was made from its source."""
+        """Make Taichi store a file with a short body for each kernel that was created from its source."""
         for kernel, features, digest in self._made:
             program = ti.lang.impl.get_runtime().prog
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # reading it is a kernel too, that the next process asks for
+            _ = self._flag[None]  # reading it is a kernel too, which the next process looks for
 
     def keep(self) -> None:
-        """Put the code of these kernels into the files of the short bodies. Call it once Taichi has ended."""
+        """Store the code of these kernels in the files of the short bodies, after Taichi has ended."""
         if self._known is not None:
             self._known.keep({digest: _name_of(kernel, digest) for kernel, _, digest in self._made})
 
     def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
-        """Make a kernel, and check the flag after its first launch."""
+        """Create a kernel, and check the flag after its first launch."""
         name = kernel.func.__name__
         start = BURST.begin(name)
-        kernel.runtime.materialize()  # lays out fields, of whose places digests are made
+        kernel.runtime.materialize()  # lays out fields: digests contain their addresses
         digest = self._digest_of(kernel, args, features)
         is_short = self._known is not None and digest in self._known
         if digest is None:
@@ -181,7 +181,7 @@ class FirstLaunches:
         kernel.launch_kernel = launch_first
 
     def _digest_of(self, kernel: Any, args: Any, features: Any) -> str | None:
-        """Return the digest of a kernel; None if no digest can be made of it."""
+        """Return the digest of a kernel; None if it has none."""
         is_ours = kernel.func.__module__.startswith("taichi_soft.")
         if self._known is None or not is_ours or kernel.autodiff_mode != kernels.AutodiffMode.NONE:
             return None
@@ -193,7 +193,7 @@ class FirstLaunches:
             return None
 
     def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
-        """Make a kernel from its source, under a name by which its file is found again."""
+        """Create a kernel from its source, under a name by which its file can be found."""
         slots = kernel.template_slot_locations
         tree, context = ti.lang.kernel_impl._get_tree_and_ctx(
             kernel, args=args, excluded_parameters=slots, arg_features=features
@@ -202,7 +202,7 @@ class FirstLaunches:
         self._made.append((kernel, features, digest))
 
     def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
-        """Make a kernel with the same arguments and the short body."""
+        """Create a kernel with the same arguments and the short body."""
         names = [argument.name for argument in kernel.arguments]
         returned = " -> None" if kernel.return_type else ""
         head = f"def {kernel.func.__name__}({', '.join(names)}){returned}:"
@@ -223,7 +223,7 @@ class FirstLaunches:
 
 
 def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
-    """Make Taichi's own kernel from the tree of a function, as `Kernel.materialize` of Taichi 1.7.4 does."""
+    """Create Taichi's own kernel from the tree of a function, as Taichi's `Kernel.materialize` does."""
     runtime = kernel.runtime
 
     def taichi_ast_generator(made: Any) -> None:  # Taichi looks for this name
@@ -241,13 +241,13 @@ def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
 
 
 def _short_body(digest: str) -> list[str]:
-    """Statements that set the flag, once with each part of the digest. Each takes time at every start."""
+    """Return statements that set the flag, one per part of the digest. Each takes time at every start."""
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return [f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1)]
 
 
 def _name_of(kernel: Any, digest: str) -> str:
-    """Name, in Taichi's file, of a kernel that is made from its source."""
+    """Name, in Taichi's file, of a kernel that is created from its source."""
     return f"{kernel.func.__name__}_{digest}"
 
 
@@ -257,7 +257,7 @@ def _short_name_of(digest: str) -> str:
 
 
 def _write(path: Path, contents: bytes) -> None:
-    """Write all of a file at once: other processes may read it meanwhile."""
+    """Write a file in one operation, because other processes can read it meanwhile."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.write_bytes(contents)
     part.replace(path)

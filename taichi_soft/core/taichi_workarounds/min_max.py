@@ -1,7 +1,7 @@
-"""`ti.min` and `ti.max` that give the same bits on every processor.
+"""`ti.min` and `ti.max` with the same bits on every processor.
 
-Taichi leaves them to an instruction of the processor. Which of -0 and 0 is the lesser, and which of a number
-and NaN, differs from one processor to the next, and WebAssembly has no such instruction.
+Taichi uses an instruction of the processor. Processors differ in which of -0 and 0, and which of a number and
+NaN, is the smaller, and WebAssembly has no such instruction.
 
 Needless once Taichi compiles `min` and `max` of floats to a comparison and a selection; main branch calls
 LLVM's own. We know of no thread about it.
@@ -20,13 +20,13 @@ def choose_by_comparison() -> None:
     ops = ti.lang.ops
 
     def choosing(plain: Callable[..., Any], comes_first: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(plain)  # or Taichi would warn of a function that is not its own
+        @functools.wraps(plain)  # otherwise Taichi warns of a foreign function
         def choose(a: Any, b: Any) -> Any:
             expressions = [each for each in (a, b) if ops.is_taichi_expr(each)]
             if not any(_is_real(each) for each in expressions):
                 return plain(a, b)
             first, second = (a, b) if ops.is_taichi_expr(a) else (b, a)
-            # Stored in variables, as Taichi computes an expression again wherever it stands.
+            # Stored in variables, because Taichi evaluates an expression wherever it occurs.
             first, second = ti.lang.impl.expr_init(first), ti.lang.impl.expr_init(second)
             return ops.select(comes_first(first, second), first, second)
 

@@ -1,8 +1,8 @@
 """Branches and loops in real functions.
 
-A `ti.real_func` is compiled once and separately, where a `ti.func` is copied to wherever it is called. But
-Taichi puts the branches and loops of a `ti.func` that a real function calls into the kernel. Their statements
-then run whatever the condition is, or Taichi crashes.
+A `ti.real_func` is compiled once and separately; a `ti.func` is copied to every call. But if a real function
+calls a `ti.func`, Taichi puts the branches and loops of the latter into the kernel. Their statements then run
+whatever the condition is, or Taichi crashes.
 
 Needless once https://github.com/taichi-dev/taichi/issues/8514 is closed; it is open, and main branch has the
 fault.

@@ -1,10 +1,10 @@
 """Read the source of kernels and functions once.
 
-Taichi reads the lines around each function where it is defined: more than half of the time of our import. It
-reads the whole source again wherever a `ti.func` is called, and wraps the lines around every expression for a
-message.
+Taichi reads the lines around each function when it is defined, which takes more than half of the time of our
+import. It reads the whole source again for every call of a `ti.func`, and wraps the lines around every
+expression for a message.
 
-Needless once Taichi's `_inside_class` reads no source and its `get_pos_info` keeps what it made. Main branch
+Needless once Taichi's `_inside_class` reads no source and its `get_pos_info` caches its results. Main branch
 does neither; https://github.com/taichi-dev/taichi/issues/7711 asked for the import. Quadrants, a fork of
 Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
 """
@@ -23,8 +23,7 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def read_sources_once() -> None:
-    """Read each source when it is first compiled. Messages show the first line of an expression,
-    unwrapped."""
+    """Read each source when it is first compiled. Messages show only the first line of an expression."""
     kernels = ti.lang.kernel_impl
     ti.lang.kernel_impl._inside_class = _is_in_class
     kernels.getsourcefile = _remember(kernels.getsourcefile)
@@ -46,7 +45,7 @@ def _is_in_class(level_of_class_stackframe: int) -> bool:
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `look_up` with a memory: it is called once for each object, as long as the object exists."""
+    """Return `look_up` with a cache: it is called once per object, as long as the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:
@@ -58,7 +57,7 @@ def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _place_of(context: Any, node: Any) -> str:
-    """Describe where a node of a source stands: file, line, function, the line itself and a mark below it."""
+    """Describe the position of a node in a source: file, line, function, the line and a mark below it."""
     number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
     start = context.indent + node.col_offset
     end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)

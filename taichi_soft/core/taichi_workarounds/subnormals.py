@@ -1,11 +1,11 @@
-"""Floats as IEEE 754 has them, in the thread that calls a kernel and in Taichi's workers.
+"""Subnormal numbers as in IEEE 754, in the thread that calls a kernel and in Taichi's workers.
 
-Taichi has the processor take numbers below 1e-38 for zero, in the thread that starts it and in its workers.
-WebAssembly cannot do that, and other libraries change it for threads of their own. A kernel would give other
-bits from one place to the next.
+Taichi makes the processor flush numbers below 1e-38 to zero, in the thread that starts it and in its workers.
+WebAssembly cannot do that, and other libraries change the setting for their own threads. So a kernel would
+compute different bits in different places.
 
 Needless once Taichi has an option for it: https://github.com/taichi-dev/taichi/pull/2143 made it fixed, and
-main branch has it so. `with_usual_floats` round a kernel stays needed for what other libraries do.
+so it is in main branch. `with_usual_floats` around a kernel remains necessary because of other libraries.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ Environment = ctypes.c_char * 64
 
 
 def _unchanged(_: Any) -> None:
-    """Stand in for C's functions where the system's library has none."""
+    """Replacement for C's functions if the system's library has none."""
 
 
 try:
@@ -38,8 +38,7 @@ except (AttributeError, OSError):
 
 
 def _usual_environment() -> Any:
-    """Return C's `FE_DFL_ENV`; where we do not know it, the environment of the thread that imports the
-    package."""
+    """Return C's `FE_DFL_ENV`; if it is unknown, the environment of the thread that imports the package."""
     here, usual = Environment(), Environment()
     _read(here)
     if sys.platform == "linux":
@@ -53,7 +52,7 @@ _usual = _usual_environment()
 
 
 def with_usual_floats(function: Function) -> Function:
-    """Let a function compute as IEEE 754 says, and leave its thread as it was."""
+    """Run a function with IEEE 754 floats, and restore the settings of its thread afterwards."""
 
     @wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
@@ -69,7 +68,7 @@ def with_usual_floats(function: Function) -> Function:
 
 
 def give_workers_usual_floats(count: int) -> None:
-    """Undo in all `count` workers what Taichi set as it started.
+    """Undo Taichi's setting in all `count` workers.
 
     A loop has as many parts as there are workers. Each part calls C's `fesetenv` and waits for the others, so
     that no worker runs two.
@@ -94,7 +93,7 @@ def give_workers_usual_floats(count: int) -> None:
 
 
 def _calling(function: int) -> Callable[[Any], None]:
-    """Return what calls the C function at an address with one argument, for use in a kernel."""
+    """Return a function for kernels that calls the C function at an address with one argument."""
 
     def call(argument: Any) -> None:
         runtime = ti.lang.impl.get_runtime()
@@ -103,5 +102,5 @@ def _calling(function: int) -> Callable[[Any], None]:
         builder = runtime.compiling_callable.ast_builder()
         builder.insert_external_func_call(function, "", "", "", given, nothing, place)
 
-    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # or Taichi warns of it
+    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # otherwise Taichi warns
     return call

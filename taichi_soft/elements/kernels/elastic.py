@@ -11,7 +11,7 @@ from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.laws.damping import tet_mean_damping_forces
-from taichi_soft.elements.laws.model import flipped_forces, upright_forces
+from taichi_soft.elements.laws.force_model import flipped_forces, upright_forces
 
 BLOCK_BITS = (1 << 22) - 1
 """Mask that leaves every block number unchanged: 33 million tetrahedra are more than fit into memory."""

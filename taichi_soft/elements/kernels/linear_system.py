@@ -23,13 +23,13 @@ from taichi_soft.elements.laws.anisotropy import green_stress
 from taichi_soft.elements.laws.bond_stiffness import along_and_across, spring_stiffness
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.cmpm import direction_of, shear_direction
-from taichi_soft.elements.laws.springs import along, spring_tension
-from taichi_soft.elements.laws.stiffness import (
+from taichi_soft.elements.laws.force_gradients import (
     element_stiffness,
     positive_part,
     stiffness_block,
     weighted_rows,
 )
+from taichi_soft.elements.laws.springs import along, spring_tension
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
 EDGES = ((0, 0, 1), (1, 0, 2), (2, 0, 3), (3, 1, 2), (4, 1, 3), (5, 2, 3))

@@ -6,7 +6,7 @@ from taichi_soft.core.math.elementary import acos, cos_sin
 from taichi_soft.core.math.tensors import determinant, product, scaled_plus_identity, trace
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, particles_of, rest_inverse_of
-from taichi_soft.elements.laws.model import cauchy_stress
+from taichi_soft.elements.laws.force_model import cauchy_stress
 
 NO_LIMIT = 1e30
 """[Pa]; not infinity, because fast-math compilers can assume that there is none."""

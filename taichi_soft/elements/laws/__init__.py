@@ -21,8 +21,8 @@ from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.cmpm import cmpm_bonds
 from taichi_soft.elements.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.elements.laws.face import face_forces
+from taichi_soft.elements.laws.force_model import ElementModel
 from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
-from taichi_soft.elements.laws.model import ElementModel
 from taichi_soft.elements.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
 from taichi_soft.elements.laws.split_ring_plane import split_ring_plane_bonds
 from taichi_soft.elements.laws.springs import spring_bonds

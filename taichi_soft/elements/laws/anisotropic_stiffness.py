@@ -27,7 +27,7 @@ from taichi_soft.core.math.tensors import (
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Flips, Strain
 from taichi_soft.elements.laws.anisotropy import anisotropic_stress, between, green_stress, wave_modulus
-from taichi_soft.elements.laws.stiffness import element_stiffness, positive_part, stiffness_block
+from taichi_soft.elements.laws.force_gradients import element_stiffness, positive_part, stiffness_block
 
 MIN_VOLUME = 0.05
 """Lower limit of the volume relative to rest by which tension is divided."""

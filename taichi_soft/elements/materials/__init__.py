@@ -3,7 +3,7 @@
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
 from taichi_soft.elements.materials.presets import PRESETS, preset
-from taichi_soft.elements.materials.springs import SpringMaterial
+from taichi_soft.elements.materials.spring_constants import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
 AnyMaterial = Material | AnisotropicMaterial | SpringMaterial

@@ -1,4 +1,7 @@
-"""Kernels that read and write a body with the state of its motion."""
+"""Kernels that read and write a body with the state of its motion.
+
+Groups of fields: writes colliders, hull.
+"""
 
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.core.constants import LANES
@@ -32,11 +35,10 @@ def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=
             out[i, 17 + k] = state.particle_target[p][k]
             out[i, 20 + k] = state.particle_push[p][k]
             out[i, 23 + k] = state.particle_reaction[p][k]
-        out[i, 13], out[i, 14] = 0.0, 0.0
+        out[i, 13] = 0.0
         if ti.static(state.capacity.implicit):
             out[i, 13] = state.particle_contact[p]
-        if ti.static(state.capacity.has_contact):
-            out[i, 14] = state.contact.particle_touches[p]
+        out[i, 14] = state.particle_touches[p]
 
 
 @ti.kernel
@@ -89,9 +91,9 @@ def write_body(
             state.particle_reaction[p] = _three(motion, i, 23)
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = int(motion[i, 13])
+            state.particle_touches[p] = int(motion[i, 14])
             if ti.static(state.capacity.has_contact):
-                state.contact.particle_touches[p] = int(motion[i, 14])
-                state.contact.particle_clearance[p] = NO_CONTACT
+                state.colliders.particle_clearance[p] = NO_CONTACT
             state.rest_position[p0 + i] = _three(rest, i, 0)
         for i in range(tet_vertices.shape[0]):
             state.tet_vertices[b0 * 4 * LANES + i] = p0 + tet_vertices[i]
@@ -127,8 +129,7 @@ def write_body(
         state.body_sound_speed[body] = state.body_sound_speed[model_of]
         state.body_fading[body] = state.body_fading[model_of]
         state.body_fading_interval[body] = state.body_fading_interval[model_of]
-        if ti.static(state.capacity.has_contact):
-            state.contact.calm[body] = 0.0
+        state.body_calm_time[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = state.body_residual[model_of]
         state.body_status[body] = status
@@ -170,5 +171,4 @@ def write_kind(state: ti.template(), body: ti.i32, row: ti.types.ndarray(dtype=t
     state.body_sound_speed[body] = row[4]
     state.body_fading[body] = row[5]
     state.body_fading_interval[body] = row[6]
-    if ti.static(state.capacity.contact.soft):
-        state.soft.body_surface[body] = ti.Vector([row[0], row[1], row[2]])
+    state.body_surface[body] = ti.Vector([row[0], row[1], row[2]])

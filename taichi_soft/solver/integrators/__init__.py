@@ -1,10 +1,10 @@
-"""How forces become motion. A new integrator is one file, one line here and its name in `core.types`."""
+"""Integrators. A new one is one file, one line here and its name in `core.types`."""
 
 from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
 from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.integrators.lazy_leapfrog import LAZY_LEAPFROG
 from taichi_soft.solver.integrators.leapfrog import LEAPFROG
-from taichi_soft.solver.integrators.model import IntegratorModel
 
 __all__ = ["INTEGRATORS", "IntegratorModel"]
 

@@ -1,4 +1,4 @@
-"""Functions of the integrators that use the forces of the old positions."""
+"""Functions shared by the explicit integrators, which use the forces of the old positions."""
 
 from taichi_soft.control.kernels.drives import add_reactions
 from taichi_soft.control.kernels.grabs import pull_grabs
@@ -14,13 +14,13 @@ def whole_substep(lag, h, s):
 
 @ti.func
 def before_each(h, s, substeps):
-    """Drives act for the whole substep, before it [s]."""
+    """External forces act for the whole substep, before it [s]."""
     return ti.select(s < substeps, h, 0.0)
 
 
 @ti.func
 def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
-    """Internal forces, reactions of pins and grabs."""
+    """Add internal forces, reactions of pins, and grabs."""
     accumulate_forces(state, program, body)
     add_reactions(state, body, felt)
     pull_grabs(state, body, h, felt)
@@ -28,5 +28,5 @@ def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def any_shape(state: ti.template(), body, h, is_last):
-    """Every shape is accepted: `kick_by_forces` checks changes of velocity instead."""
+    """Accept every shape: `kick_by_forces` checks changes of velocity instead."""
     return 1

@@ -1,9 +1,9 @@
-"""Explicit Euler (thesis section 3.5.1, eq. 3.16). Gains energy on every oscillation; for comparison."""
+"""Explicit Euler (thesis section 3.5.1, eq. 3.16), for comparison: it gains energy in every oscillation."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import add_forces, any_shape, before_each, whole_substep
-from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.kernels.kick import kick_by_forces
 
 
@@ -22,6 +22,6 @@ EXPLICIT_EULER = IntegratorModel(
     check=any_shape,
     advance=advance,
     only_flat=True,
-    warning="explicit_euler gains energy at every substep, however short, and explodes sooner or later: it "
-    "is here for comparison, leapfrog is for use",
+    warning="explicit_euler gains energy at every substep, however short, and explodes sooner or later: use "
+    "it for comparison only; use leapfrog otherwise",
 )

@@ -1,16 +1,16 @@
-"""Implicit Euler (thesis section 3.5.3, eq. 3.26): the forces are those of the new positions.
+"""Implicit Euler (thesis section 3.5.3, eq. 3.26), with the forces of the new positions.
 
-One linear solve per substep and body (`solver.kernels.implicit_euler`) finds them, with grabs, pins and the
-colliders that particles lie on in its equations. It takes forces as linear, so a substep in which a shape
-changes by too much is made again in halves.
+One linear solve per substep and body (`solver.kernels.implicit_euler`) finds them. Its equations include
+grabs, pins and the colliders under the body. Forces are linearised, so a substep that changes a shape too
+much is retried in halves.
 """
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import before_each
-from taichi_soft.solver.integrators.model import IntegratorModel
-from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES, keeps_shape, slow_down
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.kernels.implicit_kick import kick_implicitly
+from taichi_soft.solver.kernels.implicit_solve import MAX_PIECES, keeps_shape, slow_down
 
 
 @ti.func
@@ -21,19 +21,19 @@ def felt_time(lag, h, s):
 
 @ti.func
 def hold(state: ti.template(), program: ti.template(), body, h, felt):
-    """All forces are in the equations."""
+    """Do nothing: all forces are in the equations."""
 
 
 @ti.func
 def predict(state: ti.template(), program: ti.template(), body, job, felt):
-    """New velocities from the solve."""
+    """Solve for the new velocities."""
     speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
     return speed, beside, beside, 1
 
 
 @ti.func
 def check(state: ti.template(), body, h, is_last):
-    """Check the shape. In the last attempt, slow a body down whose shape changed too much."""
+    """Check the shape. In the last attempt, slow down a body whose shape changed too much."""
     if is_last == 1:
         slow_down(state, body, h)
     return int(keeps_shape(state, body))
@@ -47,8 +47,8 @@ IMPLICIT_EULER = IntegratorModel(
     predict=predict,
     check=check,
     has_stable_step=False,
-    has_hulls=False,  # it holds vertices
+    has_hulls=False,  # it constrains vertices only
     drifts_at_once=False,
-    halvings=MOST_PIECES.bit_length() - 1,
-    work=50,  # so many products with the matrix
+    halvings=MAX_PIECES.bit_length() - 1,
+    work=50,  # products with the matrix per solve
 )

@@ -1,9 +1,9 @@
-"""Lazy leapfrog (thesis section 3.5.2): explicit Euler with its two lines swapped."""
+"""Lazy leapfrog (thesis section 3.5.2): explicit Euler with its two updates swapped."""
 
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import add_forces, any_shape, before_each, whole_substep
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.integrators.leapfrog import advance
-from taichi_soft.solver.integrators.model import IntegratorModel
 from taichi_soft.solver.kernels.kick import kick_by_forces
 
 LAZY_LEAPFROG = IntegratorModel(
@@ -14,5 +14,5 @@ LAZY_LEAPFROG = IntegratorModel(
     predict=kick_by_forces,
     check=any_shape,
     advance=advance,
-    lag=0.5,  # to the order of the error that it makes
+    lag=0.5,  # to the order of its own error
 )

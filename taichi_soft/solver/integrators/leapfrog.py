@@ -1,20 +1,20 @@
 """Leapfrog (thesis section 3.5.2, eq. 3.17 with v_3/2 = v_1/2 + h M^-1 f(x_1)).
 
-Velocities live half a substep behind positions. A kick lasts from the velocity's last moment to the middle of
-the coming substep: h in a steady run, h / 2 from a fresh start, where the velocity belongs to the same moment
-as the position, and (h_old + h) / 2 where the substep changes.
+Velocities are half a substep behind positions. A kick lasts from the time of the old velocity to the middle
+of the coming substep: h in a steady run; h / 2 from a fresh start, when velocity and position belong to the
+same time; and (h_old + h) / 2 when the substep changes.
 """
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators.explicit import add_forces, any_shape
-from taichi_soft.solver.integrators.model import IntegratorModel
+from taichi_soft.solver.integrators.integrator_model import IntegratorModel
 from taichi_soft.solver.kernels.kick import kick_by_forces
 
 
 @ti.func
 def advance(x, v, a, h, kick):
-    """Position one substep later, velocity half a substep ahead of where the position was."""
+    """Return the position one substep later and the velocity half a substep after the old position."""
     v_new = v + kick * a
     return x + h * v_new, v_new
 
@@ -27,7 +27,7 @@ def felt_time(lag, h, s):
 
 @ti.func
 def drive_time(h, s, substeps):
-    """Drives act for half a substep before the first substep and after the last one [s]."""
+    """External forces act for half a substep before the first substep and after the last one [s]."""
     return 0.5 * h if s == 0 or s == substeps else h
 
 

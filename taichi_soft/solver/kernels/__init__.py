@@ -1,1 +1,1 @@
-"""The phases of a step, and the loops that make it."""
+"""The phases of a step, and the kernels that run them."""

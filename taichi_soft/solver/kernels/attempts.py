@@ -1,31 +1,35 @@
-"""A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
+"""Attempts at a step: save and restore bodies, and decide whether an attempt was fine enough.
 
-Substeps are chosen for small deformation, and more of them for a shape that is found to be stiffer. An impact
-faster than sound flattens tetrahedra, and flat ones are stiffer. Where forces change a velocity by more than
-`JOLT` at once an attempt ends, or where it comes out non-finite. The island is put back, and makes the step
-again with twice as many substeps, and so on. The last attempt brakes vibrations sharply; momentum and spin
-stay.
+The number of substeps is chosen for small deformation, and raised for shapes that are found to be stiffer. An
+impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces change a
+velocity by more than `MAX_VELOCITY_CHANGE` at once, or if its result is not finite. The island is then
+restored and retries the step with twice as many substeps, and so on. The last attempt damps vibrations
+strongly; momentum and angular momentum are conserved.
+
+Groups of fields: reads hull; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
-from taichi_soft.contact.kernels.candidates import forget_candidates
-from taichi_soft.contact.kernels.collide import forget_contacts
-from taichi_soft.contact.kernels.hull import place_points
-from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
-from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
-from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.contact.kernels.candidates import clear_candidates
+from taichi_soft.contact.kernels.collide import clear_contacts
+from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, clear_warm_start_if_free
+from taichi_soft.contact.kernels.hull_points import place_points
+from taichi_soft.contact.kernels.rebound import begin_rebounds, restore_rebounds
+from taichi_soft.contact.kernels.touches import clear_touches
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
+from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 
 @ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
-    """How often substeps are halved; and the number of the last attempt, which is as fine as the one before
-    and braked, or the same number."""
+    """Number of halvings of the substep, and the number of the last attempt.
+
+    If they differ, the last attempt has the same substeps as the one before, and strong damping.
+    """
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
     if ti.static(program.integrator.halvings > 0):
@@ -35,35 +39,35 @@ def attempts_of(state: ti.template(), program: ti.template()):
 
 @ti.func
 def refined_substeps(state: ti.template(), program: ti.template(), island, substeps, dt):
-    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or as many as the shapes of an
-    island's bodies ask for."""
+    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or more if the shapes of the island's
+    bodies require it.
+    """
     least = ti.cast(substeps, ti.f32)
     if ti.static(program.integrator.has_stable_step):
         if state.retries[None] > 0:
-            first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+            first, end = state.islands.first[island], state.islands.first[island + 1]
             row = first
             while row < end:
-                body = state.contact.island_body[row]
+                body = state.islands.body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
-                    # A forged snapshot may say anything.
-                    refinement = ti.min(state.body_refinement[body], MOST_REFINEMENT)
-                    least = ti.max(least, ti.min(at_rest * refinement, MOST_REFINEMENT * substeps))
+                    # Limited: a forged snapshot can contain any number.
+                    refinement = ti.min(state.body_refinement[body], MAX_REFINEMENT)
+                    least = ti.max(least, ti.min(at_rest * refinement, MAX_REFINEMENT * substeps))
                 row = row_behind(row)
     return ti.cast(ti.ceil(least), ti.i32)
 
 
 @ti.real_func
 def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
-    """Remember how a body is before the step: to interpolate from, and to put it back there. Forget what it
-    touched in the last one."""
+    """Save the state of a body before the step, for interpolation and retries. Clear its last contacts."""
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             save_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
-                if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
+                if state.body_status[body] == FROZEN:  # its pins have no targets, which would reset it
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
         _begin_contacts(state, program, body)
@@ -77,23 +81,23 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
             state.prev_contact[p] = state.particle_contact[p]
     begin_rebounds(state, body)
     if ti.static(state.capacity.contact.hull):
-        forget_held_if_free(state, body)
-    forget_contacts(state, body)
-    state.contact.is_exploding[body] = 0
+        clear_warm_start_if_free(state, body)
+    clear_contacts(state, body)
+    state.islands.is_exploding[body] = 0
     if ti.static(program.has_soft_contact):
         if state.body_status[body] != ACTIVE:
-            state.contact.body_speed_beside[body] = 0.0
+            state.islands.body_speed_beside[body] = 0.0
             for p in range(particles[0], particles[1]):
-                state.soft.particle_speed[p] = 0.0
+                state.particle_speed[p] = 0.0
             if ti.static(state.capacity.contact.hull):
                 place_points(state, body)
                 for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                    state.soft.particle_speed[p] = 0.0
+                    state.particle_speed[p] = 0.0
 
 
 @ti.func
-def _put_back_body(state: ti.template(), program: ti.template(), body):
-    """Put a body back to where it was before the step."""
+def _restore_body(state: ti.template(), program: ti.template(), body):
+    """Restore the state of a body before the step."""
     state.body_jolted[body] = 1
     particles = state.body_particles[body]
     p = particles[0]
@@ -105,37 +109,37 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     clear_forces(state, body)
-    take_back_rebounds(state, body)
-    forget_contacts(state, body)
+    restore_rebounds(state, body)
+    clear_contacts(state, body)
     if ti.static(state.capacity.contact.hull):
-        forget_held(state, body)
+        clear_warm_start(state, body)
     if ti.static(program.has_soft_contact):
-        forget_candidates(state, body)  # for good, as the island looks for others before it goes on
+        clear_candidates(state, body)  # not stored: the island searches again before it continues
 
 
 @ti.real_func
-def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32):
-    """Put an island back to where it was before the step."""
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+def restore_island(state: ti.template(), program: ti.template(), island: ti.i32):
+    """Restore the state of an island before the step."""
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):
-        _put_back_body(state, program, state.contact.island_body[row])
+        _restore_body(state, program, state.islands.body[row])
     if ti.static(program.has_soft_contact):
-        forget_touches(state, island)
+        clear_touches(state, island)
 
 
 @ti.func
-def brake_island(state: ti.template(), island, is_braked):
-    """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+def set_strong_damping(state: ti.template(), island, is_braked):
+    """Damp the vibrations of all bodies of an island strongly (1), or no longer (0)."""
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     row = first
     while row < end:
-        state.body_is_braked[state.contact.island_body[row]] = is_braked
+        state.body_is_braked[state.islands.body[row]] = is_braked
         row = row_behind(row)
 
 
 @ti.func
-def body_is_sound(state: ti.template(), body):
-    """Whether all of a body can still be computed with (1)."""
+def body_is_valid(state: ti.template(), body):
+    """1 if all particles of a body have valid positions and velocities."""
     particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -146,12 +150,12 @@ def body_is_sound(state: ti.template(), body):
 
 
 @ti.func
-def island_is_sound(state: ti.template(), island):
-    """Whether all that moves in an island can still be computed with (1)."""
+def island_is_valid(state: ti.template(), island):
+    """1 if all active bodies of an island are valid."""
     sound = 1
-    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):
-        body = state.contact.island_body[row]
+        body = state.islands.body[row]
         if state.body_status[body] == ACTIVE:
-            sound = sound & body_is_sound(state, body)
+            sound = sound & body_is_valid(state, body)
     return sound

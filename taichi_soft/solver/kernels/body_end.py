@@ -1,32 +1,32 @@
-"""What comes after the last substep of a step, body by body."""
+"""End of a step, body by body."""
 
 from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body
 from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
-from taichi_soft.contact.kernels.candidates import forget_candidates
-from taichi_soft.contact.kernels.collide import forget_contacts
-from taichi_soft.contact.kernels.hull import place_points
-from taichi_soft.control.kernels.drives import push_particles
+from taichi_soft.contact.kernels.candidates import clear_candidates
+from taichi_soft.contact.kernels.collide import clear_contacts
+from taichi_soft.contact.kernels.hull_points import place_points
+from taichi_soft.control.kernels.drives import apply_external_forces
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.attempts import body_is_sound
-from taichi_soft.solver.kernels.sleep import note_way_of_hulled
+from taichi_soft.solver.kernels.attempts import body_is_valid
+from taichi_soft.solver.kernels.sleep import reset_rest_timer_of_hull
 from taichi_soft.solver.kernels.untangling import untangle_body
 
 
 @ti.func
-def _freeze_if_broken(state: ti.template(), body):
-    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
-    sound = body_is_sound(state, body)
+def _freeze_if_invalid(state: ti.template(), body):
+    """Freeze a body that became invalid, in its last valid state. Returns: 1 if that happened."""
+    sound = body_is_valid(state, body)
     if sound == 0:
         particles = state.body_particles[body]
         p = particles[0]
         while p < particles[1]:
             restore_particle(state, p)
             p = row_behind(p)
-        place_points(state, body)  # or they would not be finite, and no snapshot would be taken back
+        place_points(state, body)  # a snapshot with non-finite points cannot be restored
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN
@@ -35,9 +35,9 @@ def _freeze_if_broken(state: ti.template(), body):
 
 @ti.func
 def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """Returns 1 where it failed, stays inside out, or was not solved as exactly as asked."""
-    push_particles(state, body, program.integrator.drive_time(h, substeps, substeps))
-    failed = _freeze_if_broken(state, body)
+    """Returns: 1 if it failed, stays inverted, or its solve was inexact."""
+    apply_external_forces(state, body, program.integrator.drive_time(h, substeps, substeps))
+    failed = _freeze_if_invalid(state, body)
     if failed == 0:
         state.body_velocity_lag[body] = h
         state.body_drives[body] = state.body_drives[body] & ~PUSHED
@@ -45,11 +45,11 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
             flow_body(state, body, substeps * h)
         failed = untangle_body(state, program, body, substeps * h)
         if ti.static(state.capacity.contact.hull):
-            note_way_of_hulled(state, body, substeps * h)
+            reset_rest_timer_of_hull(state, body, substeps * h)
         if ti.static(state.capacity.implicit):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
     else:
-        forget_contacts(state, body)  # it was put back: nothing has touched it
+        clear_contacts(state, body)  # a restored body has touched nothing
     return failed
 
 
@@ -57,13 +57,13 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
 def end_body(
     state: ti.template(), program: ti.template(), body: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
-    """After the last of so many substeps of `h` [s]: drives end, plasticity flows, what is caught is freed.
+    """End the step of a body after `substeps` of `h` [s]: external forces, plastic flow, inverted tetrahedra.
 
-    Returns: whether the body failed, stays inside out, or was not solved as exactly as asked (1).
+    Returns: 1 if the body failed, stays inverted, or its solve was inexact.
     """
     failed = 0
     if state.body_status[body] == ACTIVE:
         failed = _end_active_body(state, program, body, substeps, h)
     if ti.static(program.has_soft_contact):
-        forget_candidates(state, body)
+        clear_candidates(state, body)
     return failed

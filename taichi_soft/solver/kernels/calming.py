@@ -1,12 +1,14 @@
-"""What lets a body come to rest that is nearly there: fast vibrations fade, slow ones and rigid motion stay.
+"""Bring bodies to rest: damp fast vibrations, and keep slow ones and rigid motion.
 
-Damping takes from every vibration at the rate of the slowest, so what is fast would hum on for half a minute
-in a floppy body. Here pairs of neighbours lose what they have of velocity along the edge between them, one
-pair after the other. That takes the more of a vibration the more its neighbours differ, and keeps momentum
-and angular momentum.
+Material damping acts on every vibration at the rate of the slowest, so fast vibrations of a floppy body would
+last for half a minute. Here the ends of each edge lose part of their relative velocity along it, one edge
+after the other. This damps a vibration more, the more neighbours move against each other, and conserves
+momentum and angular momentum.
 
-A body that is slower than `sleep_speed` as a whole loses its slow vibrations too, in `vibration`: one limb
-that swings would keep it awake.
+A body whose overall speed is below `sleep_speed` also loses its slow vibrations, in `vibration`: one swinging
+limb would keep it awake.
+
+Groups of fields: writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -15,16 +17,16 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
 
 CALMING = 0.5
-"""Part of the velocity along an edge that its ends lose in each step."""
+"""Fraction of the relative velocity along an edge that its ends lose in each step."""
 
 SLOW_FACTOR = 10.0
-"""Root mean square speed over mass, over `sleep_speed`, below which a body is slow."""
+"""Root mean square speed, weighted by mass, over `sleep_speed`, below which a body is slow."""
 
 
 @ti.func
 def update_rest_state(state: ti.template(), body):
     """Write to `rest_state` whether a damped body is moving, slow or resting, if bodies can fall asleep."""
-    rest_state, sleep_speed = MOVING, state.contact.sleep_speed[None]
+    rest_state, sleep_speed = MOVING, state.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
         masses, motions = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
@@ -36,18 +38,19 @@ def update_rest_state(state: ti.template(), body):
                 motions[lane] += mass * state.particle_velocity[first + lane].norm_sqr()
         most, motion = masses.sum() * sleep_speed * sleep_speed, motions.sum()
         rest_state = int(motion <= SLOW_FACTOR * SLOW_FACTOR * most) + int(motion <= most)
-    if state.contact.rest_state[body] != rest_state:
-        state.contact.rest_state[body] = rest_state
+    if state.islands.rest_state[body] != rest_state:
+        state.islands.rest_state[body] = rest_state
 
 
 @ti.func
 def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """Damp the fast vibrations of a body that is slow, in substep `s` of `substeps`.
+    """Damp the fast vibrations of a slow body in substep `s` of `substeps`.
 
-    `kick` and `h` are those of `fade_vibration`. Each edge has its turn once in a step, and the edges of a
-    particle at different times: one that vibrates once in a step would always be found standing still.
+    `kick` and `h` are those of `fade_vibration`. Each edge is damped once per step, and the edges of a
+    particle at different times: otherwise a vibration with the period of the step would always be damped at
+    its turning point.
     """
-    if state.contact.rest_state[body] != MOVING:
+    if state.islands.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)
 
 
@@ -65,8 +68,8 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        # What touches is left to its contacts: between pushes a weight on it would creep.
-        if state.contact.particle_touches[p] + state.contact.particle_touches[q] == 0:
+        # Skip touched particles: between contact impulses, a weight on them would creep.
+        if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)
             apart -= felt_velocity(state, program, p, gravity, kick, h, 1)

@@ -1,6 +1,6 @@
 """Conjugate gradients with a block-Jacobi preconditioner, for the particles of one body, in one thread.
 
-After Baraff and Witkin 1998, section 5: what is held is filtered out of every residual and direction.
+After Baraff and Witkin 1998, section 5: constraints are filtered out of every residual and direction.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -8,12 +8,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 SLIDES, STICKS = 0.0, 1.0
-"""What holds a particle on the floor or a collider: along the normal only, or in all directions."""
+"""How the floor or a collider constrains a particle: along the normal only, or in all directions."""
 
 
 @ti.func
-def held(state: ti.template(), p, v):
-    """`v` without what a pin, or the floor or a collider under particle `p`, takes up."""
+def constrained(state: ti.template(), p, v):
+    """Remove from `v` the components that a pin, the floor or a collider constrains at particle `p`."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
     if state.particle_contact[p] > 0:
         hold = state.particle_hold[p]
@@ -23,13 +23,13 @@ def held(state: ti.template(), p, v):
 
 @ti.func
 def _dot(a, b):
-    """In float64: sums over a body would lose the digits that the tolerance asks for."""
+    """Dot product in float64: sums over a body in float32 would be less precise than the tolerance."""
     return ti.cast(a.dot(b), ti.f64)
 
 
 @ti.func
 def invert_blocks(state: ti.template(), body):
-    """The preconditioner: the inverse of every block on the diagonal."""
+    """Compute the preconditioner: the inverse of every diagonal block."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
@@ -38,7 +38,7 @@ def invert_blocks(state: ti.template(), body):
 
 @ti.func
 def _squared_norm(state: ti.template(), p, impulse):
-    """Square of the preconditioner's norm of an impulse on a particle."""
+    """Square of an impulse on a particle in the norm of the preconditioner."""
     return _dot(impulse, state.particle_block_inverse[p] @ impulse)
 
 
@@ -46,8 +46,8 @@ def _squared_norm(state: ti.template(), p, impulse):
 def squared_load(state: ti.template(), body, h):
     """Square of the impulse in a substep of `h` [s] to which the tolerance is relative.
 
-    The impulse is the larger of the weight and of the right-hand side, including what floor and colliders
-    support. Without these, the right-hand side of a body at rest would be rounding errors alone.
+    The impulse is the larger of the weight and the right-hand side. Both include the part that floor and
+    colliders support: without it, the right-hand side of a body at rest would be rounding errors only.
     """
     weight, total = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     gravity = gravity_on(state, body)
@@ -63,17 +63,17 @@ def squared_load(state: ti.template(), body, h):
 def _correct_common_velocity(state: ti.template(), body):
     """Add to `solution` the change of velocity that all particles share, and update `residual`.
 
-    Each call corrects one direction. Before the iterations, that is all that a body in free fall needs;
-    conjugate gradients find it late. After them, it removes the momentum left in the residual, with which
-    bodies would slide faster or creep on slopes.
+    Each call corrects one direction. Before the iterations, this suffices for a body in free fall, which
+    takes conjugate gradients many iterations. After them, it removes the momentum left in the residual, which
+    would make bodies slide faster or creep on slopes.
     """
     particles = state.body_particles[body]
     total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     for p in range(particles[0], particles[1]):
-        total += held(state, p, state.residual[p])
+        total += constrained(state, p, state.residual[p])
         mass += state.particle_mass[p]
     for p in range(particles[0], particles[1]):
-        state.direction[p] = held(state, p, total / mass)
+        state.direction[p] = constrained(state, p, total / mass)
     multiply(state, body, state.direction, state.image)
     gain, curvature = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
@@ -88,21 +88,21 @@ def _correct_common_velocity(state: ti.template(), body):
 
 @ti.func
 def solve_system(state: ti.template(), body, load):
-    """Solve system times solution = right-hand side, as `solver` asks.
+    """Solve system times solution = right-hand side, to the tolerance in `solver`.
 
-    `solution` is the initial guess, and `residual` its residual, which is used up. Residuals are measured in
-    the norm of the preconditioner.
+    `solution` is the initial guess, and `residual` its residual, which is overwritten. Residuals are measured
+    in the norm of the preconditioner.
 
     Args:
-        load: as `squared_load` returns it. The tolerance is relative to it.
-    Returns: the residual left, over the load.
+        load: result of `squared_load`, to which the tolerance is relative.
+    Returns: the remaining residual over the load.
     """
     _correct_common_velocity(state, body)
     particles = state.body_particles[body]
     left = ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
-        r = held(state, p, state.residual[p])
-        d = held(state, p, state.particle_block_inverse[p] @ r)
+        r = constrained(state, p, state.residual[p])
+        d = constrained(state, p, state.particle_block_inverse[p] @ r)
         state.residual[p] = r
         state.direction[p] = d
         left += _dot(r, d)
@@ -112,7 +112,7 @@ def solve_system(state: ti.template(), body, load):
         multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
-            state.image[p] = held(state, p, state.image[p])
+            state.image[p] = constrained(state, p, state.image[p])
             curvature += _dot(state.direction[p], state.image[p])
         if curvature > 0.0:
             step = ti.cast(left / curvature, state.real)
@@ -121,7 +121,7 @@ def solve_system(state: ti.template(), body, load):
             for p in range(particles[0], particles[1]):
                 state.solution[p] = state.solution[p] + step * state.direction[p]
                 r = state.residual[p] - step * state.image[p]
-                z = held(state, p, state.particle_block_inverse[p] @ r)
+                z = constrained(state, p, state.particle_block_inverse[p] @ r)
                 state.residual[p] = r
                 state.image[p] = z
                 left += _dot(r, z)
@@ -130,6 +130,6 @@ def solve_system(state: ti.template(), body, load):
                 state.direction[p] = state.image[p] + turn * state.direction[p]
             count += 1
         else:
-            count = most_iterations  # rounding has left nothing to go along
+            count = most_iterations  # no direction left but rounding errors
     _correct_common_velocity(state, body)
     return ti.sqrt(ti.cast(left / ti.max(load, 1e-300), state.real))

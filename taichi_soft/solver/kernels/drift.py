@@ -1,33 +1,36 @@
-"""Drift among colliders: new positions from velocities, and what colliders in the way make of both."""
+"""Drift among colliders: positions from velocities, and collisions on the path.
+
+Groups of fields: reads colliders.
+"""
 
 from taichi_soft.bodies.kernels.particles import highest_speed
-from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders
-from taichi_soft.contact.kernels.hull import has_hull, place_points
-from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
+from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
+from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
+from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import note_motion
+from taichi_soft.solver.kernels.sleep import reset_rest_timer
 from taichi_soft.solver.step_fields import Job
 
 
 @ti.func
-def look_for_colliders(state: ti.template(), body, speed, since, left):
-    """List the colliders that a body can reach at 1.25 times a speed [m/s] in the rest of the step."""
+def list_near_colliders(state: ti.template(), body, speed, since, left):
+    """List the colliders that a body can reach at 1.25 times `speed` [m/s] in the rest of the step."""
     place_points(state, body)
     find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
 
 
 @ti.func
-def can_drift_at_once(state: ti.template(), body, way):
-    """1 if a body alone can move its next `way` [m] first and collide afterwards.
+def can_drift_at_once(state: ti.template(), body, path):
+    """1 if a single body can move its next `path` [m] first and collide afterwards.
 
-    The colliders near it must be known. Points of a hull near a collider change velocities before the move.
+    The colliders near it must be known. Hull points near a collider change velocities before the move.
     """
-    is_known = int(state.contact.gone[body] + way <= state.contact.reach[body])
+    is_known = int(state.colliders.gone[body] + path <= state.colliders.reach[body])
     if ti.static(state.capacity.contact.hull):
-        is_known = is_known & int(state.contact.near_count[body] == 0 or not has_hull(state, body))
+        is_known = is_known & int(state.colliders.near_count[body] == 0 or not has_hull(state, body))
     return is_known
 
 
@@ -52,74 +55,77 @@ def _move_block(state: ti.template(), first, count, h):
 
 
 @ti.func
-def _collide_body(state: ti.template(), body, h, since, gone):
-    """Collide the particles of a body on the way that they have just moved.
+def _collide_body(state: ti.template(), body, h, since, travelled):
+    """Collide the particles of a body on the path that they have just moved.
 
     Args:
-        gone: way since near colliders were listed, including this one [m].
+        travelled: distance travelled since near colliders were listed, including this path [m].
     """
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
         is_clear = ti.Vector.zero(ti.i32, LANES)
         for lane in range(LANES):
-            is_clear[lane] = int(state.contact.particle_clearance[first + lane] > gone)
+            is_clear[lane] = int(state.colliders.particle_clearance[first + lane] > travelled)
         if is_clear.min() == 0:
             p, end = first, ti.min(first + LANES, particles[1])
             while p < end:
-                if not (state.contact.particle_clearance[p] > gone) and state.particle_inv_mass[p] > 0.0:
+                if (
+                    not (state.colliders.particle_clearance[p] > travelled)
+                    and state.particle_inv_mass[p] > 0.0
+                ):
                     collide_particle(state, body, p, h, since)
                 p = row_behind(p)
     limit_rebounds(state, body, since + h)
 
 
 @ti.real_func
-def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone: ti.f32):
-    """Collide a body that has moved by its velocities, and report its speed to sleep.
+def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
+    """Collide a body that has moved by its velocities, and update its rest timer.
 
     Args:
-        gone: way since near colliders were listed, including this one [m].
+        travelled: distance travelled since near colliders were listed, including this path [m].
     """
-    state.contact.gone[body] = gone
-    if state.contact.near_count[body] > 0:
-        _collide_body(state, body, h, since, gone)
+    set_travelled(state, body, travelled)
+    if state.colliders.near_count[body] > 0:
+        _collide_body(state, body, h, since, travelled)
     place_points(state, body)
-    is_noted = int(state.contact.calm[body] != 0.0)
+    updates_timer = int(state.body_calm_time[body] != 0.0)
     if ti.static(state.capacity.contact.hull):
-        is_noted = is_noted & int(not has_hull(state, body))  # whose way a step counts: `note_way_of_hulled`
-    if is_noted == 1:
-        note_motion(state, body, highest_speed(state, body))
+        updates_timer = updates_timer & int(not has_hull(state, body))  # see `reset_rest_timer_of_hull`
+    if updates_timer == 1:
+        reset_rest_timer(state, body, highest_speed(state, body))
 
 
 @ti.real_func
 def drift_body(state: ti.template(), body: ti.i32, job: Job):
-    """New positions of one body, and what colliders in the way make of both."""
-    gone = state.contact.gone[body] + job.fastest * job.h
-    is_new = int(not (state.contact.reach[body] >= gone))
+    """Move one body by its velocities, and collide it on the way."""
+    travelled = state.colliders.gone[body] + job.fastest * job.h
+    is_new = int(not (state.colliders.reach[body] >= travelled))
     if is_new == 1:
-        look_for_colliders(state, body, job.fastest, job.since, job.left)
-        gone = job.fastest * job.h
+        list_near_colliders(state, body, job.fastest, job.since, job.left)
+        travelled = job.fastest * job.h
     if ti.static(state.capacity.contact.hull):
-        if state.contact.near_count[body] > 0:
-            collide_points(state, body, job.h, job.since, gone)
+        if state.colliders.near_count[body] > 0:
+            collide_points(state, body, job.h, job.since, travelled)
         elif is_new == 1:
-            forget_held(state, body)
+            clear_warm_start(state, body)
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
         _move_block(state, first, particles[1] - first, job.h)
-    end_drift(state, body, job.h, job.since, gone)
+    end_drift(state, body, job.h, job.since, travelled)
 
 
 @ti.func
 def has_drifted(state: ti.template(), body, speed, h, since):
-    """Collide a body alone that the kick has moved. Undo the move if near colliders are not known.
+    """Collide a single body that the kick has moved. Undo the move if the colliders near it are unknown.
 
     Returns: 1 if the body has moved.
     """
     is_known = can_drift_at_once(state, body, speed * h)
     if is_known == 1:
-        end_drift(state, body, h, since, state.contact.gone[body] + speed * h)
+        end_drift(state, body, h, since, state.colliders.gone[body] + speed * h)
     else:
         particles = state.body_particles[body]
         p = particles[0]

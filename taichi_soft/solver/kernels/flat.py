@@ -1,13 +1,13 @@
 """Schedule `flat`: all tetrahedra, then all particles, of all bodies in parallel, substep by substep.
 
-For bodies too large for one thread. Forces are stored per corner and per edge, and each particle gathers
-its own in a fixed order, so the result does not depend on the number of threads.
+For bodies too large for one thread. Forces are stored per corner and per edge, and each particle gathers its
+own in a fixed order, so the result does not depend on the number of threads.
 
-On a CPU the substeps lie inside one kernel call: one task per thread, which meet at a spinning barrier.
-Waking a thread pool costs 5 to 90 us per loop, a barrier well under one. All tasks of a loop run at
-once because Taichi's pool has exactly that many threads. The price: where other programs keep a core busy,
-every barrier may wait for the operating system, which is why only very large bodies use this by themselves.
-A GPU has no such barrier: there each substep is a launch of its own.
+On a CPU, all substeps run inside one kernel call: one task per thread, synchronised by a spinning barrier.
+Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at once because
+Taichi's pool has exactly that many threads. The disadvantage: if another program occupies a core, every
+barrier can wait for the operating system, so only very large bodies use this schedule by default. A GPU has
+no such barrier: each substep is a separate launch.
 """
 
 from taichi_soft.bodies.kernels.particles import (
@@ -26,10 +26,10 @@ from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressu
 from taichi_soft.elements.kernels.edges import edge_force_of
 from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clear_forces
-from taichi_soft.solver.kernels.kick import JOLT
+from taichi_soft.solver.kernels.kick import MAX_VELOCITY_CHANGE
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
-_FAILING, _DONE = 5, 6  # above the status of any body: the step is made again, or need not be
+_FAILING, _DONE = 5, 6  # above any body's status: retry the step, or step done
 
 
 @ti.func
@@ -43,7 +43,7 @@ def _block_is_active(state: ti.template(), block):
 
 
 @ti.func
-def _remember_phase(state: ti.template(), p):
+def _save_phase(state: ti.template(), p):
     if _status_of(state, p) != ABSENT:
         save_particle(state, p)
 
@@ -70,9 +70,9 @@ def _edge_phase(state: ti.template(), program: ti.template(), e):
 
 @ti.func
 def gathered_force(state: ti.template(), p):
-    """Internal force on one particle [N]: its corners' forces, then its edges'."""
+    """Internal force on one particle [N]: the forces of its corners, then of its edges."""
     total = ti.Vector.zero(state.real, 4)
-    corners = state.particle_corners[p]  # none in bodies whose law looks at edges
+    corners = state.particle_corners[p]  # empty if the body's law acts on edges
     for k in range(corners[0], corners[1]):
         total += state.corner_force[state.corner_slot[k]]
     force = total.xyz
@@ -93,7 +93,7 @@ def _felt_time(state: ti.template(), program: ti.template(), body, h, s):
 
 @ti.func
 def _moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
-    """One substep of one particle under the internal force on it [N]; a pinned one keeps its velocity.
+    """Advance one particle by one substep under its internal force [N]. A pinned one keeps its velocity.
 
     Returns: its new position [m] and velocity [m/s], and its acceleration [m/s^2].
     """
@@ -118,7 +118,7 @@ def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
         x, v, a = _moved_particle(state, program, p, force, gravity, h, kick)
         state.particle_position[p] = x
         state.particle_velocity[p] = v
-        if not (kick * a.norm() <= JOLT * state.body_sound_speed[body]):
+        if not (kick * a.norm() <= MAX_VELOCITY_CHANGE * state.body_sound_speed[body]):
             state.body_jolted[body] = 1
 
 
@@ -129,7 +129,7 @@ def _is_damped_now(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def _gather_phase(state: ti.template(), p, h, s, substeps):
-    """Forces of bodies whose vibrations are damped now, to where damping reads them."""
+    """Write the forces of bodies that are damped in this substep to where damping reads them."""
     if _is_damped_now(state, state.particle_body[p], h, s, substeps):
         state.particle_force[p] = widened(gathered_force(state, p))
 
@@ -151,7 +151,7 @@ def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, subste
 
 @ti.func
 def substep_alone(state: ti.template(), program: ti.template(), body, h, s, substeps):
-    """One substep of one body in one thread, to find out what broke it."""
+    """Run one substep of one body in one thread, to find the cause of a failure."""
     accumulate_forces(state, program, body)
     kick = _felt_time(state, program, body, h, s)
     damp_vibration(state, program, body, kick, h, s, substeps)
@@ -165,9 +165,9 @@ def substep_alone(state: ti.template(), program: ti.template(), body, h, s, subs
 
 @ti.func
 def _begin_phase(state: ti.template(), p, is_again):
-    """Remember a particle; where its body makes the step again, it was put back."""
+    """Save the state of a particle in the first attempt."""
     if is_again == 0:
-        _remember_phase(state, p)
+        _save_phase(state, p)
 
 
 @ti.func
@@ -180,7 +180,7 @@ def _check_phase(state: ti.template(), p, is_last):
 
 
 @ti.func
-def _fall_back_phase(state: ti.template(), p):
+def _restore_phase(state: ti.template(), p):
     if _status_of(state, p) == _FAILING:
         restore_particle(state, p)
 
@@ -193,8 +193,10 @@ def _flow_phase(state: ti.template(), block, dt):
 
 
 @ti.func
-def _settle_body(state: ti.template(), body, h, is_braked, is_last):
-    """Returns 1 for a body that failed: it makes the step again, or is frozen after the last attempt."""
+def _end_attempt(state: ti.template(), body, h, is_braked, is_last):
+    """End an attempt of a body: it retries the step, or is frozen after the last attempt. Returns: 1 if it
+    failed.
+    """
     failed = 0
     state.body_jolted[body] = 0
     if state.body_status[body] == _FAILING:
@@ -209,7 +211,7 @@ def _settle_body(state: ti.template(), body, h, is_braked, is_last):
 
 @ti.func
 def _end_step(state: ti.template(), body_count):
-    """After the last attempt: bodies for which the step is done can make the next one."""
+    """After the last attempt, make the bodies that are done ready for the next step."""
     for body in range(body_count):
         state.body_is_braked[body] = 0
         if state.body_status[body] == _DONE:
@@ -217,11 +219,11 @@ def _end_step(state: ti.template(), body_count):
 
 
 @ti.func
-def _meet(state: ti.template(), worker_count: ti.template()):
-    """Wait until all workers have come here as often as this one."""
+def _wait_for_workers(state: ti.template(), worker_count: ti.template()):
+    """Wait until all workers have called this as often as this one."""
     arrived = ti.atomic_add(state.barrier[0], 1) + 1
     target = (arrived + worker_count - 1) // worker_count * worker_count
-    # A maximum with -1 changes nothing; it is here because it cannot be optimised into a plain load.
+    # A maximum with -1 changes nothing, but cannot be optimised into a plain load.
     while ti.atomic_max(state.barrier[0], -1) < target:
         pass
 
@@ -241,9 +243,9 @@ def step_flat_cpu(
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """Substeps from `first` to before `last`, of so many in one attempt, of `attempts`, at a fixed step.
+    """Run substeps `first` to `last` - 1 of `substeps` in one of several attempts at a fixed step.
 
-    Of all bodies that have not made it yet, by `program.worker_count` threads. Returns how many failed.
+    It acts on all bodies that are not done, with `program.worker_count` threads. Returns: how many failed.
     """
     failed = 0
     state.barrier[0] = 0
@@ -260,29 +262,29 @@ def step_flat_cpu(
             for block in range(b0, b1):
                 _block_phase(state, program, block)
             if ti.static(program.reads_expansion):
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
             for e in range(e0, e1):
                 _edge_phase(state, program, e)
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
             is_damped = 0
             for body in range(body_count):
                 is_damped = is_damped | int(_is_damped_now(state, body, h, s, substeps))
             if is_damped == 1:
                 for p in range(p0, p1):
                     _gather_phase(state, p, h, s, substeps)
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
                 for i in range((body_count - worker + workers - 1) // workers):
                     _damp_phase(state, program, worker + i * workers, h, s, substeps)
-                _meet(state, workers)
+                _wait_for_workers(state, workers)
             for p in range(p0, p1):
                 _move_phase(state, program, p, h, s)
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
         if last == substeps:
             for p in range(p0, p1):
                 _check_phase(state, p, int(attempt == attempts - 1))
-            _meet(state, workers)
+            _wait_for_workers(state, workers)
             for p in range(p0, p1):
-                _fall_back_phase(state, p)
+                _restore_phase(state, p)
             if ti.static(program.has_plasticity):
                 for block in range(b0, b1):
                     _flow_phase(state, block, substeps * h)
@@ -291,7 +293,7 @@ def step_flat_cpu(
         if last == substeps:
             for body in range(body_count):
                 is_last = int(attempt == attempts - 1)
-                failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+                failed += _end_attempt(state, body, h, int(attempt == attempts - 2), is_last)
             if failed == 0 or attempt == attempts - 1:
                 _end_step(state, body_count)
     return failed
@@ -299,9 +301,9 @@ def step_flat_cpu(
 
 @ti.kernel
 def begin_flat(state: ti.template(), particle_count: ti.i32):
-    """Remember where every particle is."""
+    """Save the state of every particle."""
     for p in range(particle_count):
-        _remember_phase(state, p)
+        _save_phase(state, p)
 
 
 @ti.kernel
@@ -316,7 +318,7 @@ def substep_flat(
     h: ti.f32,
     s: ti.i32,
 ):
-    """One substep with one tetrahedron, edge or particle per thread."""
+    """Run one substep with one tetrahedron, edge or particle per thread."""
     for t in range(block_count * LANES):
         block, lane = t // LANES, t % LANES
         is_active = _block_is_active(state, block)
@@ -348,24 +350,24 @@ def end_flat(
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """After the substeps of an attempt at a step: put back what failed. Returns how many bodies did."""
+    """End an attempt at a step: restore failed bodies. Returns: how many failed."""
     failed = 0
     for p in range(particle_count):
         _check_phase(state, p, int(attempt == attempts - 1))
     for p in range(particle_count):
-        _fall_back_phase(state, p)
+        _restore_phase(state, p)
     if ti.static(program.has_plasticity):
         for block in range(block_count):
             _flow_phase(state, block, substeps * h)
     for body in range(body_count):
         is_last = int(attempt == attempts - 1)
-        failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+        failed += _end_attempt(state, body, h, int(attempt == attempts - 2), is_last)
     return failed
 
 
 @ti.kernel
 def finish_flat(state: ti.template(), body_count: ti.i32):
-    """After the last attempt."""
+    """End the step after the last attempt."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _end_step(state, body_count)

@@ -1,46 +1,50 @@
-"""Particles that the floor or colliders hold within the solve of implicit Euler, with Coulomb's friction.
+"""Particles that the solve of implicit Euler constrains to the floor or colliders, with Coulomb friction.
 
-Contact after the solve could take from the particles that touch no more than their own momentum. A body would
-sink into itself until its solve threw them down fast enough, and would follow a belt only as fast as its
-lowest particles pull. So the solve holds a particle that was stopped: it gets the velocity of the surface
-along the normal. If it sticks, it gets that velocity in all directions; if it slides, an impulse of friction.
-While impulses are off Coulomb's law the system is solved again, from the last solution: what would have to be
-pulled leaves, what sticks beyond friction slides, and what friction would turn back sticks.
+Contact after the solve could remove only the momentum of the particles that touch. A body would sink into
+itself until its solve throws these down fast enough, and would follow a conveyor belt only as fast as its
+lowest particles pull it. So the solve constrains each particle that was stopped: along the normal, it gets
+the velocity of the surface. A sticking particle gets that velocity in all directions, a sliding one an
+impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting from the last
+solution: particles that would be pulled are released, particles that stick beyond the friction limit slide,
+and particles that friction would turn back stick.
+
+Groups of fields: reads colliders.
 """
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system, squared_load
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
-HARDEST = 1e24
-"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: it counts as none."""
+MAX_IMPULSE = 1e24
+"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: it counts as zero."""
 
-MOST_SOLVES = 6
-"""In one substep, to find which particles stick, slide and leave."""
+MAX_SOLVES = 6
+"""Solves in one substep, at most, to find which particles stick, slide and leave."""
 
-CLOSE = 0.003
-"""Error of the impulses by Coulomb's law, over their sum, at which a substep is not solved again."""
+TOLERANCE = 0.003
+"""Violation of Coulomb's law, over the sum of impulses, at which a substep is not solved again."""
 
-GIVEN_BACK = 0.1
-"""Largest relative change of a sliding velocity where friction was too strong: a larger one keeps a body from
-coming to rest."""
+MAX_REVERSAL = 0.1
+"""Largest relative change of a sliding velocity that undoes too strong friction. Larger changes would keep a
+body from coming to rest."""
 
 
 @ti.func
 def _friction_on(state: ti.template(), p):
-    """Coefficient of friction of what holds a particle."""
-    return state.contact.collider_surface[state.particle_contact[p] - 1].x
+    """Friction coefficient of the collider under a particle."""
+    return state.colliders.surface[state.particle_contact[p] - 1].x
 
 
 @ti.func
-def hold_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
-    """Hold a particle for which `particle_contact` says by what.
+def constrain_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
+    """Constrain a particle to the collider in `particle_contact`.
 
-    It sticks in the first solve if it slides no faster than what gravity changes in a substep.
+    It sticks in the first solve if it slides no faster than gravity accelerates in a substep.
 
     Args:
         n: normal of the surface.
-        sliding: velocity relative to the surface before the substep [m/s]; its part along `n` is ignored.
+        sliding: velocity relative to the surface before the substep [m/s]; its component along `n` is
+            ignored.
         surface_velocity: mean velocity of the surface in the substep [m/s].
         fall: change of velocity by gravity in a substep [m/s].
     """
@@ -53,7 +57,7 @@ def hold_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
 
 @ti.func
 def _begin_solve(state: ti.template(), body):
-    """Write velocities of held particles to `solution`, and the residual of it to `residual`."""
+    """Write the velocities of constrained particles to `solution`, and its residual to `residual`."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_contact[p] > 0:
@@ -71,10 +75,10 @@ def _begin_solve(state: ti.template(), body):
 
 @ti.func
 def _impulse_of(state: ti.template(), p):
-    """Impulse of the last solve on a particle that is held.
+    """Impulse of the last solve on a constrained particle.
 
-    Returns: its part along the normal [N s], its part across, the limit of that by friction, and the velocity
-    of the particle relative to the surface, without the part along the normal [m/s].
+    Returns: its component along the normal [N s], the tangential rest, the friction limit of that, and the
+    tangential velocity of the particle relative to the surface [m/s].
     """
     hold = state.particle_hold[p]
     n = hold.xyz
@@ -87,11 +91,11 @@ def _impulse_of(state: ti.template(), p):
 
 
 @ti.func
-def _judge(state: ti.template(), body):
-    """Measure how far impulses are from Coulomb's law.
+def _measure_errors(state: ti.template(), body):
+    """Measure the violation of Coulomb's law.
 
-    Returns: sums over all particles [N s]: of impulses, of those that pull, of what is beyond friction where
-    particles stick, and of the errors of friction where they slide.
+    Returns: sums over all particles [N s]: of impulses, of those that pull, of the excess over the friction
+    limit where particles stick, and of the errors of friction where they slide.
     """
     total, pulling = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     beyond, wrong = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
@@ -112,11 +116,11 @@ def _judge(state: ti.template(), body):
 
 
 @ti.func
-def _correct(state: ti.template(), body, releases):
-    """Change what holds particles, and friction on them, after a solve.
+def _update_constraints(state: ti.template(), body, releases):
+    """Update constraints and friction after a solve.
 
     Args:
-        releases: whether particles leave that would have to be pulled (1).
+        releases: 1 to release particles that are pulled.
     """
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -137,45 +141,45 @@ def _correct(state: ti.template(), body, releases):
 
 @ti.func
 def solve_held(state: ti.template(), body, held_count, h):
-    """Solve the system of a body of which so many particles are held.
+    """Solve the system of a body with `held_count` constrained particles.
 
-    Changes of velocity are in `solution`, and in `image` what the system makes of them [N s].
+    `solution` receives the changes of velocity, and `image` their product with the system [N s].
 
-    Returns: the residual left, over the load.
+    Returns: the remaining residual over the load.
     """
     load = squared_load(state, body, h)
     residual, solves = ti.cast(0.0, state.real), 0
-    while solves < MOST_SOLVES:
+    while solves < MAX_SOLVES:
         if held_count > 0:
             _begin_solve(state, body)
         residual = solve_system(state, body, load)
         multiply(state, body, state.solution, state.image)
         solves += 1
         if held_count == 0:
-            solves = MOST_SOLVES
-        elif solves < MOST_SOLVES:
-            total, pulling, beyond, wrong = _judge(state, body)
-            if pulling + beyond + wrong > CLOSE * total:
-                _correct(state, body, int(beyond <= CLOSE * total))
+            solves = MAX_SOLVES
+        elif solves < MAX_SOLVES:
+            total, pulling, beyond, wrong = _measure_errors(state, body)
+            if pulling + beyond + wrong > TOLERANCE * total:
+                _update_constraints(state, body, int(beyond <= TOLERANCE * total))
             else:
-                solves = MOST_SOLVES
+                solves = MAX_SOLVES
     return residual
 
 
 @ti.func
 def held_velocity(state: ti.template(), p):
-    """Velocity of a held particle after the solve.
+    """Velocity of a constrained particle after the solve.
 
-    Friction that the solves left too weak or too strong acts on the particle alone, and none does work on it.
+    Errors of friction that the solves left are corrected on the particle alone, without adding energy.
 
-    Returns: the velocity [m/s], the impulse along the normal [N s], and that across.
+    Returns: the velocity [m/s], the impulse along the normal and the tangential impulse [N s].
     """
     pressing, across, most, sliding = _impulse_of(state, p)
-    if not ti.abs(pressing) + across.norm() < HARDEST:
+    if not ti.abs(pressing) + across.norm() < MAX_IMPULSE:
         pressing, across = ti.cast(0.0, state.real), ti.Vector.zero(state.real, 3)
     elif state.particle_hold[p].w == SLIDES:
         momentum = state.particle_mass[p] * sliding.norm()
-        brake = ti.min(ti.max(most - across.norm(), -GIVEN_BACK * momentum), momentum)
+        brake = ti.min(ti.max(most - across.norm(), -MAX_REVERSAL * momentum), momentum)
         if across.dot(sliding) > 0.0:
             brake = momentum
         share = brake / ti.max(momentum, 1e-30)

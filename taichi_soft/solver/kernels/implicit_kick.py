@@ -1,49 +1,56 @@
-"""Implicit Euler among colliders: which particles its solve holds on them, and what colliders feel."""
+"""Kick of implicit Euler: constrain particles to colliders, solve, and apply impulses to the colliders.
+
+Groups of fields: reads colliders.
+"""
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.collide import react_on_collider
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle
-from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, keep_residual, solve_body
+from taichi_soft.solver.kernels.held_particles import constrain_particle, held_velocity
+from taichi_soft.solver.kernels.implicit_solve import add_pin_reactions, record_residual, solve_body
 
 
 @ti.func
-def _surface_velocity(contact: ti.template(), c, x, since, h):
-    """Mean velocity in a substep of the point of a collider that is at `x` [m/s].
+def _surface_velocity(colliders: ti.template(), c, x, since, h):
+    """Mean velocity of a collider's surface at `x` in a substep [m/s].
 
-    Of a turning one that is the chord: along the tangent, what lies on it would spiral outwards.
+    For a rotating collider it points along the chord: along the tangent, particles on it would spiral
+    outwards.
 
-    Returns: it, and the way from the collider's position to the point [m].
+    Returns: the velocity, and the vector from the collider's position to `x` [m].
     """
-    arm = x - contact.collider_position[c] - since * contact.collider_velocity[c]
-    turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * contact.collider_spin[c])
-    return contact.collider_velocity[c] + (turned(turn, arm) - arm) / h, arm
+    arm = x - colliders.position[c] - since * colliders.velocity[c]
+    turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * colliders.spin[c])
+    return colliders.velocity[c] + (turned(turn, arm) - arm) / h, arm
 
 
 @ti.func
-def _surface_below(contact: ti.template(), c, x, since):
-    """Distance of a point from a collider's skin `since` [s] after the start of the step; normal there."""
-    rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
-    place = x - contact.collider_position[c] - since * contact.collider_velocity[c]
-    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
-    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
+def _surface_below(colliders: ti.template(), c, x, since):
+    """Distance of a point from a collider's skin `since` [s] after the start of the step, and the normal
+    there.
+    """
+    rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
+    place = x - colliders.position[c] - since * colliders.velocity[c]
+    kind, parameters = colliders.kind[c], colliders.parameters[c]
+    resolution, offset = colliders.resolution[c], colliders.offset[c]
     distance, normal = signed_distance(
-        contact.samples, kind, parameters, resolution, offset, turned_back(rotation, place)
+        colliders.samples, kind, parameters, resolution, offset, turned_back(rotation, place)
     )
-    return distance - contact.collider_surface[c].z, turned(rotation, normal)
+    return distance - colliders.surface[c].z, turned(rotation, normal)
 
 
 @ti.func
-def _lay_on_colliders(state: ti.template(), body, h, since):
-    """Hold particles that lie on colliders; release others.
+def _constrain_to_colliders(state: ti.template(), body, h, since):
+    """Constrain the particles that lie on colliders, and release others.
 
-    A particle lies there while gravity alone would bring it back within the substep.
+    A particle lies on a collider while gravity alone would bring it back within the substep.
 
-    Returns: the number of particles that are held.
+    Returns: the number of constrained particles.
     """
     count, fall = 0, h * gravity_on(state, body).norm()
     particles = state.body_particles[body]
@@ -51,70 +58,71 @@ def _lay_on_colliders(state: ti.template(), body, h, since):
         c = state.particle_contact[p] - 1
         state.particle_contact[p] = 0
         if c >= 0 and state.particle_inv_mass[p] > 0.0:
-            mine, theirs = state.contact.body_filter[body], state.contact.collider_filter[c]
+            mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
             x, v = state.particle_position[p], state.particle_velocity[p]
-            distance, n = _surface_below(state.contact, c, x, since)
-            surface_velocity, _ = _surface_velocity(state.contact, c, x, since, h)
+            distance, n = _surface_below(state.colliders, c, x, since)
+            surface_velocity, _ = _surface_velocity(state.colliders, c, x, since, h)
             leaving = n.dot(v - surface_velocity)
             is_near = distance + h * leaving <= TOUCHING + h * fall
-            if state.contact.collider_kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
+            if state.colliders.kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
                 if (theirs[0] & mine[1]) != 0:
-                    velocity_so_far, _ = _surface_velocity(state.contact, c, x, since, -h)
+                    velocity_so_far, _ = _surface_velocity(state.colliders, c, x, since, -h)
                     state.particle_contact[p] = c + 1
                     approach = ti.max(distance - TOUCHING, 0.0) / h
-                    hold_particle(state, p, n, v - velocity_so_far, surface_velocity - approach * n, fall)
+                    constrain_particle(
+                        state, p, n, v - velocity_so_far, surface_velocity - approach * n, fall
+                    )
                     count += 1
     return count
 
 
 @ti.func
-def _press(state: ti.template(), body, p, h, since):
-    """Velocity of a particle on a collider after the solve [m/s]; the collider feels its impulse."""
+def _apply_impulse(state: ti.template(), body, p, h, since):
+    """Apply the impulse of a constrained particle to its collider. Returns: the particle's velocity [m/s]."""
     c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
     velocity, pressing, across = held_velocity(state, p)
-    surface_velocity, arm = _surface_velocity(state.contact, c, state.particle_position[p], since, h)
+    surface_velocity, arm = _surface_velocity(state.colliders, c, state.particle_position[p], since, h)
     impulse = pressing * n + across
-    row = body * state.contact.capacity.colliders + c
-    state.contact.impulse[row] = state.contact.impulse[row] - impulse
-    state.contact.angular_impulse[row] = state.contact.angular_impulse[row] - arm.cross(impulse)
+    row = body * state.colliders.capacity.colliders + c
+    react_on_collider(state, row, arm, impulse)
     if pressing < 0.0:
         state.particle_contact[p] = 0
     else:
-        state.contact.particle_touches[p] = 1
-        if state.contact.collider_surface[c].y >= 0.0:
+        state.particle_touches[p] = 1
+        if state.colliders.surface[c].y >= 0.0:
             along = n.dot(surface_velocity)
-            add_normal_impulse(state.contact, row, pressing, n, along, along)
+            add_normal_impulse(state.colliders, row, pressing, n, along, along)
     return velocity
 
 
 @ti.func
 def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since, is_first, common):
-    """New velocities of one body from a solve, and in `direction` where its particles are.
+    """Solve for the new velocities of one body, and write its present positions to `direction`.
 
     Args:
         since: time since the start of the step [s].
         is_first: 1 in the first substep of a step.
-    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    Returns: the highest speed [m/s], and the highest relative to the `common` velocity.
     """
-    held_count = _lay_on_colliders(state, body, h, since)
-    keep_residual(state, body, solve_body(state, program, body, h, held_count), is_first)
+    held_count = _constrain_to_colliders(state, body, h, since)
+    record_residual(state, body, solve_body(state, program, body, h, held_count), is_first)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         v = state.particle_velocity[p]
-        state.contact.particle_touches[p] = 0
+        state.particle_touches[p] = 0
         if state.particle_inv_mass[p] == 0.0:
             state.solution[p] = state.particle_force[p].xyz - state.image[p]
         else:
             v += state.solution[p]
             if state.particle_contact[p] > 0:
-                v = _press(state, body, p, h, since)
+                v = _apply_impulse(state, body, p, h, since)
         state.particle_velocity[p] = v
         state.direction[p] = state.particle_position[p]
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
         if ti.static(program.has_soft_contact):
-            state.soft.particle_speed[p] = (v - common).norm()
+            state.particle_speed[p] = (v - common).norm()
             highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
     add_pin_reactions(state, body, h)
     return ti.sqrt(highest), ti.sqrt(highest_beside)

@@ -1,30 +1,33 @@
-"""Islands: bodies that may touch each other in a step or are joined, directly or through others.
+"""Islands: bodies that can touch each other in a step or are joined, directly or through others.
 
-One thread owns an island, so that what passes between its bodies has one order (see `jobs.py`). A body
-that stays clear of all others is an island of its own.
+One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
+stays clear of all others is an island of its own.
+
+Groups of fields: reads hull, joints; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull import motion_of
+from taichi_soft.contact.kernels.hull_points import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-SPARE = 0.25
-"""Mean edges by which bodies may come nearer than their velocities say, and still be in one island."""
+ISLAND_MARGIN = 0.25
+"""Distance, in mean edges, by which bodies can come closer than their velocities predict and still be in one
+island."""
 
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Box round each body's surface and its way through a step of `dt` [s]; of absent ones far away."""
+    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Absent bodies get a far one."""
     for body in range(body_count):
         if state.body_status[body] == ABSENT:
-            state.contact.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
+            state.body_bounds_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
         if state.body_status[body] == ASLEEP:
-            continue  # in the box that it fell asleep in
+            continue  # it keeps its box
         outer = state.touching.body_outer[body]
         p = state.touching.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
@@ -41,59 +44,59 @@ def _find_boxes(state: ti.template(), body_count, dt):
             lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
-        surface = state.soft.body_surface[body]
-        # What its parts do beside each other, they may do otherwise before the step is over.
+        surface = state.body_surface[body]
+        # Relative motion of its parts can change direction within the step.
         fall = gravity_on(state, body).norm() * dt * dt
-        reach = 0.5 * (fast - slow) * dt + fall + surface.y + SPARE * surface.z
-        state.contact.body_lower[body] = lower - reach
-        state.contact.body_upper[body] = upper + reach
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
+        state.body_bounds_lower[body] = lower - reach
+        state.body_bounds_upper[body] = upper + reach
 
 
 @ti.func
 def _sort_by_lower_x(state: ti.template(), body_count):
     """Insertion sort: bodies keep nearly the order they had a step ago."""
     for i in range(1, body_count):
-        body = state.soft.sweep_order[i]
-        x = state.contact.body_lower[body].x
+        body = state.islands.sweep_order[i]
+        x = state.body_bounds_lower[body].x
         j = i - 1
-        while j >= 0 and state.contact.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
-            state.soft.sweep_order[j + 1] = state.soft.sweep_order[j]
+        while j >= 0 and state.body_bounds_lower[state.islands.sweep_order[ti.max(j, 0)]].x > x:
+            state.islands.sweep_order[j + 1] = state.islands.sweep_order[j]
             j -= 1
-        state.soft.sweep_order[j + 1] = body
+        state.islands.sweep_order[j + 1] = body
 
 
 @ti.func
-def _root(contact: ti.template(), body):
+def _root(islands: ti.template(), body):
     root = body
-    while contact.parent[root] != root:
-        root = contact.parent[root]
+    while islands.parent[root] != root:
+        root = islands.parent[root]
     return root
 
 
 @ti.func
-def _join(contact: ti.template(), a, b):
-    p, q = _root(contact, a), _root(contact, b)
-    contact.parent[ti.max(p, q)] = ti.min(p, q)
+def _join(islands: ti.template(), a, b):
+    p, q = _root(islands, a), _root(islands, b)
+    islands.parent[ti.max(p, q)] = ti.min(p, q)
 
 
 @ti.func
 def _join_overlapping(state: ti.template(), body_count):
     for i in range(body_count):
-        a = state.soft.sweep_order[i]
+        a = state.islands.sweep_order[i]
         j = i + 1
         is_open = int(state.body_status[a] != ABSENT)
         while is_open == 1 and j < body_count:
-            b = state.soft.sweep_order[j]
+            b = state.islands.sweep_order[j]
             j += 1
-            if state.contact.body_lower[b].x > state.contact.body_upper[a].x:
+            if state.body_bounds_lower[b].x > state.body_bounds_upper[a].x:
                 is_open = 0
             elif state.body_status[b] != ABSENT and may_touch(state, a, b):
                 apart = 0
                 for k in ti.static(range(1, 3)):
-                    apart = apart | int(state.contact.body_lower[a][k] > state.contact.body_upper[b][k])
-                    apart = apart | int(state.contact.body_lower[b][k] > state.contact.body_upper[a][k])
+                    apart = apart | int(state.body_bounds_lower[a][k] > state.body_bounds_upper[b][k])
+                    apart = apart | int(state.body_bounds_lower[b][k] > state.body_bounds_upper[a][k])
                 if apart == 0:
-                    _join(state.contact, a, b)
+                    _join(state.islands, a, b)
 
 
 @ti.func
@@ -101,55 +104,54 @@ def _join_held(state: ti.template()):
     for j in range(MOST_JOINTS):
         ends = state.joints.bodies[j]
         if ends[0] > 0:
-            _join(state.contact, ends[0] - 1, ends[1] - 1)
+            _join(state.islands, ends[0] - 1, ends[1] - 1)
 
 
 @ti.func
 def _is_listed(state: ti.template(), body, end):
-    """Whether a body, whose parent is the root, and its root have a status before `end`."""
-    root = state.contact.parent[body]
+    """1 if a body, whose parent is the root, and its root have a status below `end`."""
+    root = state.islands.parent[body]
     return int(state.body_status[body] < end) & int(state.body_status[root] < end)
 
 
 @ti.func
 def _list_islands(state: ti.template(), body_count, end):
-    """Bodies of a status before `end`, island by island, both in ascending order: a counting sort."""
-    contact = state.contact
-    islands = 0
+    """List the bodies with a status below `end` by island, both in ascending order: a counting sort."""
+    fields, islands = state.islands, 0
     for body in range(body_count):
-        # No parent has a larger number than its child: the parent's parent is the root already.
-        root = contact.parent[contact.parent[body]]
-        contact.parent[body] = root
+        # A parent's number never exceeds its child's, so its parent is already the root.
+        root = fields.parent[fields.parent[body]]
+        fields.parent[body] = root
         if _is_listed(state, body, end):
             if root == body:
-                contact.body_island[body] = islands
-                contact.island_first[islands] = 0  # bodies in it so far
+                fields.of_body[body] = islands
+                fields.first[islands] = 0  # bodies in it so far
                 islands += 1
-            island = contact.body_island[root]
-            contact.body_island[body] = island
-            contact.island_first[island] = contact.island_first[island] + 1
+            island = fields.of_body[root]
+            fields.of_body[body] = island
+            fields.first[island] = fields.first[island] + 1
     rows, island = 0, 0
     while island < islands:
-        rows += contact.island_first[island]
-        contact.island_first[island] = rows  # the row after its last one
+        rows += fields.first[island]
+        fields.first[island] = rows  # the row after its last one
         island = row_behind(island)
     for i in range(body_count):
         body = body_count - 1 - i
         if _is_listed(state, body, end):
-            island = contact.body_island[body]
-            row = contact.island_first[island] - 1
-            contact.island_first[island] = row
-            contact.island_body[row] = body
-    contact.island_first[islands] = rows
-    contact.island_count[None] = islands
+            island = fields.of_body[body]
+            row = fields.first[island] - 1
+            fields.first[island] = row
+            fields.body[row] = body
+    fields.first[islands] = rows
+    fields.count[None] = islands
 
 
 @ti.real_func
 def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
-    """Find which bodies may touch within a step of `dt` [s], and list them."""
+    """Find and list the islands of a step of `dt` [s]."""
     body = 0
     while body < body_count:
-        state.contact.parent[body] = body
+        state.islands.parent[body] = body
         body = row_behind(body)
     _find_boxes(state, body_count, dt)
     _sort_by_lower_x(state, body_count)
@@ -161,18 +163,18 @@ def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 
 @ti.kernel
 def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """In which island each body was in the last step."""
+    """Read the island of each body in the last step."""
     ti.loop_config(serialize=True)
     for body in range(islands.shape[0]):
-        islands[body] = state.contact.body_island[body]
+        islands[body] = state.islands.of_body[body]
 
 
 @ti.kernel
 def list_joined_islands(state: ti.template(), body_count: ti.i32):
-    """The islands where bodies do not touch each other: what joints make of them, until those change."""
+    """List the islands of joints in a world whose bodies do not touch each other, until the joints change."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         for body in range(body_count):
-            state.contact.parent[body] = body
+            state.islands.parent[body] = body
         _join_held(state)
-        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, where bodies may come any time
+        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, which can be filled at any time

@@ -1,23 +1,25 @@
-"""How threads share an island: phase by phase, each thread takes bodies until none is left.
+"""Sharing an island between threads: phase by phase, each thread takes bodies until none is left.
 
     thread 0                              thread 1                       thread 2
     owns island 0 of bodies a b c d       owns island 1 of body e        owns none: helper 1
     ----------------------------------    ---------------------------    ----------------------
-    calls for KICK
+    starts KICK
     kick a, kick b                        kick e                         kick c, kick d
     waits for c and d
     solves joints of a b c d              joints, contact, drift of e    looks for bodies
-    calls for NARROW_PHASE
+    starts NARROW_PHASE
     gaps of a, b                          next substep                   gaps of c, d
     solves contacts of a b c d            ...                            looks for bodies
-    calls for DRIFT
+    starts DRIFT
     ...                                   has no island left: helper 2   ...
 
-An island of several bodies is a *shared island*. One thread *owns* it. The owner does what passes between
-its bodies, and calls for a *job*: a phase that each of them makes by itself. *Helpers* are threads that own
-no island, or none any more. They take bodies of a job that nobody has taken yet, and so does the owner. The
-owner then waits for the bodies that others took. Nobody waits for a thread that has not begun: where none is
-free the owner takes all bodies itself. What becomes of a body does not depend on which thread took it.
+An island of several bodies is a *shared island*. One thread *owns* it. The owner solves joints and contacts
+between its bodies, and starts *jobs*: phases that each body runs separately. *Helpers* are threads that own
+no island, or have finished theirs. Owner and helpers take bodies that no thread has taken yet. The owner then
+waits for the bodies that others took. It never waits for a thread that has not started: without free threads
+it takes all bodies itself. The result for a body does not depend on the thread.
+
+Groups of fields: reads islands; writes jobs.
 """
 
 from taichi_soft.core.math.rows import row_behind
@@ -25,30 +27,30 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import MOST_PARTS, Job
 
 OWNER = 0
-"""Number of the worker that owns an island; its helpers are numbered on."""
+"""Number of the worker that owns an island; helpers have the numbers after it."""
 
 HELP = -1
-"""Instead of a phase: whatever the owner has called for."""
+"""Used in place of a phase: run the phase that the owner has started."""
 
 
 @ti.func
 def _now(counter: ti.template()):
-    """What a counter is that other threads change.
+    """Read a counter that other threads change.
 
-    A maximum with -1 changes nothing that matters; it cannot be optimised into a plain load.
+    A maximum with -1 does not change it, and cannot be optimised into a plain load.
     """
     return ti.atomic_max(counter, -1)
 
 
 @ti.func
 def _size_of(state: ti.template(), island):
-    """Bodies of an island."""
-    return state.contact.island_first[island + 1] - state.contact.island_first[island]
+    """Number of bodies of an island."""
+    return state.islands.first[island + 1] - state.islands.first[island]
 
 
 @ti.func
 def is_shared_island(state: ti.template(), island):
-    """Whether an island has several bodies, so that other threads may help with it."""
+    """True if an island has several bodies, so that other threads can help."""
     return _size_of(state, island) > 1
 
 
@@ -61,23 +63,24 @@ def run_job(
     worker: ti.i32,
     job: Job,
 ):
-    """Take bodies of an island until none is waiting. The owner calls for a job first, and waits for all.
+    """Take bodies of an island until none is left. The owner starts the job first, and waits for all bodies.
 
-    Each worker begins with its own part of the bodies, and takes from those of others when that is done: what
-    a body reads and writes then stays in the cache of one core from phase to phase.
+    Each worker begins with its own part of the bodies, then takes from the parts of others. So the data of a
+    body stay in the cache of one core from phase to phase.
 
-    What is called for is written here, because to Taichi no call reads what was written before it: it drops
-    what is written again before the kernel itself reads it. A body alone is nobody else's business: what its
-    thread wrote here would take the cache line from those of its neighbours.
+    The job is stored here and not in another function, because Taichi assumes that a called function does not
+    read earlier writes, and drops a write that the kernel itself overwrites before reading it. Islands with
+    one body are not shared between threads: writing their job would move the cache line away from the threads
+    of their neighbours.
 
     Args:
         do_phase: a function (state, program, island, body, job).
-        worker: OWNER, or a helper's number; the owner alone may call for any phase but HELP.
+        worker: OWNER, or a helper's number; only the owner can start a phase other than HELP.
     """
-    first, count = state.contact.island_first[island], _size_of(state, island)
+    first, count = state.islands.first[island], _size_of(state, island)
     called = job
     is_shared = int(count > 1)
-    parts, rows = 1, state.contact.island_body.shape[0]
+    parts, rows = 1, state.islands.body.shape[0]
     if is_shared == 1:
         parts = state.jobs.parts[None]
         if job.phase != HELP:
@@ -97,7 +100,7 @@ def run_job(
         while place > 0:
             if job.phase == HELP:
                 called = state.jobs.job[island]
-            do_phase(state, program, island, state.contact.island_body[before + place], called)
+            do_phase(state, program, island, state.islands.body[before + place], called)
             done += 1
             place = 0
             if is_shared == 1:
@@ -111,9 +114,9 @@ def run_job(
 
 @ti.func
 def open_shared_islands(state: ti.template(), helpers):
-    """Before the islands are stepped: what there is to help with."""
+    """Before the islands are stepped, count the work that can be shared."""
     islands, members, island = 0, 0, 0
-    while island < state.contact.island_count[None]:
+    while island < state.islands.count[None]:
         if is_shared_island(state, island):
             islands += 1
             members += _size_of(state, island)
@@ -125,16 +128,17 @@ def open_shared_islands(state: ti.template(), helpers):
 
 @ti.func
 def close_shared_island(state: ti.template(), island):
-    """After the step of an island: its helpers may look elsewhere."""
+    """After the step of an island, release its helpers."""
     if is_shared_island(state, island):
         ti.atomic_sub(state.jobs.unfinished_islands[None], 1)
 
 
 @ti.func
 def help_others(state: ti.template(), program: ti.template(), do_phase: ti.template(), helper):
-    """Work on shared islands until all are finished, as one of the first helpers; others would only be in the
-    way."""
+    """Work on shared islands until all are finished, as one of the first helpers; more would only slow them
+    down.
+    """
     while helper < state.jobs.useful_helpers[None] and _now(state.jobs.unfinished_islands[None]) > 0:
-        for island in range(state.contact.island_count[None]):
+        for island in range(state.islands.count[None]):
             if is_shared_island(state, island):
                 run_job(state, program, do_phase, island, helper + 1, Job(phase=HELP))

@@ -1,35 +1,38 @@
-"""Kick among colliders: new velocities from forces. Positions follow in the drift.
+"""Kick among colliders: new velocities from forces. The drift then moves positions.
 
-Between the two the island takes velocities away, in joints and in contact of bodies with each other.
+In between, joints and contact between bodies change velocities island by island.
+
+Groups of fields: writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.contact.kernels.hull import note_points
+from taichi_soft.contact.kernels.hull_points import update_points
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import Job
 
-JOLT = 1.0
-"""By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
-body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
-cross the smallest tetrahedron."""
+MAX_VELOCITY_CHANGE = 1.0
+"""Largest change of a particle's velocity by the forces of one substep, over the speed of sound in its body.
+Stable vibrations stay below it, even of slivers: a stable substep is about the time in which sound crosses
+the smallest tetrahedron."""
 
-PRESSED = 4.0
-"""The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
-by what it presses against."""
+TOUCHED_FACTOR = 4.0
+"""Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep: contact removes
+most of its change."""
 
 EXPLODING = 20.0
-"""Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
-taken to be exploding: others pass through it until it is frozen or calm."""
+"""Path of a particle within one substep, over the mean edge of its body's surface, above which the body
+counts as exploding. Others pass through it until it is frozen or slower."""
 
 
 @ti.func
-def _put_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
-    """Write what a kick made of `LANES` particles from `first` on, and clear what the next one begins with.
+def _store_block(state: ti.template(), first, positions: ti.template(), velocities: ti.template()):
+    """Store new positions and velocities of `LANES` particles from `first` on, and clear their touches and
+    forces.
 
-    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
+    One loop per field: a loop of constant length over one field compiles to a few wide stores.
     """
     for lane in range(LANES):
         for i in ti.static(range(3)):
@@ -38,46 +41,48 @@ def _put_block(state: ti.template(), first, positions: ti.template(), velocities
         for i in ti.static(range(3)):
             state.particle_velocity[first + lane][i] = velocities[lane, i]
     for lane in range(LANES):
-        state.contact.particle_touches[first + lane] = 0
+        state.particle_touches[first + lane] = 0
     for lane in range(LANES):
         state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
 
 
 @ti.func
-def _put_last_block(state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()):
-    """The same of the last particles of a body, fewer than `LANES`."""
+def _store_last_block(
+    state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()
+):
+    """Store the last particles of a body, fewer than `LANES`, in the same way."""
     lane = 0
     while lane < count:
         p = first + lane
         for i in ti.static(range(3)):
             state.particle_position[p][i] = positions[lane, i]
             state.particle_velocity[p][i] = velocities[lane, i]
-        state.contact.particle_touches[p] = 0
+        state.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         lane = row_behind(lane)
 
 
 @ti.func
-def _note_block(state: ti.template(), first, count, common, velocities: ti.template()):
-    """Write the speeds of up to `LANES` particles relative to the `common` velocity, for contacts.
+def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
+    """Store the speeds of up to `LANES` particles relative to the `common` velocity, for contact.
 
-    Called before new velocities are written. Returns: the squares of possible impact speeds.
+    Call it before new velocities are stored. Returns: the squares of possible impact speeds.
     """
     speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         v = ti.Vector([velocities[lane, i] for i in ti.static(range(3))])
         speeds[lane] = (v - common).norm()
-        # What presses against others gains speed only to lose it to them.
-        was_touched = state.contact.particle_touches[first + lane] == 1
+        # A particle in contact loses the speed that it gains in the kick again.
+        was_touched = state.particle_touches[first + lane] == 1
         beside = ti.select(was_touched, state.particle_velocity[first + lane], v) - common
         striking2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
     if count >= LANES:
         for lane in range(LANES):
-            state.soft.particle_speed[first + lane] = speeds[lane]
+            state.particle_speed[first + lane] = speeds[lane]
     else:
         lane = 0
         while lane < count:
-            state.soft.particle_speed[first + lane] = speeds[lane]
+            state.particle_speed[first + lane] = speeds[lane]
             lane = row_behind(lane)
     return striking2
 
@@ -88,18 +93,18 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
     Forces are cleared. Rows beyond the last particle are computed too, and ignored.
 
-    Returns: of each the square of its speed, of that with which it may strike another, and of its
-    acceleration, which counts less where something held it.
+    Returns: for each the squares of its speed, of its possible impact speed, and of its acceleration, which
+    is reduced for touched particles.
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
     velocities = ti.Matrix.zero(state.real, LANES, 3)
     speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
+    # This loop stores to local arrays only: the compiler cannot know that fields do not overlap.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
-        # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
+        # All four components of a force (the last is 0), for wide loads without gaps.
         acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         x, v = program.integrator.advance(
@@ -109,15 +114,15 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        counts = ti.select(state.contact.particle_touches[p] == 1, 1.0 / PRESSED**2, 1.0)
+        counts = ti.select(state.particle_touches[p] == 1, 1.0 / TOUCHED_FACTOR**2, 1.0)
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if ti.static(program.has_soft_contact):
         if job.has_pairs == 1:
-            striking2 = _note_block(state, first, count, job.velocity, velocities)
+            striking2 = _store_speeds(state, first, count, job.velocity, velocities)
     if count >= LANES:
-        _put_block(state, first, positions, velocities)
+        _store_block(state, first, positions, velocities)
     else:
-        _put_last_block(state, first, count, positions, velocities)
+        _store_last_block(state, first, count, positions, velocities)
     return speed2, striking2, acceleration2
 
 
@@ -125,8 +130,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
     """Compute velocities after `kick` [s] of the forces, and positions after the job's `drift_time`.
 
-    Returns: the highest speed [m/s]; the highest and the mean with which it may strike another, if it has
-    pairs; and whether forces changed no velocity by too much at once (1).
+    Returns: the highest speed [m/s]; the highest and the mean possible impact speed, if the body has pairs;
+    and 1 if forces changed no velocity by too much at once.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -137,37 +142,37 @@ def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick
         v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, job)
         speed2, striking2 = ti.max(speed2, v2), ti.max(striking2, b2)
         acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
-    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= JOLT * state.body_sound_speed[body])
+    is_stable = int(kick * ti.sqrt(acceleration2.max()) <= MAX_VELOCITY_CHANGE * state.body_sound_speed[body])
     return ti.sqrt(speed2.max()), ti.sqrt(striking2.max()), ti.sqrt(total2.sum() / count), is_stable
 
 
 @ti.func
-def _note_speeds(
+def _store_body_speeds(
     state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
 ):
-    """For the island, and for the search for contacts."""
-    # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
-    # is as it was is not written.
-    state.contact.body_speed[body] = speed
-    if state.contact.is_stable[body] != is_stable:
-        state.contact.is_stable[body] = is_stable
+    """Store the speeds of a body for its island and for the search for contacts."""
+    # Unchanged values are not written: neighbouring bodies share a cache line, which a write takes from
+    # other threads.
+    state.islands.body_speed[body] = speed
+    if state.islands.is_stable[body] != is_stable:
+        state.islands.is_stable[body] = is_stable
     if ti.static(program.has_soft_contact):
-        state.contact.body_speed_beside[body] = beside
-        state.contact.body_mean_beside[body] = mean_beside
+        state.islands.body_speed_beside[body] = beside
+        state.islands.body_mean_beside[body] = mean_beside
         is_exploding = int(not (speed * h <= EXPLODING * state.body_edge[body]))
-        if state.contact.is_exploding[body] != is_exploding:
-            state.contact.is_exploding[body] = is_exploding
+        if state.islands.is_exploding[body] != is_exploding:
+            state.islands.is_exploding[body] = is_exploding
 
 
 @ti.real_func
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
-    """Compute new velocities of one body, on which forces act for `felt` [s], and write its speeds.
+    """Compute new velocities of one body, on which forces act for `felt` [s], and store its speeds.
 
     Returns: 1 if forces changed no velocity by too much at once.
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):
-        of_points, beside_of_points = note_points(state, body, job.velocity)
+        of_points, beside_of_points = update_points(state, body, job.velocity)
         speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
-    _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
+    _store_body_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
     return is_stable

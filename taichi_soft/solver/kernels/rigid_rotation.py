@@ -1,14 +1,14 @@
-"""Keep the stiffness matrix of implicit Euler from braking the rotation of a body.
+"""Keep the stiffness matrix of implicit Euler from slowing down the rotation of a body.
 
 Internal forces have no torque, but -K v has one, because K is projected and the forces are those of the old
-positions. So K acts on velocities beside the rotation of the body, P v = v - W J W^T M v: the matrix is
-P^T K P. W maps an angular velocity to velocities, and J is the inverse of the inertia tensor. P^T K P is
-positive semi-definite like K, and has no torque. It differs from K by a matrix of rank 6, so that products
-need only the three columns of K W beside K.
+positions. So K acts on velocities without the body's rotation, P v = v - W J W^T M v, and the matrix is P^T K
+P. W maps an angular velocity to velocities, and J is the inverse of the inertia tensor. P^T K P is positive
+semi-definite like K, and has no torque. It differs from K by a matrix of rank 6, so that products need only
+the three columns of K W in addition to K.
 
-A body that is held swings by gravity like a pendulum, with the frequency sqrt(g / r) for the radius of
-gyration r. Without stiffness in the system a substep h is stable only for r > h^2 g / 4. So J has the inertia
-of a radius h^2 g added. A little more lets J exist for bodies along a straight line.
+A pinned body swings by gravity like a pendulum, with the frequency sqrt(g / r) for the radius of gyration r.
+Without stiffness in the system, a substep h is stable only for r > h^2 g / 4. So the inertia of a radius h^2
+g is added before J is computed. A little more makes J exist for bodies along a straight line.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -16,25 +16,25 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_edge_products
 
 THIN = 1e-6
-"""Moment of inertia that is added about every axis, over the trace of the tensor."""
+"""Moment of inertia added about every axis, over the trace of the tensor."""
 
 
 @ti.func
 def _cross_matrix(d):
-    """The matrix whose product with an angular velocity is its cross product with `d`."""
+    """Return the matrix whose product with an angular velocity is its cross product with `d`."""
     zero = d.x * 0.0
     return ti.Matrix([[zero, d.z, -d.y], [-d.z, zero, d.x], [d.y, -d.x, zero]])
 
 
 @ti.func
 def _arm(state: ti.template(), body, p):
-    """From the centre of mass of a body to a particle [m]."""
+    """Vector from the centre of mass of a body to a particle [m]."""
     first = state.body_particles[body][0]
     return state.particle_position[p] - state.particle_position[first] - state.body_center[body]
 
 
 @ti.func
-def split_off_rotation(state: ti.template(), body, h):
+def project_out_rotation(state: ti.template(), body, h):
     """Prepare products with P^T K P for a body whose blocks hold h^2 K."""
     particles, edges = state.body_particles[body], state.body_edges[body]
     first = state.particle_position[particles[0]]
@@ -59,7 +59,7 @@ def split_off_rotation(state: ti.template(), body, h):
     added = THIN * inertia.trace() + mass * radius * radius + 1e-30
     for i in ti.static(range(3)):
         inertia[i, i] += added
-    scale = 1.0 / inertia.trace()  # whose cube would leave the range of numbers
+    scale = 1.0 / inertia.trace()  # its cube would overflow or underflow
     state.body_inverse_inertia[body] = scale * (scale * inertia).inverse()
     state.body_turning[body] = turning
 

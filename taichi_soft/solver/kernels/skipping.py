@@ -1,19 +1,19 @@
-"""Bodies that stand still for one step: they cost nothing in it, and go on with the velocities that they had.
+"""Bodies that skip one step: they cost nothing in it, and then continue with their velocities.
 
-As sleepers, they make the step after all where something comes near that moves: see `wake_island`.
+Like sleeping bodies, they take part in the step after all if a moving body comes near: see `wake_island`.
 """
 
 from taichi_soft.bodies.kernels.particles import save_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
-from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import note_boxes_of_skipping
+from taichi_soft.solver.kernels.sleep import store_boxes_of_skipping
 
 
 @ti.kernel
 def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Let bodies stand still in the coming step, but those that a force pushes in it."""
+    """Make bodies skip the coming step, except those that a force acts on in it."""
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
         body = bodies[i]
@@ -23,16 +23,16 @@ def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndi
 
 @ti.kernel
 def begin_skips(state: ti.template(), body_count: ti.i32):
-    """Before a step that some skip: where they are now is where something may come near them."""
+    """Update the boxes of the bodies that skip the coming step."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        note_boxes_of_skipping(state, body_count)
+        store_boxes_of_skipping(state, body_count)
 
 
 @ti.kernel
 def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
-    """After a step: who skipped it moves again. It is drawn where it stands, nothing has touched it, and what
-    a force field did is over.
+    """Make the bodies that skipped a step active again. They are drawn where they are, touched nothing, and
+    lose the forces of force fields.
 
     Returns: how many skipped it.
     """
@@ -46,7 +46,7 @@ def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
                 save_particle(state, p)
                 p = row_behind(p)
             if ti.static(state.capacity.has_contact):
-                forget_contacts(state, body)
+                clear_contacts(state, body)
             state.body_drives[body] = state.body_drives[body] & ~PUSHED
             state.body_status[body] = ACTIVE
             skipped += 1

@@ -1,26 +1,30 @@
-"""Sleep: islands in which nothing has moved for a while are left alone until something comes near."""
+"""Sleep: islands at rest are skipped until something comes near.
+
+Groups of fields: reads colliders, hull, islands.
+"""
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.hull import has_hull, place_points
+from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CALM_TIME = 0.5
-"""Time [s] for which all bodies of an island must be slow: longer than the turning point of a throw."""
+"""Time [s] for which all bodies of an island must be slow: longer than a thrown body is slow at its highest
+point."""
 
-NEAR = 0.01
-"""Way [m] beside a sleeping body's box within which what happens wakes it."""
+WAKE_MARGIN = 0.01
+"""Distance [m] from a sleeping body's box within which an event wakes it."""
 
 
 @ti.func
 def _wake_in_box(state: ti.template(), body_count, lower, upper):
-    """Wake bodies that sleep or stand still whose box is near another. Returns how many."""
+    """Wake bodies that sleep or skip the step and whose box is near another. Returns: how many."""
     woken = 0
     for body in range(body_count):
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
-            above = (lower - state.contact.body_upper[body]).max()
-            if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= NEAR:
+            above = (lower - state.body_bounds_upper[body]).max()
+            if ti.max(above, (state.body_bounds_lower[body] - upper).max()) <= WAKE_MARGIN:
                 state.body_status[body] = ACTIVE
                 woken += 1
     return woken
@@ -29,23 +33,23 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
 @ti.func
 def wake_by_colliders(state: ti.template(), body_count):
     """Wake sleeping bodies that a moving collider comes near in this step."""
-    for c in range(state.contact.collider_count[None]):
-        if state.contact.collider_kind[c] != NO_COLLIDER and state.contact.collider_speed[c] > 0.0:
-            _wake_in_box(state, body_count, state.contact.collider_lower[c], state.contact.collider_upper[c])
+    for c in range(state.colliders.count[None]):
+        if state.colliders.kind[c] != NO_COLLIDER and state.colliders.speed[c] > 0.0:
+            _wake_in_box(state, body_count, state.colliders.lower[c], state.colliders.upper[c])
 
 
 @ti.real_func
 def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
-    """Wake all bodies of an island of which one is awake. Returns whether any is."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    """Wake all bodies of an island if one of them is awake. Returns: 1 if so."""
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     is_awake = 0
     i = first
     while i < last:
-        is_awake = is_awake | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
+        is_awake = is_awake | int(state.body_status[state.islands.body[i]] == ACTIVE)
         i = row_behind(i)
     i = ti.select(is_awake == 1, first, last)
     while i < last:
-        body = state.contact.island_body[i]
+        body = state.islands.body[i]
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
             state.body_status[body] = ACTIVE
         i = row_behind(i)
@@ -53,26 +57,29 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 
 
 @ti.func
-def note_motion(state: ti.template(), body, speed):
-    """Start to count anew where a body is fast."""
-    if not (speed <= state.contact.sleep_speed[None]) and state.contact.calm[body] != 0.0:
-        state.contact.calm[body] = 0.0
+def reset_rest_timer(state: ti.template(), body, speed):
+    """Reset the rest timer of a body if it is fast."""
+    if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
+        state.body_calm_time[body] = 0.0
 
 
 @ti.func
-def note_way_of_hulled(state: ti.template(), body, dt):
-    """The same of a body with a hull, by its way through a step of `dt` [s]: what carries points in contact
-    goes to and fro from substep to substep, and stays where it is."""
+def reset_rest_timer_of_hull(state: ti.template(), body, dt):
+    """Reset the rest timer of a body with a hull if its displacement in a step of `dt` [s] is large.
+
+    Velocities do not count: carriers of points in contact oscillate from substep to substep without moving
+    away.
+    """
     if has_hull(state, body):
-        way = ti.cast(0.0, ti.f32)
+        displacement = ti.cast(0.0, ti.f32)
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
-            way = ti.max(way, (state.particle_position[p] - state.prev_position[p]).norm())
-        note_motion(state, body, way / dt)
+            displacement = ti.max(displacement, (state.particle_position[p] - state.prev_position[p]).norm())
+        reset_rest_timer(state, body, displacement / dt)
 
 
 @ti.func
-def note_box(state: ti.template(), body):
-    """Remember the box round a body that stands still, and round its hull."""
+def store_box(state: ti.template(), body):
+    """Store the box around a body that does not move, including its hull."""
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
     upper = lower
@@ -86,21 +93,20 @@ def note_box(state: ti.template(), body):
         for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x = state.particle_position[point]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-    state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+    state.body_bounds_lower[body], state.body_bounds_upper[body] = lower, upper
 
 
 @ti.real_func
-def note_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
-    """Remember the boxes round bodies that skip the coming step: they may have been moved since they were
-    told to."""
+def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
+    """Store the boxes around bodies that skip the coming step. They may have moved since `skip_bodies`."""
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
-            note_box(state, body)
+            store_box(state, body)
 
 
 @ti.func
 def _put_to_sleep(state: ti.template(), body):
-    """Stop a body where it is; when it wakes it counts anew."""
+    """Stop a body where it is, and reset its rest timer."""
     particles = state.body_particles[body]
     p = particles[0]
     while p < particles[1]:
@@ -108,31 +114,32 @@ def _put_to_sleep(state: ti.template(), body):
         state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
         state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
         p = row_behind(p)
-    note_box(state, body)
+    store_box(state, body)
     state.body_velocity_lag[body] = 0.0
-    state.contact.calm[body] = 0.0
+    state.body_calm_time[body] = 0.0
     state.body_status[body] = ASLEEP
 
 
 @ti.real_func
-def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
-    """Count the calm of an island after a step of `dt` [s], and let it fall asleep together.
+def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
+    """Add a step of `dt` [s] to the rest timers of an island, and put it to sleep when all have run long
+    enough.
 
-    Returns: whether it is still awake (1).
+    Returns: 1 if it is still awake.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, last = state.islands.first[island], state.islands.first[island + 1]
     calm = ti.cast(1e30, ti.f32)
     row = first
     while row < last:
-        body = state.contact.island_body[row]
+        body = state.islands.body[row]
         if state.body_status[body] == ACTIVE:
-            state.contact.calm[body] = state.contact.calm[body] + dt
-            calm = ti.min(calm, state.contact.calm[body])
+            state.body_calm_time[body] = state.body_calm_time[body] + dt
+            calm = ti.min(calm, state.body_calm_time[body])
         row = row_behind(row)
-    is_awake = int(not (calm > CALM_TIME and state.contact.sleep_speed[None] > 0.0))
+    is_awake = int(not (calm > CALM_TIME and state.sleep_speed[None] > 0.0))
     if is_awake == 0:
         for i in range(first, last):
-            body = state.contact.island_body[i]
+            body = state.islands.body[i]
             if state.body_status[body] == ACTIVE:
                 _put_to_sleep(state, body)
     return is_awake
@@ -140,11 +147,11 @@ def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
 
 @ti.kernel
 def wake_body(state: ti.template(), body: ti.i32):
-    """Wake one body, or all where `body` is -1; who is awake stays so for a while."""
+    """Wake one body, or all if `body` is -1. Waking a body restarts its rest timer."""
     ti.loop_config(serialize=True)
     for b in range(state.capacity.bodies):
         if body == b or body == -1:
-            state.contact.calm[b] = 0.0
+            state.body_calm_time[b] = 0.0
             if state.body_status[b] == ASLEEP:
                 state.body_status[b] = ACTIVE
 
@@ -153,11 +160,11 @@ def wake_body(state: ti.template(), body: ti.i32):
 def wake_near(
     state: ti.template(), body_count: ti.i32, box: ti.types.ndarray(dtype=ti.f32, ndim=1)
 ) -> ti.i32:
-    """Wake who sleeps near a box, lower and upper corner [m], (6,). Returns how many."""
+    """Wake bodies that sleep near a box, lower and upper corner [m], (6,). Returns: how many."""
     woken = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
-        note_boxes_of_skipping(state, body_count)
+        store_boxes_of_skipping(state, body_count)
         lower, upper = ti.Vector([box[0], box[1], box[2]]), ti.Vector([box[3], box[4], box[5]])
         woken = _wake_in_box(state, body_count, lower, upper)
     return woken

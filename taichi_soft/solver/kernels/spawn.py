@@ -1,16 +1,19 @@
-"""Bodies come and go: one slot is written, the rest of the world is left alone."""
+"""Spawn and despawn bodies: one slot is written, and the rest of the world does not change.
+
+Groups of fields: reads hull; writes soft.
+"""
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.status import ABSENT, ACTIVE, JUST_PLACED
-from taichi_soft.contact.kernels.collide import forget_contacts
-from taichi_soft.contact.kernels.hull_colliders import forget_held
+from taichi_soft.contact.kernels.collide import clear_contacts
+from taichi_soft.contact.kernels.hull_colliders import clear_warm_start
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
 def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Put a body into its slot as if the world began with it.
+    """Place a body in its slot as if the world began with it.
 
     Args:
         rows: (n, 8): position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the
@@ -47,26 +50,24 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             state.body_residual[body] = 0.0
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
-        if ti.static(state.capacity.contact.colliders > 0):
-            state.contact.calm[body] = 0.0
-            particles = state.body_particles[body]
-            p = particles[0]
-            while p < particles[1]:
-                state.contact.particle_touches[p] = 0
-                p = row_behind(p)
-            if ti.static(state.capacity.contact.hull):
-                forget_held(state, body)
-            if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
-                for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                    state.soft.kept_normal_impulse[point] = 0.0
-        if ti.static(state.capacity.contact.soft):
-            state.soft.overlap[body] = JUST_PLACED
+        state.body_calm_time[body] = 0.0
+        state.body_overlap[body] = JUST_PLACED
+        particles = state.body_particles[body]
+        p = particles[0]
+        while p < particles[1]:
+            state.particle_touches[p] = 0
+            p = row_behind(p)
+        if ti.static(state.capacity.contact.hull):
+            clear_warm_start(state, body)
+        if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
+            for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                state.soft.kept_normal_impulse[point] = 0.0
         state.body_status[body] = ACTIVE
 
 
 @ti.kernel
 def despawn_body(state: ti.template(), body: ti.i32):
-    """Empty a slot. Its particles stay where they are, finite, and nobody moves or reads them."""
+    """Empty a slot. Its particles keep finite positions, which no code moves or reads."""
     if ti.static(state.capacity.contact.colliders > 0):
-        forget_contacts(state, body)  # or colliders would be told of its last impulse in every step
+        clear_contacts(state, body)  # otherwise colliders would receive its last impulse in every step
     state.body_status[body] = ABSENT

@@ -1,11 +1,13 @@
-"""One fixed step of the schedule `per_body`: as many attempts as it takes, each of many substeps.
+"""One fixed step of the schedule `per_body`: one or more attempts, each of many substeps.
 
-One thread makes all substeps of an island, and islands go side by side. Nothing waits between substeps, and
-a body stays in one core's cache. An island is all bodies that may touch in the step or are joined, and
-threads that have nothing else to do help with it (`jobs.py`). The result does not depend on the number of
-threads.
+One thread runs all substeps of an island, and islands run in parallel. Nothing waits between substeps, and a
+body stays in one core's cache. An island is all bodies that can touch in the step or are joined. Idle threads
+help with islands of several bodies (`jobs.py`). The result does not depend on the number of threads.
 
-A long step is made in several calls, so that Ctrl-C can come between: each island goes on where it stopped.
+Long steps are split over several kernel calls, so that Ctrl-C works in between: each island continues where
+it stopped.
+
+Groups of fields: reads islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on, highest_speed
@@ -15,14 +17,14 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
     attempts_of,
-    brake_island,
-    island_is_sound,
-    put_back_island,
+    island_is_valid,
     refined_substeps,
+    restore_island,
+    set_strong_damping,
 )
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
-from taichi_soft.solver.kernels.sleep import settle_island, wake_by_colliders, wake_island
+from taichi_soft.solver.kernels.sleep import update_sleep, wake_by_colliders, wake_island
 from taichi_soft.solver.kernels.substep import (
     BEGIN,
     END,
@@ -36,20 +38,20 @@ from taichi_soft.solver.kernels.substep import (
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
-"""Instead of a number of bodies: none is awake, and the next step would find all as it is."""
+"""Returned in place of a number of bodies if no body is awake, so that another step would change nothing."""
 
 UNFINISHED = -2
-"""Instead of a number of bodies: the call made the substeps that it was given, and the step needs more."""
+"""Returned in place of a number of bodies if the step needs more calls."""
 
 DONE = -1
-"""Instead of the number of an attempt: the step is made."""
+"""Used in place of the number of an attempt when the step is complete."""
 
 
 @ti.func
 def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h, most, goes_on):
-    """One fixed step of an island, as fine as it needs, or the next `most` substeps of it.
+    """Run one fixed step of an island, or its next `most` substeps.
 
-    Returns: how many of its bodies failed, or UNFINISHED; and whether it is awake (1).
+    Returns: how many of its bodies failed, or UNFINISHED; and 1 if it is awake.
     """
     if goes_on == 0:
         _begin(state, program, island)
@@ -68,22 +70,22 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         _make_substeps(state, program, island, end, count, longest / finer, is_last, run)
         left -= run.s - first
         if is_last == 0 and run.is_stable == 0:
-            _put_back(state, program, island, run, halvings)
+            _restore(state, program, island, run, halvings)
         elif run.s == count:
-            if (is_last | island_is_sound(state, island)) == 1:
+            if (is_last | island_is_valid(state, island)) == 1:
                 is_good = 1
             else:
-                _put_back(state, program, island, run, halvings)
+                _restore(state, program, island, run, halvings)
     if is_good == 1:
         _end(state, program, island, run, finer * least, longest / finer)
-        run.is_awake = settle_island(state, island, substeps * h)  # what was calm for long enough sleeps
+        run.is_awake = update_sleep(state, island, substeps * h)  # puts resting islands to sleep
     state.progress[island] = run
     return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake
 
 
 @ti.func
 def _begin(state: ti.template(), program: ti.template(), island):
-    """Wake bodies that one awake may touch, and remember where all are."""
+    """Wake the bodies that an awake one can touch, and save the state of all."""
     is_awake = wake_island(state, island)
     if is_awake == 1:
         each_body(state, program, island, Job(phase=BEGIN))
@@ -96,8 +98,8 @@ def _begin(state: ti.template(), program: ti.template(), island):
 @ti.func
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
-        body = state.contact.island_body[state.contact.island_first[island]]
-        # With what it falls in the step: near colliders are listed once.
+        body = state.islands.body[state.islands.first[island]]
+        # Includes the speed gained by gravity, so that near colliders are listed once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
@@ -107,7 +109,7 @@ def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run
 def _make_substeps(
     state: ti.template(), program: ti.template(), island, end, count, h, is_last, run: ti.template()
 ):
-    """Substeps to before `end`, of so many in an attempt, which ends where it is found to be too coarse."""
+    """Run substeps before `end`, of `count` in an attempt, until one is found to be too coarse."""
     while run.s < end and (run.is_stable | is_last) == 1:
         s = run.s
         now = Moment(s=s, substeps=count, is_last=is_last, h=h, since=s * h, left=h * (count - s))
@@ -117,13 +119,13 @@ def _make_substeps(
 
 @ti.func
 def _mean_velocity(state: ti.template(), island):
-    """Of the particles of an island [m/s]: what its bodies share brings none nearer.
+    """Mean velocity of the particles of an island [m/s]; motion shared by all brings no two closer.
 
-    Zero where one of them does not move.
+    It is zero if a body of the island does not move.
     """
     total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
             particles = state.body_particles[body]
             p = particles[0]
@@ -137,28 +139,28 @@ def _mean_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _put_back(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
-    """Put an island back to where it was, for the next attempt."""
-    put_back_island(state, program, island)
+def _restore(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
+    """Restore an island for the next attempt."""
+    restore_island(state, program, island)
     run.attempt += 1
     run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
     run.fastest, run.shift = 0.0, ti.Vector.zero(ti.f32, 3)
     if run.attempt > halvings:
-        brake_island(state, island, 1)
+        set_strong_damping(state, island, 1)
 
 
 @ti.func
 def _end(state: ti.template(), program: ti.template(), island, run: ti.template(), substeps, h):
-    """End the step of each body; freeze what is broken."""
+    """End the step of each body, and freeze invalid bodies."""
     failed = 0
     each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
-    row = state.contact.island_first[island]
-    while row < state.contact.island_first[island + 1]:
-        failed += state.contact.has_failed[state.contact.island_body[row]]
+    row = state.islands.first[island]
+    while row < state.islands.first[island + 1]:
+        failed += state.islands.has_failed[state.islands.body[row]]
         row = row_behind(row)
     if ti.static(program.has_soft_contact):
         part_bodies(state, island, substeps * h)
-    brake_island(state, island, 0)
+    set_strong_damping(state, island, 0)
     run.attempt, run.failed = DONE, failed
 
 
@@ -173,11 +175,12 @@ def step_islands(
     most: ti.i32,
     goes_on: ti.i32,
 ) -> ti.i32:
-    """One fixed step of every active body, or the next `most` substeps of it.
+    """Run one fixed step of every active body, or its next `most` substeps.
 
     Args:
-        helpers: threads that may work on islands of others when there is none left for themselves.
-    Returns: how many failed, or `ALL_SLEEP`; or UNFINISHED: then it is to be called again, with `goes_on` 1.
+        helpers: number of threads that can help with islands of others when they own none.
+        goes_on: 1 to continue an unfinished step.
+    Returns: how many bodies failed, or `ALL_SLEEP`; or UNFINISHED: then call it again with `goes_on` = 1.
     """
     failed, awake, unfinished = 0, 0, 0
     ti.loop_config(serialize=True)
@@ -188,14 +191,14 @@ def step_islands(
                 find_islands(state, body_count, substeps * h)
         open_shared_islands(state, helpers)
     ti.loop_config(block_dim=1)
-    for i in range(state.contact.island_count[None] + helpers):
-        if i < state.contact.island_count[None]:
+    for i in range(state.islands.count[None] + helpers):
+        if i < state.islands.count[None]:
             failed_here, is_awake = fixed_step(state, program, i, substeps, h, most, goes_on)
             failed += ti.max(failed_here, 0)
             awake += is_awake
             unfinished += int(failed_here == UNFINISHED)
             close_shared_island(state, i)
         else:
-            help_others(state, program, do_phase, i - state.contact.island_count[None])
+            help_others(state, program, do_phase, i - state.islands.count[None])
     found = ti.select(failed + awake == 0, ALL_SLEEP, failed)
     return ti.select(unfinished > 0, UNFINISHED, found)

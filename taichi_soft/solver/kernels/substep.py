@@ -1,15 +1,17 @@
 """One substep, phase by phase, in the order in which they run.
 
-    each body by itself     wind, drives
-                            internal forces, reactions of pins, grabs, motors
-                            vibrations fade
-                            kick: new velocities
-    its island              joints
-                            contact: broad phase, narrow phase, solver
-    each body by itself     drift: new positions
+    each body              wind, external forces
+                           internal forces, reactions of pins, grabs, motors
+                           damping of vibrations
+                           kick: new velocities
+    its island             joints
+                           contact: broad phase, narrow phase, solver
+    each body              drift: new positions
 
-Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
-of them. A body alone drifts in the same pass as its kick, and collides afterwards.
+Contact changes velocities before they move anything. Joints correct its effect on them in the next substep. A
+single body drifts in the same pass as its kick, and collides afterwards.
+
+Groups of fields: reads colliders, soft; writes islands.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -18,43 +20,45 @@ from taichi_soft.contact.kernels.broad_phase import (
     begin_search,
     has_contact_pairs,
     is_outdated,
-    note_way,
     search_body,
+    update_displacement,
 )
 from taichi_soft.contact.kernels.contact_solver import solve_island
-from taichi_soft.contact.kernels.narrow_phase import find_gaps
+from taichi_soft.contact.kernels.narrow_phase import find_contacts
 from taichi_soft.contact.kernels.touches import add_touches
-from taichi_soft.control.kernels.drives import blow_on, push_particles
+from taichi_soft.control.kernels.drives import apply_external_forces, apply_wind
 from taichi_soft.control.kernels.joints import solve_joints
 from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, look_for_colliders
+from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, list_near_colliders
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_body
-from taichi_soft.solver.kernels.vibration import damp_body, to_positions
+from taichi_soft.solver.kernels.vibration import damp_body, time_to_positions
 from taichi_soft.solver.step_fields import Job
 
 BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
-"""Phases that each body makes by itself. The first and the last belong to the whole step."""
+"""Phases that each body runs separately. The first and the last belong to the whole step."""
 
 NONE, OUTDATED, VALID = range(3)
-"""Candidates of an island: the last step has forgotten its own; those of an attempt at this one; usable."""
+"""Candidates of an island: none, because the last step cleared them; outdated, from a failed attempt;
+usable."""
 
-BLOW = 0.1
-"""Mean edges within a substep from which a body that is struck may strike the next one in the same substep.
-A slower one may go into the next body by that much, and is moved out again."""
+MAX_IMPULSE_STEP = 0.1
+"""Distance per substep, in mean edges, above which impacts are passed on within the substep: a struck body
+can strike the next one. Below it, a body can enter the next one by that distance, and contact moves it out
+again."""
 
 
 @ti.func
 def substep(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """One substep of an island.
+    """Run one substep of an island.
 
     Args:
         now: a `Moment`.
-        run: a `Progress`, which becomes that after the substep.
+        run: a `Progress`, updated for the next substep.
     """
     drift_time = _kick_bodies(state, program, island, now, run)
     speed, impact_speed = _compare_speeds(state, island, now, run)
@@ -67,31 +71,31 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
 
 @ti.func
 def _advance_body(state: ti.template(), program: ti.template(), body, job):
-    """The phases of one body by itself: wind, drives and forces, damping, kick."""
+    """Run the phases of one body up to the kick: wind, external forces, internal forces, damping, kick."""
     felt = program.integrator.felt_time(state.body_velocity_lag[body], job.h, job.s)
-    blow_on(state, body, job.h)
-    push_particles(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
+    apply_wind(state, body, job.h)
+    apply_external_forces(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
     program.integrator.hold(state, program, body, job.h, felt)
     run_motors(state, body, job.h, felt, int(job.s == 0))
     if job.s == 0:
         update_rest_state(state, body)
     damp_body(state, program, body, felt, job.h, job.s, job.substeps)
-    calm_body(state, program, body, to_positions(program, felt, job.h), job.h, job.s, job.substeps)
+    calm_body(state, program, body, time_to_positions(program, felt, job.h), job.h, job.s, job.substeps)
     kick_body(state, program, body, job, felt)
 
 
 @ti.func
 def substep_alone(state: ti.template(), program: ti.template(), body, now):
-    """One substep of one body among colliders, without other bodies, to find out what broke it."""
+    """Run one substep of one body among colliders, without other bodies, to find the cause of a failure."""
     job = Job(s=now.s, substeps=now.substeps, h=now.h, since=now.since, left=now.left)
     _advance_body(state, program, body, job)
-    job.fastest = state.contact.body_speed[body]
+    job.fastest = state.islands.body_speed[body]
     drift_body(state, body, job)
 
 
 @ti.func
 def do_phase(state: ti.template(), program: ti.template(), island, body, job):
-    """One phase of one body, in whichever thread."""
+    """Run one phase of one body, in any thread."""
     if job.phase != KICK:
         _do_other_phase(state, program, island, body, job)
     elif state.body_status[body] == ACTIVE:
@@ -100,46 +104,49 @@ def do_phase(state: ti.template(), program: ti.template(), island, body, job):
 
 @ti.real_func
 def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """By itself: beside the others LLVM does not compute gaps side by side, which is 2 % of a heap's time."""
+    """Run a phase of contact. A separate function, because LLVM vectorises the gaps only there."""
     if job.phase == BOXES:
         begin_search(state, body, job.impact_speed, job.h, job.left, job.forgets)
     if job.phase == BROAD_PHASE:
         search_body(state, body, island)
     if job.phase == NARROW_PHASE:
-        find_gaps(state, body, job.impact_speed, job.h)
+        find_contacts(state, body, job.impact_speed, job.h)
 
 
 @ti.real_func
 def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """All but the kick, those of contact in a function of their own. Taichi takes more than twice as long for
-    twice the code in one."""
+    """Run any phase but the kick. Contact is a separate function, because Taichi's compile time grows faster
+    than the length of a function.
+    """
     if job.phase == BEGIN:
         begin_body(state, program, body)
     if job.phase == END:
-        state.contact.has_failed[body] = end_body(state, program, body, job.substeps, job.h)
+        state.islands.has_failed[body] = end_body(state, program, body, job.substeps, job.h)
     if job.phase == DRIFT and state.body_status[body] == ACTIVE:
         drift_body(state, body, job)
     if ti.static(program.has_soft_contact):
         if job.phase == DRIFT and has_contact_pairs(state, island) == 1:
-            note_way(state, body, job.shift)
+            update_displacement(state, body, job.shift)
         if job.phase == BOXES or job.phase == BROAD_PHASE or job.phase == NARROW_PHASE:
             _do_contact_phase(state, island, body, job)
 
 
 @ti.func
 def each_body(state: ti.template(), program: ti.template(), island, job):
-    """Have every body of an island make a phase, and wait for all."""
+    """Run a phase of every body of an island, and wait for all."""
     run_job(state, program, do_phase, island, OWNER, job)
 
 
 @ti.func
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Returns: for how long bodies have drifted with their new velocities already [s]."""
-    body = state.contact.island_body[state.contact.island_first[island]]
+    """Kick the bodies of an island. Returns: the time for which they have drifted with their new velocities
+    [s].
+    """
+    body = state.islands.body[state.islands.first[island]]
     is_free = is_alone(state, program, island)
     if is_free == 1:
-        if not (state.contact.gone[body] + run.fastest * now.h <= state.contact.reach[body]):
-            look_for_colliders(state, body, run.fastest, now.since, now.left)
+        if not (state.colliders.gone[body] + run.fastest * now.h <= state.colliders.reach[body]):
+            list_near_colliders(state, body, run.fastest, now.since, now.left)
         is_free = can_drift_at_once(state, body, run.fastest * now.h)
     drift_time = now.h * ti.cast(is_free, ti.f32)
     has_pairs = 0
@@ -166,8 +173,8 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
     """1 if an island is one body that only colliders can touch, and its kick can move it."""
-    body = state.contact.island_body[state.contact.island_first[island]]
-    bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
+    body = state.islands.body[state.islands.first[island]]
+    bodies = state.islands.first[island + 1] - state.islands.first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
     alone = drifts_at_once & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
     if ti.static(program.has_soft_contact):
@@ -177,30 +184,30 @@ def is_alone(state: ti.template(), program: ti.template(), island):
 
 @ti.func
 def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
-    """What the bodies of an island noted in the kick; whether forces changed no velocity by too much at once.
+    """Combine the results of the bodies' kicks: speeds, and stability of the attempt.
 
-    Returns: the highest speed [m/s]; that which one may give to another that it strikes, beside what they
-    share. What explodes is not counted in the second: others would be searched again and again because of it.
+    Returns: the highest speed [m/s], and the speed that a body can gain from an impact, relative to the
+    island. Exploding bodies do not count in the second: they would cause new searches again and again.
     """
     highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     least_edge = ti.cast(NO_CONTACT, ti.f32)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
-            highest = ti.max(highest, state.contact.body_speed[body])
-            if state.contact.is_exploding[body] == 0:
-                striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
-            run.is_stable = run.is_stable & state.contact.is_stable[body]
+            highest = ti.max(highest, state.islands.body_speed[body])
+            if state.islands.is_exploding[body] == 0:
+                striking = ti.max(striking, 2.0 * state.islands.body_mean_beside[body])
+            run.is_stable = run.is_stable & state.islands.is_stable[body]
         least_edge = ti.min(least_edge, state.body_edge[body])
     run.fastest = highest
-    return highest, ti.select(striking * now.h > BLOW * least_edge, striking, 0.0)
+    return highest, ti.select(striking * now.h > MAX_IMPULSE_STEP * least_edge, striking, 0.0)
 
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """1 if the bodies of an island are at their new positions: a body alone that its kick has moved."""
+    """1 if the bodies of an island are at their new positions: a single body that its kick has moved."""
     has_moved = 0
-    body = state.contact.island_body[state.contact.island_first[island]]
+    body = state.islands.body[state.islands.first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
         has_moved = has_drifted(state, body, run.fastest, now.h, now.since)
     return has_moved
@@ -210,7 +217,7 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
 def _solve_contact(
     state: ti.template(), program: ti.template(), island, now, run: ti.template(), impact_speed
 ):
-    """Contact between the bodies of an island: candidates, where they have aged; contacts; impulses."""
+    """Contact between the bodies of an island: update outdated candidates, find contacts, apply impulses."""
     if ti.static(program.has_soft_contact):
         if has_contact_pairs(state, island) == 1:
             if run.candidates != VALID or is_outdated(state, island, impact_speed, now.h) == 1:
@@ -243,8 +250,8 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 
 @ti.func
 def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Note if the integrator rejects the new shape of a body."""
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        body = state.contact.island_body[i]
+    """Mark the attempt as unstable if the integrator rejects the new shape of a body."""
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
             run.is_stable = run.is_stable & program.integrator.check(state, body, now.h, now.is_last)

@@ -1,15 +1,15 @@
-"""The numbers that hold for all bodies of a world, into their fields."""
+"""Write the numbers that are common to all bodies of a world to their fields."""
 
 from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
 def write_surroundings(state: ti.template(), numbers: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """One kernel for all: Taichi compiles one for each number of a field that Python writes.
+    """Write all of them with one kernel: Taichi would compile one kernel per number written from Python.
 
     Args:
-        numbers: gravity [m/s^2]; height [m], restitution and friction of the floor; tolerance and most
-            iterations of implicit Euler; how often a step that fails is made again, (9,).
+        numbers: gravity [m/s^2]; height [m], restitution and friction of the floor; tolerance and largest
+            number of iterations of implicit Euler; number of retries, (9,).
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -1,13 +1,13 @@
-"""What brings back a body that is caught inside out.
+"""Restore bodies with inverted tetrahedra.
 
-Forces alone turn nearly all tetrahedra that are inside out back again. Every `PATIENCE` steps
-the body is checked for tetrahedra that are flat or inside out, and its vibrations fade until a check finds
-none. A body that its own weight folds may keep a few for ever, as their forces balance. Such a body is
-reported after `REPORTED` steps, and left as it is. A body that is wrecked altogether has no shape to go back
-to: its particles move to where the rest shape fits best to them, within a second.
+Forces alone turn nearly all inverted tetrahedra back. Every `PATIENCE` steps a body is checked for flat or
+inverted tetrahedra. If there are any, its vibrations are damped until a check finds none. A body that is
+folded by its own weight can keep a few for ever, because their forces balance. It is reported after
+`REPORTED_AFTER` steps and left as it is. A body with too many of them has lost its shape: within a third of a
+second, its particles move to the best fit of the rest shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-may be too long for these, and parts of them would tremble for ever. They get more substeps.
+can be too long for these: parts of them would vibrate for ever. They get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -22,61 +22,61 @@ from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 PATIENCE = 15
-"""Fixed steps between two looks: a quarter of a second."""
+"""Fixed steps between two checks: a quarter of a second."""
 
-REPORTED = 8 * PATIENCE
-"""Fixed steps after which a body with such tetrahedra is reported: two seconds."""
+REPORTED_AFTER = 8 * PATIENCE
+"""Fixed steps after which a body with inverted tetrahedra is reported: two seconds."""
 
-WRECKED = 0.1
-"""Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
+FAILED_FRACTION = 0.1
+"""Fraction of inverted tetrahedra above which a body counts as failed, if the step was retried."""
 
-RAISING_STEPS, CALMING = 20, 0.8
-"""Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
-about itself twice without being inside out anywhere would stay so otherwise."""
+RESTORING_STEPS, CALMING = 20, 0.8
+"""Steps in which a failed body moves to its rest shape, and fraction of its vibration kept in each. It also
+restores bodies that are twisted by two turns without an inverted tetrahedron."""
 
 FADING = 20.0
-"""At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
-out would keep each other trembling otherwise, light ones for seconds."""
+"""Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Inverted slivers would
+otherwise make each other vibrate, light ones for seconds."""
 
-SPARE = 0.9
-"""Square of the substep that is chosen for a deformed body over that of its own limit, as estimated here."""
+STEP_MARGIN = 0.9
+"""Square of the substep chosen for a deformed body over its estimated stability limit."""
 
-MOST_REFINEMENT = 4.0
-"""Substeps over those at rest, at most: shorter ones are left to attempts."""
+MAX_REFINEMENT = 4.0
+"""Number of substeps over that at rest, at most. Shorter substeps are left to retries."""
 
 RELAXING = 0.8
-"""Part of the additional substeps that remains at each look after the shape needs them no more."""
+"""Fraction of the additional substeps that remains at each check after the shape no longer needs them."""
 
 FLAT = 1e-5
-"""Volume over that at rest, from which down a tetrahedron counts as caught."""
+"""Volume over that at rest, below which a tetrahedron counts as inverted."""
 
 
 @ti.func
-def _is_caught(state: ti.template(), positions: ti.template(), block, lane):
-    """Whether a tetrahedron is flat or inside out (1)."""
+def _is_inverted(state: ti.template(), positions: ti.template(), block, lane):
+    """1 if a tetrahedron is flat or inverted."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
-    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
+    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the padding of the last block
     return int(inverse != 0.0) & int(determinant(B) * inverse < FLAT)
 
 
 @ti.func
-def _caught_count(state: ti.template(), positions: ti.template(), body):
+def _count_inverted(state: ti.template(), positions: ti.template(), body):
     caught, blocks = 0, state.body_blocks[body]
     row = blocks[0] * LANES
     while row < blocks[1] * LANES:
-        caught += _is_caught(state, positions, row // LANES, row % LANES)
+        caught += _is_inverted(state, positions, row // LANES, row % LANES)
         row = row_behind(row)
     return caught
 
 
 @ti.func
 def _stiffness_of(state: ti.template(), block, lane):
-    """The square of a tetrahedron's highest frequency from its resistance to a change of volume [1/s^2].
+    """Square of a tetrahedron's highest frequency due to its resistance to a change of volume [1/s^2].
 
     In stable neo-Hookean material that force is (lambda + 5/6 mu) (J - a) dV/dx, so its stiffness grows with
-    the square of dV/dx, a third of an area vector. A stretched face makes it stiffer at any volume.
-    Returns: it now, and at rest.
+    the square of dV/dx, a third of an area vector. A stretched face therefore makes it stiffer at any volume.
+    Returns: the present value, and that at rest.
     """
     ps = particles_of(state, block, lane)
     inverse = rest_inverse_of(state, block, lane)
@@ -104,30 +104,32 @@ def _stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def _refinement_of(state: ti.template(), body):
-    """Substeps that the present shape of a body asks for, over those at rest: 1 or more."""
+    """Number of substeps that the present shape of a body requires, over that at rest: 1 or more."""
     now, rest = ti.cast(0.0, state.real), ti.cast(1e-30, state.real)
     row, blocks = state.body_blocks[body][0] * LANES, state.body_blocks[body]
     while row < blocks[1] * LANES:
         stiffness, stiffness_at_rest = _stiffness_of(state, row // LANES, row % LANES)
         now, rest = ti.max(now, stiffness), ti.max(rest, stiffness_at_rest)
         row = row_behind(row)
-    return ti.max(1.0, ti.min(ti.sqrt(SPARE * now / rest), MOST_REFINEMENT))
+    return ti.max(1.0, ti.min(ti.sqrt(STEP_MARGIN * now / rest), MAX_REFINEMENT))
 
 
 @ti.func
-def _is_wrecked(state: ti.template(), body):
-    """Whether much was caught before a step that had to be made again, or to which somebody put the body."""
+def _needs_rest_shape(state: ti.template(), body):
+    """True if many tetrahedra were inverted before a step that was retried, or where the caller placed the
+    body.
+    """
     is_wrecked = False
     if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
         blocks = state.body_blocks[body]
-        caught = _caught_count(state, state.prev_position, body)
-        is_wrecked = caught >= WRECKED * LANES * (blocks[1] - blocks[0])
+        caught = _count_inverted(state, state.prev_position, body)
+        is_wrecked = caught >= FAILED_FRACTION * LANES * (blocks[1] - blocks[0])
     return is_wrecked
 
 
 @ti.func
 def _best_fit(state: ti.template(), body):
-    """How the rest shape fits best to where a body is.
+    """Find the best fit of the rest shape to the present positions of a body.
 
     Returns: its centre at rest and now [m], and the rotation, as rows.
     """
@@ -154,12 +156,12 @@ def _best_fit(state: ti.template(), body):
 
 
 @ti.func
-def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all particles of a wreck a part of the way to where they fit best, in the last step all of it.
+def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, steps_left, seconds):
+    """Move all particles of a failed body part of the way to the best fit, and all of it in the last step.
 
-    Pinned particles stay, and the floor stops the others. Among colliders, which may be in the way, particles
-    get a velocity instead, with which they arrive in the coming step of so many seconds. That step begins by
-    taking its share of this velocity.
+    Pinned particles stay, and the floor stops the others. Among colliders, which can be in the way, particles
+    get a velocity with which they arrive in the coming step of `seconds`. It allows for the damping at the
+    beginning of that step.
     """
     rest, now, rows = _best_fit(state, body)
     particles = state.body_particles[body]
@@ -168,11 +170,11 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
         if state.particle_inv_mass[p] > 0.0:
             r = state.rest_position[p] - rest
             goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
-            way = (goal - state.particle_position[p]) / steps_left
+            displacement = (goal - state.particle_position[p]) / steps_left
             if ti.static(program.has_contact):
-                state.particle_velocity[p] = state.particle_velocity[p] + way / (CALMING * seconds)
+                state.particle_velocity[p] = state.particle_velocity[p] + displacement / (CALMING * seconds)
             else:
-                x = state.particle_position[p] + way
+                x = state.particle_position[p] + displacement
                 if ti.static(program.has_floor):
                     x.z = ti.max(x.z, ti.min(state.floor[None].x, state.particle_position[p].z))
                 state.particle_position[p] = x
@@ -181,7 +183,7 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
 
 @ti.func
 def _recovers(state: ti.template(), program: ti.template(), body):
-    """Whether the law of a body brings back what is inside out (1)."""
+    """1 if the law of a body restores inverted tetrahedra."""
     recovers = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
@@ -191,7 +193,7 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _stiffens(state: ti.template(), program: ti.template(), body):
-    """Whether a body has the law for which `_refinement_of` holds (1)."""
+    """1 if `_refinement_of` applies to the law of a body."""
     stiffens = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.has_energy and model.flips == Flips.RECOVER):
@@ -200,33 +202,33 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 
 @ti.func
-def kept_while_caught(state: ti.template(), body, h, is_first):
-    """Part of its vibration that a body of which some is caught keeps in a substep of `h` [s].
+def kept_while_inverted(state: ti.template(), body, h, is_first):
+    """Fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h` [s].
 
-    In every substep: vibrations of twice the period of the steps never moved at their beginning, and went on
-    for ever when they were damped there only. A wreck is damped in the first substep of each step.
+    It is damped in every substep: at the beginning of steps only, vibrations of twice the step's period would
+    always be damped at their turning points. A failed body is damped in the first substep of each step.
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
         keep = exp(-FADING * h)
-    elif is_first and age >= -RAISING_STEPS and age < 0:
+    elif is_first and age >= -RESTORING_STEPS and age < 0:
         keep = CALMING
     return keep
 
 
 @ti.real_func
 def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32) -> ti.i32:
-    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back.
+    """At the end of a step of `seconds`, check and restore a body, if its law restores inverted tetrahedra.
 
-    Returns: whether some has been caught for so long that the body is to be reported (1).
+    Returns: 1 if it has had inverted tetrahedra for so long that it must be reported.
     """
     is_reported = 0
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
-        age = ti.max(before, -RAISING_STEPS - 1) + 1
-        if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
-            if _is_wrecked(state, body):
-                age = -RAISING_STEPS
+        age = ti.max(before, -RESTORING_STEPS - 1) + 1
+        if before >= 0 or before == PLACED:  # a restoration that has begun is completed
+            if _needs_rest_shape(state, body):
+                age = -RESTORING_STEPS
             elif before == PLACED:
                 age = 0
         is_look = age >= 0 and age % PATIENCE == 0
@@ -234,11 +236,11 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
             kept = 1.0 + RELAXING * (state.body_refinement[body] - 1.0)
             state.body_refinement[body] = ti.max(_refinement_of(state, body), kept)
         if is_look:
-            if _caught_count(state, state.particle_position, body) == 0:
+            if _count_inverted(state, state.particle_position, body) == 0:
                 age = 0
-            is_reported = int(age == REPORTED)
+            is_reported = int(age == REPORTED_AFTER)
         if age < 0:
-            _raise(state, program, body, -age, seconds)
+            _move_to_rest_shape(state, program, body, -age, seconds)
         state.body_patience[body] = age
         state.body_jolted[body] = 0
     return is_reported

@@ -1,14 +1,17 @@
-"""Damping of vibrations: of all motion of a body beside its rigid one.
+"""Damping of vibrations: of all motion of a body relative to its rigid motion.
 
-Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
-and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
-ratio. It acts on the velocities at the time of the positions, in the middle of a kick. There leapfrog keeps,
-of each mode of frequency w,
+Velocities v become P v + k (v - P v). P v is the rigid motion with the momentum and angular momentum of v,
+and k = exp(-2 zeta w seconds), with the angular frequency w of the body's first mode and its damping ratio
+zeta. Damping acts on the velocities at the time of the positions, in the middle of a kick. There leapfrog
+conserves, for each mode of frequency w,
 
-    v^2 + w^2 (1 - h^2 w^2 / 4) x^2,
+    v^2 + w^2 (1 - h^2 w^2 / 4) x^2.
 
-and less of v is less of that, for every stable step and however often it is done. Of velocities half a step
-later it also keeps h w^2 x v: what damped these every third substep, say, pumped modes of three substeps.
+A smaller v reduces this, for every stable step and any interval of damping. For velocities half a step later,
+the conserved quantity also contains h w^2 x v: damping these every third substep, for example, would excite
+modes with a period of three substeps.
+
+Groups of fields: reads islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -18,34 +21,35 @@ from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.untangling import kept_while_caught
+from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
-MOST_FADING = 0.43
-"""What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
-of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
-That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A wreck loses
-more, once in a step."""
+MAX_FADING = 0.43
+"""Largest exponent of damping in one substep: exp(-0.43) = 0.65 is kept, d below. The kick of particles in
+contact is not part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a. That is
+stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A failed body is damped more,
+once per step."""
 
 MOVING, SLOW, RESTING = range(3)
-"""Rest states of a body by its speed as a whole: see `calming`."""
+"""Rest states of a body by its overall speed: see `calming`."""
 
 RESTING_RATE = 2.0
-"""Least rate at which the vibrations of a resting body fade [1/s]."""
+"""Smallest rate at which the vibrations of a resting body are damped [1/s]."""
 
-SHARP_BRAKE = 0.5
-"""Of the vibration that a substep leaves where a step that failed is made for the last time."""
+STRONG_DAMPING = 0.5
+"""Fraction of the vibration kept in each substep of the last attempt at a step."""
 
 FARTHEST = 0.1
-"""Way of a particle in a substep of such a step, beside the rigid motion, over the surface's mean edge."""
+"""Path of a particle relative to the rigid motion in a substep of the last attempt, at most, over the
+surface's mean edge."""
 
 THIN_BODY = 1e-6
-"""Product of the principal moments over the cube of their sum, below which a body is taken for a straight
-line: it does not feel a turn about that."""
+"""Product of the principal moments over the cube of their sum, below which a body counts as a straight line,
+which has no inertia about itself."""
 
 
 @ti.func
-def _solved(rows: ti.template(), b):
-    """x of rows x = b for a symmetric matrix given by its rows, scaled so that their trace is 1."""
+def _solve_symmetric(rows: ti.template(), b):
+    """Solve rows x = b for a symmetric matrix given by its rows, scaled to a trace of 1."""
     a0, a1, a2 = rows
     c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
     det = a0.dot(c0)
@@ -59,7 +63,7 @@ def _solved(rows: ti.template(), b):
 
 @ti.func
 def _kicked_velocity(state: ti.template(), p, gravity, kick):
-    """What a kick of the forces [s] will make of a particle's velocity [m/s]; a pinned one keeps its own."""
+    """Velocity [m/s] of a particle after its forces have acted for `kick` [s]; a pinned one keeps its own."""
     inv_mass = state.particle_inv_mass[p]
     change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
     return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
@@ -67,16 +71,17 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 @ti.func
 def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
-    """The same with what will hold the particle in a substep of `h` [s], where that counts (`is_held` 1).
+    """Velocity of a particle after its forces have acted for `kick` [s], in m/s, and after contact if
+    `is_held` is 1.
 
-    What is pressed against something gains speed only to lose it. If that counted as vibration, what lies
-    still would be pushed. What the floor takes is known before; what something else held in the last substep
-    it will hold again.
+    A particle pressed against something loses the speed that it gains in the kick again. If that counted as
+    vibration, damping would push bodies at rest. The effect of the floor in a substep of `h` [s] is known
+    beforehand; of other contacts, that of the last substep is assumed.
     """
     velocity = _kicked_velocity(state, p, gravity, kick)
     if is_held == 1:
         if ti.static(program.has_contact):
-            if state.contact.particle_touches[p] == 1:
+            if state.particle_touches[p] == 1:
                 velocity = state.particle_velocity[p]
         if ti.static(program.has_floor):
             if state.particle_inv_mass[p] > 0.0:
@@ -96,10 +101,10 @@ def _column_sums(rows: ti.template()):
 
 @ti.func
 def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
-    """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `felt_velocity`
-    takes them.
+    """Rigid motion of a body after its forces have acted for `kick` [s]; `h` and `is_held` as in
+    `felt_velocity`.
 
-    Returns: its centre beside x0 [m], velocity beside v0 [m/s] and angular velocity [rad/s].
+    Returns: its centre relative to x0 [m], velocity relative to v0 [m/s] and angular velocity [rad/s].
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     masses = ti.Vector.zero(state.real, LANES)
@@ -111,8 +116,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
             p = first + lane
-            # What lies behind belongs to another body, which may be on its way to infinity: times 0 that is
-            # no number.
+            # Rows beyond the last belong to another body, which can be non-finite: times 0 that is NaN.
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
@@ -140,14 +144,16 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
             ti.Vector([-d.x, s.z + s.x, -d.y]) / trace,
             ti.Vector([-d.z, -d.y, s.x + s.y]) / trace,
         )
-        angular_velocity = _solved(rows, spin / trace)
+        angular_velocity = _solve_symmetric(rows, spin / trace)
     return center, velocity, angular_velocity
 
 
 @ti.func
 def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
-    """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s], in a substep
-    of `h` [s]."""
+    """Scale the vibration of a body after its forces have acted for `kick` [s] by `keep`.
+
+    `h` is the length of the substep [s].
+    """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, 1, x0, v0)
@@ -168,20 +174,21 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
             if state.particle_inv_mass[p] > 0.0:
                 state.particle_velocity[p] = state.particle_velocity[p] + change
             elif state.body_drives[body] & FEELS_REACTION != 0:
-                impulse = state.particle_mass[p] * change  # which what holds it takes up
+                impulse = state.particle_mass[p] * change  # on the pin
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
 @ti.func
 def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
-    """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick.
+    """Limit the speed of particles relative to the rigid motion to `farthest` [m/s], after forces have acted
+    for `kick` [s].
 
-    Momentum and angular momentum stay.
+    Momentum and angular momentum are conserved.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, spin = x0 * 0.0, v0 * 0.0, v0 * 0.0
-    for turn in range(2):  # first all are made slower, then they get back what that took of the rigid motion
+    for turn in range(2):  # first limit all speeds, then restore the rigid motion
         center_now, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
         if turn == 0:
             center, velocity, spin = center_now, velocity_now, spin_now
@@ -193,61 +200,61 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
                 if turn == 0:
                     kicked = _kicked_velocity(state, p, gravity, kick)
                     rigid = v0 + velocity + spin.cross(arm)
-                    change = rigid + _slower(kicked - rigid, farthest) - kicked
+                    change = rigid + _limited(kicked - rigid, farthest) - kicked
                 state.particle_velocity[p] = state.particle_velocity[p] + change
             p = row_behind(p)
 
 
 @ti.func
-def _slower(beside, most):
-    """A velocity beside the rigid motion, no faster than `most` [m/s]."""
+def _limited(beside, most):
+    """Limit a velocity relative to the rigid motion to `most` [m/s]."""
     speed = beside.norm()
     slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
-    if not speed < 1e18:  # whose square overflows: its direction is not known
+    if not speed < 1e18:  # its square overflows, so its direction is unknown
         slower = beside * 0.0
     return slower
 
 
 @ti.func
 def kept_vibration(state: ti.template(), body, h, s, substeps):
-    """The share of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
+    """Fraction of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
 
-    Below 1 every few substeps only, but many times in a period of the first mode. Not always after the same
-    number of them: a mode that does not move whenever it would be damped would go on for ever.
+    It is below 1 every few substeps only, but many times in a period of the first mode. The intervals vary:
+    otherwise a mode that is always damped at its turning points would last for ever.
     """
     keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
     if state.body_is_braked[body] == 1:
-        keep = SHARP_BRAKE
+        keep = STRONG_DAMPING
     elif rate > 0.0:
         if ti.static(state.capacity.has_contact):
-            if state.contact.rest_state[body] == RESTING:
+            if state.islands.rest_state[body] == RESTING:
                 rate = ti.max(rate, RESTING_RATE)
         whole = substeps * h
-        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
+        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MAX_FADING))
         times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
         while times < substeps and substeps % times == 0:
             times += 1
         if (s + 1) * times // substeps > s * times // substeps:
-            keep = exp(-ti.min(rate * whole / times, MOST_FADING))
+            keep = exp(-ti.min(rate * whole / times, MAX_FADING))
     return keep
 
 
 @ti.func
-def to_positions(program: ti.template(), kick, h):
-    """The part of a kick [s] that brings velocities to the time of the positions, in a substep of `h` [s]."""
+def time_to_positions(program: ti.template(), kick, h):
+    """Part of a kick [s] that advances velocities to the time of the positions, in a substep of `h` [s]."""
     return kick - program.integrator.lag * h
 
 
 @ti.func
 def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """What damping takes from a body in substep `s` of `substeps` of `h` [s] each.
+    """Damp the vibration of a body in substep `s` of `substeps` of `h` [s] each.
 
-    It comes before the kick of `kick` [s] by the forces that the body feels, and takes its share of what the
-    velocities will be in the middle of that.
+    It runs before the kick of `kick` [s] by the body's forces, and damps the velocities in the middle of that
+    kick.
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        fade_vibration(state, program, body, to_positions(program, kick, h), h, keep)
+        fade_vibration(state, program, body, time_to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
 
@@ -266,11 +273,14 @@ def _limit_body(state: ti.template(), program: ti.template(), body: ti.i32, kick
 
 @ti.func
 def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
-    rounding does not depend on what else a world has."""
+    """Damp a body on CPUs: as `damp_vibration`, and more if it has inverted tetrahedra.
+
+    Each part is called once only: LLVM inlines it, and its rounding does not depend on the rest of the
+    program.
+    """
     keep = kept_vibration(state, body, h, s, substeps)
-    keep *= kept_while_caught(state, body, h, s == 0)
+    keep *= kept_while_inverted(state, body, h, s == 0)
     if keep < 1.0:
-        _fade_body(state, program, body, to_positions(program, kick, h), h, keep)
+        _fade_body(state, program, body, time_to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)

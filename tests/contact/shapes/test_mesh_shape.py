@@ -164,7 +164,7 @@ def test_a_cell_that_is_too_fine_is_refused_with_one_that_is_not(size):
     mesh = trimesh.creation.box(size)
     with pytest.raises(MeshError, match="2,000,000") as caught:
         MeshShape(mesh, cell=1e-4)
-    offer = float(str(caught.value).split("take cell=")[1].split()[0])
+    offer = float(str(caught.value).split("use cell=")[1].split()[0])
     assert 1_500_000 < len(MeshShape(mesh, cell=offer).samples) <= 2_000_000
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from lab.drop_test import Summary, make_case, run_cases
 from lab.drop_test.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
-from lab.drop_test.trial import PER_SHAPE, batches
+from lab.drop_test.case_runs import PER_SHAPE, batches
 
 SEED, COUNT = 0, 30
 

@@ -8,10 +8,10 @@ import pytest
 
 from lab import peers
 from lab.cli.peers import peers as film_peers
-from lab.peers import Course, Drop, Entry, compare, comparison, measure
-from lab.peers.course import RATE, Simulation, record
+from lab.peers import Drop, Entry, Trajectory, compare, comparison, measure
 from lab.peers.drop import GRAVITY
 from lab.peers.reference import Reference
+from lab.peers.trajectory import RATE, Simulation, record
 from lab.peers.wall import captions, film_wall
 from taichi_soft import OptionError, StateError, VideoError, box, sphere
 from taichi_soft.render import VideoWriter
@@ -20,7 +20,7 @@ SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
 
 def bounced(drop, squash, speed_back):
-    """A course by hand: free fall, half a sine of squashing in 0.1 s, and up with a share of the speed."""
+    """A trajectory by hand: free fall, half a sine of squashing in 0.1 s, and up with part of the speed."""
     t = np.arange(round(drop.seconds * RATE) + 1) / RATE
     touch, contact = np.sqrt(2 * drop.height / GRAVITY), 0.1
     up, speed = t - touch - contact, speed_back * GRAVITY * touch
@@ -30,7 +30,7 @@ def bounced(drop, squash, speed_back):
     rest = drop.start - (0, 0, drop.height)
     rows = rest * np.stack([0 * t + 1, 0 * t + 1, 1 - pressed], axis=1)[:, None]
     rows[:, :, 2] += height[:, None]
-    return Course(rows, np.full(round(drop.seconds * 60), 1e-3), 1 / RATE)
+    return Trajectory(rows, np.full(round(drop.seconds * 60), 1e-3), 1 / RATE)
 
 
 def test_the_masses_of_vertices_add_up_to_density_times_volume():
@@ -97,9 +97,9 @@ def test_steps_are_halved_until_the_body_holds_together(bad):
 
 
 def test_between_two_moments_vertices_are_on_the_line_between():
-    course = Course(np.arange(18.0).reshape(3, 2, 3), np.ones(1), 1.0)
-    np.testing.assert_allclose(course.at(1.25 / RATE), course.positions[1] + 0.25 * 6)
-    np.testing.assert_allclose(course.at(9.0), course.positions[2])
+    trajectory = Trajectory(np.arange(18.0).reshape(3, 2, 3), np.ones(1), 1.0)
+    np.testing.assert_allclose(trajectory.at(1.25 / RATE), trajectory.positions[1] + 0.25 * 6)
+    np.testing.assert_allclose(trajectory.at(9.0), trajectory.positions[2])
 
 
 @pytest.fixture
@@ -124,7 +124,7 @@ def test_captions_say_cost_and_error(entries):
 
 
 def test_the_wall_has_a_panel_for_each_engine_in_which_its_own_body_is_drawn(tmp_path, entries):
-    """Pictures side by side: where courses differ, so do their panels, but for words and colours."""
+    """Pictures side by side: where trajectories differ, so do their panels, but for words and colours."""
     seen = []
     with VideoWriter(tmp_path / "w.png", fps=10, size=(480, 160)) as writer:
         film_wall(SMALL, [*entries, entries[1]], writer, seconds=0.5, on_frame=lambda *now: seen.append(now))

@@ -8,7 +8,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import box, sphere
 from taichi_soft.render import PALETTE, Surface, colormap, highlight
 from taichi_soft.render.colors import to_linear, to_srgb
-from taichi_soft.render.scene import SceneArrays
+from taichi_soft.render.frame_arrays import SceneArrays
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,4 +1,4 @@
-"""One cell: built with what it names and nothing else, dropped or left to itself, and judged."""
+"""Run one cell: build it from its values and defaults only, drop or release it, and judge it."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 DROP, DROP_TIME = 2.0, 2.5
-"""Height [m] and time [s]: a fall of 0.64 s, an impact, and what bounces falls once more."""
+"""Height [m] and time [s]: a fall of 0.64 s, an impact, and a second fall."""
 
 RECOVERY_TIME, CALM_TIME = 10.0, 0.5
-"""Within which no tetrahedron may be inside out any more, and for how long to take it as settled [s]."""
+"""Time within which all inverted tetrahedra must recover, and time for which they must stay so [s]."""
 
 REST_SPEED, LONGEST_REST = 1e-4, 60.0
-"""At rest is what is slower than so many sizes per second (root mean square over mass). To come there without
-gravity a body has as long as waves take to cross it `REST_CROSSINGS` times, and at most so long [s]."""
+"""Speed at rest, in sizes per second (root mean square over mass). Without gravity, a body must reach it
+within `REST_CROSSINGS` times the time in which waves cross it, or within the second [s]."""
 
 REST_CROSSINGS = 60.0
 
 MOST_WORK = 2e9
-"""Tetrahedra times substeps of a cell, half a minute: what would take more is too slow as well."""
+"""Tetrahedra times substeps of a cell, at most, about half a minute: larger cells count as too slow as
+well."""
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
-    """What became of a cell: verdict and reason, and the facts of its mesh and its step. Plain data."""
+    """Return verdict and reason of a cell, and facts of its mesh and its step. Plain data."""
     mesh = cell_mesh(cell["mesh"], cell["scale"])
     squared_sound = cell["young"] / cell["density"]
     facts = {
@@ -70,13 +71,13 @@ def run_cell(cell: Cell) -> dict[str, Any]:
 
 @lru_cache(maxsize=128)
 def cell_mesh(name: str, scale: float) -> TetMesh:
-    """A mesh by its name, all lengths multiplied."""
+    """Return a mesh by its name, scaled."""
     mesh = MESHES[name]()
     return mesh if scale == 1.0 else TetMesh(mesh.vertices * scale, mesh.tets)
 
 
 def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
-    """A world with nothing but the body, high above the floor."""
+    """Build a world with nothing but the body, high above the floor."""
     damping = DAMPINGS[cell["damping"]](mesh, cell)
     material = Material(cell["young"], cell["poisson"], cell["density"], **damping)
     named = {option: cell[option] for option in ("law", "flips") if cell[option] is not None}
@@ -88,7 +89,7 @@ def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
 
 
 def _too_slow(cell: Cell, world: World, body: Body) -> str | None:
-    """Why it is not worth trying, None where it is."""
+    """Return the reason if the cell is too slow to be tried, else None."""
     substeps = world.stable_substeps(1 / 60)
     if substeps > MOST_SUBSTEPS:
         return f"{substeps} substeps for 1/60 s ({body.stable_step.stiffest})"
@@ -103,7 +104,7 @@ def _steps(cell: Cell) -> int:
 
 
 def _try(cell: Cell, world: World, body: Body) -> Ending:
-    """Put the body where it begins, and see."""
+    """Place the body at its start, run it, and measure the end."""
     x = body.mesh.vertices
     rest = x - (x.min(axis=0) + x.max(axis=0)) / 2
     size = float(np.ptp(rest, axis=0).max())
@@ -122,7 +123,7 @@ def _try(cell: Cell, world: World, body: Body) -> Ending:
 
 @dataclass
 class _Run:
-    """A body on its way."""
+    """A running trial."""
 
     world: World
     body: Body
@@ -131,17 +132,18 @@ class _Run:
     dt: float  # [s]
 
     def fall(self, steps: int) -> None:
-        """Let it fall and bounce."""
+        """Let the body fall and bounce."""
         for _ in range(steps):
             if self.body.is_frozen:
                 return
             self.world.step(self.dt)
 
     def recover(self, steps: int, crossing: float) -> None:
-        """Until no tetrahedron is inside out; then without gravity, braked, until it is at rest.
+        """Step until no tetrahedron is inverted, then without gravity and with damping until the body is at
+        rest.
 
         Args:
-            crossing: time in which a wave goes once through the body [s].
+            crossing: time in which a wave crosses the body once [s].
         """
         calm = 0
         for _ in range(steps):
@@ -162,12 +164,12 @@ class _Run:
 
     @property
     def speed(self) -> float:
-        """Root mean square over mass [m/s]."""
+        """Root mean square speed, weighted by mass [m/s]."""
         velocities, masses = self.body.velocities().astype(np.float64), self.body.masses
         return float(np.sqrt(masses @ (velocities**2).sum(axis=1) / masses.sum()))
 
     def ending(self, fastest: float) -> Ending:
-        """What is to be judged; `fastest` is infinite where the body was wrecked."""
+        """Return the measurements to judge; `fastest` is infinite for a body that was strongly deformed."""
         body = self.body
         now = body.positions().astype(np.float64)
         is_finite = bool(np.isfinite(now).all())
@@ -187,7 +189,7 @@ class _Run:
 def _failure_of(body: Body) -> str:
     failure = body.failure
     if failure is None or failure.tetrahedron is None:
-        return "it cannot be told which tetrahedron broke first"
+        return "the tetrahedron that failed first is unknown"
     mesh = body.mesh
     assert isinstance(mesh, TetMesh)
     angle = mesh.quality.min_dihedral[failure.tetrahedron]

@@ -1,4 +1,4 @@
-"""Running cases, many in one world: each body has a group of its own and meets its own course only."""
+"""Run cases, many in one world: each body has its own group, and touches only its own course."""
 
 from __future__ import annotations
 
@@ -19,32 +19,37 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 PER_SHAPE = 6
-"""Cases of each shape in one world: with five shapes as many as there are groups, but one."""
+"""Cases of each shape in one world: five shapes then need one group fewer than there are."""
 
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
-"""Of a world, always the same, so that all worlds share kernels."""
+"""Capacity of every world, always the same, so that all worlds share kernels."""
 
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
-"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]. For
-what is smaller than half a metre the second counts [m/s], half of the speed at which Box2D's bodies fall
-asleep: a small ball in a corner goes on rocking from facet to facet at some mm/s."""
+"""A body is at rest if it was slower than the first for the third [s]. The first is a root mean square over
+vertices, in sizes per second; for bodies below half a metre the second counts [m/s], half of the speed at
+which Box2D's bodies fall asleep: a small ball in a corner keeps rocking from facet to facet at a few mm/s."""
 
 PATIENCE = 150.0
-"""Time in which a body must have come to rest, in that in which it falls half its size: sqrt(size / g)."""
+"""Time within which a body must come to rest, over the time in which it falls half its size, sqrt(size /
+g)."""
 
 FREE_TIME, BRAKE = 20.0, 0.2
-"""After so long all velocities fade at this rate, in the same unit: a stiff ball on a plane would roll for
-minutes. What shakes by itself goes on shaking, and what slides down a slope goes on sliding."""
+"""Time after which all velocities are damped, and the rate, in the same unit: a stiff ball on a plane would
+roll for minutes. Bodies that gain energy, or slide down a slope, keep moving."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:
-    """Run all cases, in worlds of those with the same number of substeps; yields each when it ends."""
+    """Run all cases, in worlds of those with the same number of substeps. Yields each outcome when the case
+    ends.
+    """
     for batch in batches(list(cases)):
         yield from _run_batch(batch)
 
 
 def batches(cases: list[Case]) -> Iterator[list[Case]]:
-    """Cases that fit in one world together: of one number of substeps and law, `PER_SHAPE` of each shape."""
+    """Yield cases that fit in one world: with the same law and number of substeps, and `PER_SHAPE` of each
+    shape.
+    """
     for kind in sorted({(case.law, case.substeps) for case in cases}):
         alike = [case for case in cases if (case.law, case.substeps) == kind]
         queues = [[case for case in alike if case.shape == shape] for shape in SHAPES]
@@ -53,7 +58,7 @@ def batches(cases: list[Case]) -> Iterator[list[Case]]:
 
 
 class _Run:
-    """One body on its way."""
+    """One body and the measurements of its case."""
 
     def __init__(self, case: Case, body: Body) -> None:
         self.case, self.body = case, body
@@ -63,11 +68,11 @@ class _Run:
         self.calm = 0  # steps
         self.speed = np.inf
 
-    def note_step(self) -> None:
-        """Look at the body after a step."""
+    def measure_step(self) -> None:
+        """Measure the body after a step."""
         now = self.body.positions()
-        ways = np.linalg.norm(now - self.before, axis=1).astype(np.float64)
-        self.speed = float(np.sqrt((ways**2).mean())) * STEPS_PER_SECOND / self.case.size
+        paths = np.linalg.norm(now - self.before, axis=1).astype(np.float64)
+        self.speed = float(np.sqrt((paths**2).mean())) * STEPS_PER_SECOND / self.case.size
         is_calm = self.speed < max(CALM_SPEED, LEAST_CALM_SPEED / self.case.size)
         self.calm = self.calm + 1 if is_calm else 0
         self.before = now
@@ -81,11 +86,11 @@ class _Run:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether it was slow for long enough."""
+        """True if it was slow for long enough."""
         return self.calm >= CALM_TIME * STEPS_PER_SECOND and not self.body.is_frozen
 
     def outcome(self, time: float, *, is_at_rest: bool) -> Outcome:
-        """How it ended after `time` [s]."""
+        """Return the outcome after `time` [s]."""
         outer = self.before[self.outer].astype(np.float64)
         depths = [(solid.depth(outer), solid) for solid in self.case.course if not solid.is_room]
         worst, deepest = max(((d - s.tolerance, d), s.name) for d, s in depths)
@@ -113,7 +118,7 @@ def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
                     run.body.set_linear_damping(BRAKE / run.case.unit_time)
             world.step(1 / STEPS_PER_SECOND, count)
             for run in list(runs):
-                run.note_step()
+                run.measure_step()
                 is_at_rest = run.is_at_rest
                 if is_at_rest or run.body.is_frozen or world.time >= PATIENCE * run.case.unit_time:
                     yield run.outcome(world.time, is_at_rest=is_at_rest)
@@ -122,7 +127,7 @@ def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
 
 
 def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
-    """A world of stated capacity with the cases in it."""
+    """Build a world of the usual capacity with the cases in it."""
     world = bare_world(floor=None, collider_room=MOST_COLLIDERS - 1 - sum(len(case.course) for case in batch))
     samples = 0
     bodies = []
@@ -150,7 +155,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
                 group=contact.group,
                 mask=contact.mask,
             )
-    # What nobody touches fills up the capacity.
+    # A collider that nothing touches fills the rest of the capacity.
     world.add_collider(HeightFieldShape(np.zeros((2, (MOST_SAMPLES - samples) // 2)), 1.0), group=0, mask=0)
     for shape in SHAPES:
         missing = PER_SHAPE - sum(case.shape == shape for case in batch)
@@ -162,7 +167,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
 
 @cache
 def _filler(shape: str, law: LawName, flips: FlipsName | None) -> SoftBodyAsset:
-    """Of slots that stay empty: soft and pinned, so that nothing warns of its step or its weight."""
+    """Asset of slots that stay empty: soft and pinned, so that nothing warns of its step or its weight."""
     mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
     pinned = range(len(mesh.vertices))
     return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips, pinned=pinned)

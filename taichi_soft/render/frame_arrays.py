@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.errors import OptionError
+from taichi_soft.render.drawn_surface import Surface
 from taichi_soft.render.geometry_kernels import compute_normals
-from taichi_soft.render.surface import Surface
 from taichi_soft.render.texture import SceneTextures
 
 

@@ -30,7 +30,7 @@ MOST_HALVINGS = 6
 
 
 @dataclass(frozen=True)
-class Course:
+class Trajectory:
     """Positions of the vertices, and the time of each frame."""
 
     positions: Floats  # (k, n, 3), each 1 / RATE s from the start on [m]
@@ -57,7 +57,7 @@ class Simulation:
 
 def record(
     drop: Drop, make: Callable[[int], Simulation], first: int, on_frame: Progress | None = None
-) -> Course:
+) -> Trajectory:
     """Simulate a drop with the longest stable step.
 
     Args:
@@ -70,14 +70,14 @@ def record(
         steps = first << doubling
         with silenced():
             engine = make(steps)
-        course = _try(drop, engine, on_frame)
-        if course is not None:
-            return course
+        trajectory = _try(drop, engine, on_frame)
+        if trajectory is not None:
+            return trajectory
     raise StateError(f"the body explodes even with {first << MOST_HALVINGS} steps in 1/{RATE} s")
 
 
-def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Course | None:
-    """Course of the whole drop; None if the body explodes."""
+def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Trajectory | None:
+    """Trajectory of the whole drop; None if the body explodes."""
     frames = round(drop.seconds / FRAME)
     positions, times = [np.array(engine.positions(), dtype=np.float64)], []
     reach = FARTHEST * np.abs(drop.start).max()
@@ -93,4 +93,4 @@ def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Course | 
         times.append(took)
         if on_frame:
             on_frame(frame + 1, frames)
-    return Course(np.array(positions), np.array(times), engine.step)
+    return Trajectory(np.array(positions), np.array(times), engine.step)

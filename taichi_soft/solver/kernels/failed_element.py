@@ -1,8 +1,8 @@
-"""What broke a frozen body: its last step made again, element by element."""
+"""Find why a body was frozen: repeat its last step, element by element."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
-from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
@@ -12,7 +12,7 @@ from taichi_soft.solver.step_fields import Moment
 
 
 @ti.kernel
-def find_broken_element(
+def find_failed_element(
     state: ti.template(),
     program: ti.template(),
     body: ti.i32,
@@ -21,11 +21,11 @@ def find_broken_element(
     is_braked: ti.i32,
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Make the last step of a frozen body again, up to the substep in which it breaks, and undo it.
+    """Repeat the last step of a frozen body up to the substep in which it fails, and undo it.
 
     Args:
-        found: receives the tetrahedron (block times `LANES` plus lane) or edge that broke first and the
-            substep; left alone where nothing breaks.
+        found: receives the tetrahedron (block times `LANES` plus lane) or edge that failed first, and the
+            substep; unchanged if nothing fails.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -52,4 +52,4 @@ def find_broken_element(
         clear_forces(state, body)
         forget_loads(state, body)
         if ti.static(program.has_contact):
-            forget_contacts(state, body)
+            clear_contacts(state, body)

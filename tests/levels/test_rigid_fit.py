@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_soft.levels.fitting import fitting_motion
+from taichi_soft.levels.rigid_fit import fitting_motion
 
 RNG = np.random.default_rng(4)
 

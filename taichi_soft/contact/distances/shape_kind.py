@@ -1,10 +1,10 @@
-"""Kinds of solids, as kernels know them."""
+"""Kinds of solids in kernels."""
 
 from enum import IntEnum
 
 
 class ShapeKind(IntEnum):
-    """Which function measures the distance from a solid."""
+    """Selects the distance function of a solid."""
 
     PLANE = 0
     SPHERE = 1
@@ -15,4 +15,4 @@ class ShapeKind(IntEnum):
 
 
 CONVEX = frozenset({ShapeKind.PLANE, ShapeKind.SPHERE, ShapeKind.BOX, ShapeKind.CAPSULE})
-"""Kinds of which every solid is convex, and its signed distance too: see `first_touch`."""
+"""Kinds whose solids and signed distances are always convex: see `first_touch`."""

@@ -1,8 +1,9 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (f + m g - h K v): the forces of the old positions, and how they change on the way.
-K is projected, and acts on what a body moves beside its rotation: see `rigid_rotation`. The solve holds
-particles that lie on colliders, until it would have to pull them down: see `held_particles`.
+(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and their change along the path. K is
+projected to be positive semi-definite, and acts only on motion without the body's rotation: see
+`rigid_rotation`. The solve constrains particles that lie on colliders, unless it would have to pull them
+down: see `held_particles`.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -19,28 +20,28 @@ from taichi_soft.elements.kernels.linear_system import (
 )
 from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks
 from taichi_soft.solver.kernels.held_particles import solve_held
-from taichi_soft.solver.kernels.rigid_rotation import multiply, split_off_rotation
+from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rotation
 
 FARTHEST = 0.5
-"""Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
+"""Change of an edge in a substep, over its length, above which the substep is halved."""
 
-LEAST_LENGTH = 0.1
-"""Of the mean length of edges: shorter ones count as that long."""
+MIN_LENGTH = 0.1
+"""Edges shorter than this fraction of the mean length count as that long."""
 
-MOST_PIECES = 32
-"""Of one step, so that it ends."""
+MAX_PIECES = 32
+"""Largest number of pieces of a substep, so that the halving ends."""
 
 
 @ti.func
 def assemble(state: ti.template(), program: ti.template(), body, h):
-    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well.
+    """Fill the blocks, and write the right-hand side to `residual` and `particle_force`.
 
-    `solution` becomes zero.
+    `solution` is set to zero.
     """
     particles = state.body_particles[body]
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
-    split_off_rotation(state, body, h)
+    project_out_rotation(state, body, h)
     multiply(state, body, state.particle_velocity, state.image)
     gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
@@ -58,7 +59,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 @ti.func
 def solve_body(state: ti.template(), program: ti.template(), body, h, held_count):
-    """Solve a body of which so many particles are held: see `solve_held`."""
+    """Solve a body with `held_count` constrained particles: see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
     return solve_held(state, body, held_count, h)
@@ -66,7 +67,7 @@ def solve_body(state: ti.template(), program: ti.template(), body, h, held_count
 
 @ti.func
 def add_pin_reactions(state: ti.template(), body, h):
-    """Add up what pinned particles took up in a piece of a step [N s]."""
+    """Accumulate the impulses on pinned particles in a substep of `h` [s]."""
     if state.body_drives[body] & FEELS_REACTION != 0:
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
@@ -77,15 +78,15 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 
 @ti.func
-def keep_residual(state: ti.template(), body, residual, is_first):
-    """Keep the largest residual of a step's solves. That of a body that goes non-finite does not count."""
+def record_residual(state: ti.template(), body, residual, is_first):
+    """Record the largest residual of a step's solves, without that of a body that becomes non-finite."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
     state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
-def _keep_share(state: ti.template(), body, h, share):
-    """Leave a substep of `h` [s] a share of its motion, but all that the body's particles have in common."""
+def _scale_motion(state: ti.template(), body, h, share):
+    """Scale the motion of a substep of `h` [s] by `share`, except the mean motion of the body's particles."""
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -102,13 +103,13 @@ def _keep_share(state: ti.template(), body, h, share):
 
 @ti.func
 def _largest_change(state: ti.template(), body):
-    """Of an edge since particles were where `direction` says, over its length."""
+    """Largest change of an edge since the positions in `direction`, over its length."""
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
         r = state.direction[state.edge_vertices[e][1]] - state.direction[state.edge_vertices[e][0]]
         mean += r.dot(r)
-    least = LEAST_LENGTH * LEAST_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
+    least = MIN_LENGTH * MIN_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
     worst = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
@@ -120,13 +121,13 @@ def _largest_change(state: ti.template(), body):
 
 @ti.func
 def keeps_shape(state: ti.template(), body):
-    """Whether no edge has changed by more than `FARTHEST` since particles were where `direction` says."""
+    """True if no edge has changed by more than `FARTHEST` since the positions in `direction`."""
     return _largest_change(state, body) <= FARTHEST
 
 
 @ti.func
 def slow_down(state: ti.template(), body, h):
-    """Take speed from a body of which an edge has changed by more than `FARTHEST` in a substep of `h` [s]."""
+    """Slow a body down if an edge changed by more than `FARTHEST` in a substep of `h` [s]."""
     change = _largest_change(state, body)
     if change > FARTHEST:
-        _keep_share(state, body, h, FARTHEST / change)
+        _scale_motion(state, body, h, FARTHEST / change)

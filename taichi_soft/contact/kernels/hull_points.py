@@ -1,6 +1,8 @@
-"""Points of hulls: where they are, how fast, and what an impulse at one does to the particles that carry it.
+"""Hull points: position, velocity, and impulses distributed to the particles that carry them.
 
-In a world without hulls a particle is its own carrier, and all of this is what it would be without this file.
+In a world without hulls, a particle carries itself.
+
+Groups of fields: reads hull, joints.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
@@ -9,7 +11,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def motion_of(state: ti.template(), p):
-    """Position [m] and velocity [m/s] of a particle, or of a point as its carriers are now."""
+    """Position [m] and velocity [m/s] of a particle, or of a hull point from its carriers."""
     x, v = state.particle_position[p], state.particle_velocity[p]
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -22,7 +24,7 @@ def motion_of(state: ti.template(), p):
 
 @ti.func
 def inv_mass_at(state: ti.template(), p):
-    """Inverse mass of a particle or a point [1/kg]; zero where the body does not move."""
+    """Inverse mass of a particle or hull point [1/kg]; 0 if the body cannot move."""
     inv_mass = ti.cast(0.0, ti.f32)
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -35,7 +37,7 @@ def inv_mass_at(state: ti.template(), p):
 
 @ti.real_func
 def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
-    """How fast an impulse of 1 N s at one point makes another of the same body [m/s]."""
+    """Speed that an impulse of 1 N s at one hull point gives another of the same body [m/s]."""
     mobility = ti.cast(0.0, ti.f32)
     mine, theirs = state.hull.carriers[p], state.hull.carriers[q]
     own_weights, their_weights = state.hull.weights[p], state.hull.weights[q]
@@ -47,8 +49,8 @@ def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
 
 
 @ti.func
-def push_point(state: ti.template(), p, impulse):
-    """Give a particle, or the carriers of a point, an impulse [N s]. What does not move takes none."""
+def apply_point_impulse(state: ti.template(), p, impulse):
+    """Apply an impulse [N s] to the carriers of a hull point. Carriers that cannot move are skipped."""
     who, weights = state.hull.carriers[p], state.hull.weights[p]
     for k in range(4):
         change = weights[k] * inv_mass_of(state, who[k]) * impulse
@@ -57,7 +59,9 @@ def push_point(state: ti.template(), p, impulse):
 
 @ti.func
 def shift_point(state: ti.template(), p, impulse):
-    """Move a particle, or the carriers of a point, as far as an impulse [N s] would within a second."""
+    """Displace the carriers of a hull point by the distance that an impulse [N s] would move them in one
+    second.
+    """
     who, weights = state.hull.carriers[p], state.hull.weights[p]
     for k in range(4):
         change = weights[k] * inv_mass_of(state, who[k]) * impulse
@@ -66,19 +70,19 @@ def shift_point(state: ti.template(), p, impulse):
 
 @ti.func
 def mark_touched(state: ti.template(), p):
-    """Note that something holds a particle, or the carriers of a point."""
+    """Mark a particle, or the carriers of a hull point, as touched."""
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
         for k in range(4):
             if weights[k] != 0.0:
-                state.contact.particle_touches[who[k]] = 1
+                state.particle_touches[who[k]] = 1
     else:
-        state.contact.particle_touches[p] = 1
+        state.particle_touches[p] = 1
 
 
 @ti.func
 def is_held(state: ti.template(), p):
-    """Whether a joint holds a particle, or any carrier of a point (1)."""
+    """1 if a joint holds a particle, or a carrier of a hull point."""
     held = 0
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -92,14 +96,14 @@ def is_held(state: ti.template(), p):
 
 @ti.func
 def has_hull(state: ti.template(), body):
-    """Whether a body touches others by a hull."""
+    """True if a body touches others by a hull."""
     points = state.hull.body_points[body]
     return points[0] < points[1]
 
 
 @ti.func
 def place_points(state: ti.template(), body):
-    """Put the points of a hull where their carriers are."""
+    """Update the positions of hull points from their carriers."""
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x, _ = motion_of(state, p)
@@ -107,10 +111,10 @@ def place_points(state: ti.template(), body):
 
 
 @ti.func
-def note_points(state: ti.template(), body, common):
-    """Put the points of a hull where their carriers are, and note how fast they are.
+def update_points(state: ti.template(), body, common):
+    """Update positions and speeds of hull points from their carriers.
 
-    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    Returns: the highest speed [m/s], and the highest relative to the `common` velocity.
     """
     speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     if ti.static(state.capacity.contact.hull):
@@ -119,6 +123,6 @@ def note_points(state: ti.template(), body, common):
             own = (v - common).norm()
             state.particle_position[p] = x
             if ti.static(state.capacity.contact.soft):
-                state.soft.particle_speed[p] = own
+                state.particle_speed[p] = own
             speed, beside = ti.max(speed, v.norm()), ti.max(beside, own)
     return speed, beside

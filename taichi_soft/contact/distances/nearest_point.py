@@ -1,14 +1,15 @@
-"""The point of a triangle that is nearest to another point."""
+"""The point of a triangle nearest to another point."""
 
 from taichi_soft.core.runtime import ti
 
 FLATTEST_SQUARED = 1e-8
-"""Height over length, squared, below which float32 knows no normal: such a triangle counts as its edges."""
+"""Height over length, squared, below which float32 cannot resolve a normal. Such a triangle counts as its
+edges."""
 
 
 @ti.func
 def nearest_on_segment(p, a, b):
-    """Nearest point to p between a and b, which may be one point."""
+    """Point of the segment from a to b nearest to p. The segment can have no length."""
     along = b - a
     t = (p - a).dot(along) / ti.max(along.dot(along), 1e-30)
     return a + ti.max(0.0, ti.min(1.0, t)) * along
@@ -16,7 +17,7 @@ def nearest_on_segment(p, a, b):
 
 @ti.func
 def nearest_on_triangle(p, a, b, c):
-    """Nearest point to p in the triangle abc, which may be flat."""
+    """Point of the triangle abc nearest to p. The triangle can be flat."""
     normal = (b - a).cross(c - a)
     squared = normal.dot(normal)
     longest = ti.max((b - a).dot(b - a), (c - a).dot(c - a))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.peers.course import Course
 from lab.peers.drop import Drop
+from lab.peers.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
 
@@ -21,14 +21,14 @@ class Outcome:
     bounce: float  # how high the centre of mass rises again, in the height that it fell from
 
 
-def measure(drop: Drop, course: Course) -> Outcome:
+def measure(drop: Drop, trajectory: Trajectory) -> Outcome:
     """Measure both, with a parabola through the three recorded values about each extreme.
 
     The centre of mass has the masses of the drop, whatever masses the engine uses.
     """
-    tops = course.positions[:, :, 2].max(axis=1)
-    centers = course.positions[:, :, 2] @ drop.masses / drop.masses.sum()
-    landed = int(np.argmax(course.positions[:, :, 2].min(axis=1) < 0.05 * drop.height))
+    tops = trajectory.positions[:, :, 2].max(axis=1)
+    centers = trajectory.positions[:, :, 2] @ drop.masses / drop.masses.sum()
+    landed = int(np.argmax(trajectory.positions[:, :, 2].min(axis=1) < 0.05 * drop.height))
     turn = landed + int(np.argmax(np.diff(centers[landed:]) > 0.0))  # the centre is lowest
     again = turn + int(np.argmax(np.append(np.diff(centers[turn:]), -1.0) < 0.0))  # and highest
     about = slice(max(landed, turn - 6), turn + 7)
