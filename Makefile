@@ -40,7 +40,7 @@ test: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "not soak"
 
 test-fast: $(VENV)/.test
-	@$(BIN)/python -m pytest -m "numpy or kernel"
+	@$(BIN)/python -m pytest -m "(numpy or kernel) and not soak"
 
 test-all: $(VENV)/.dev
 	@$(BIN)/python -m pytest $(PYTEST)

@@ -43,43 +43,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-TIERS = {
-    "cages": "numpy",
-    "cli": "soak",
-    "contact/distances": "kernel",
-    "contact/shapes": "kernel",
-    "core/math": "kernel",
-    "demos": "soak",
-    "doctor": "soak",
-    "elements": "kernel",
-    "elements/laws/test_energy_laws.py": "world",
-    "elements/materials": "numpy",
-    "lab": "soak",
-    "meshing": "numpy",
-    "native": "soak",
-    "profiling": "soak",
-}
-"""Tier of the tests of a folder or file that have no marker for one. The longest path counts; elsewhere it is
-"world"."""
-
-NEEDS = {
-    "lab/experiments/": "lab",
-    "lab/report/": "lab",
-    "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
-    "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
-}
-"""Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
-
-
-def tiers_of(item):
-    """Tiers that a test is marked with."""
-    return [tier for tier in ("numpy", "kernel", "world", "soak") if item.get_closest_marker(tier)]
-
-
-def tier_of(path):
-    """Tier of the tests of a file that have no marker for one."""
-    places = (place.as_posix() for place in (path, *path.parents))
-    return next((TIERS[place] for place in places if place in TIERS), "world")
+KINDS = ("numpy", "kernel", "world")
+"""Markers for what a test runs; "world" is the default. `soak` stands beside them, for slow tests."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -87,13 +52,17 @@ def pytest_collection_modifyitems(items):
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
     items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
     for item in items:
-        if not tiers_of(item):
-            item.add_marker(tier_of(item.path.relative_to(HERE)))
-        for start, extra in NEEDS.items():
-            if item.nodeid.removeprefix("tests/").startswith(start):
-                missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
-                reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
-                item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+        if not kinds_of(item) and not item.get_closest_marker("soak"):
+            item.add_marker("world")
+        for extra in [mark.args[0] for mark in item.iter_markers("needs")]:
+            missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
+            reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
+            item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+
+
+def kinds_of(item):
+    """Return the markers of a test that tell what it runs."""
+    return [kind for kind in KINDS if item.get_closest_marker(kind)]
 
 
 def keeps_a_world(item):
@@ -105,10 +74,10 @@ def keeps_a_world(item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    tiers = tiers_of(item)
-    if len(tiers) > 1:
-        pytest.fail(f"{item.nodeid} is marked {' and '.join(tiers)}: leave one of them", pytrace=False)
-    if tiers == ["soak"] and time.time() > float(os.environ.get(UNTIL, "inf")):
+    kinds = kinds_of(item)
+    if len(kinds) > 1:
+        pytest.fail(f"{item.nodeid} is marked {' and '.join(kinds)}: leave one of them", pytrace=False)
+    if item.get_closest_marker("soak") and time.time() > float(os.environ.get(UNTIL, "inf")):
         pytest.skip(TIME_IS_UP)
 
 

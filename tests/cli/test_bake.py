@@ -7,6 +7,8 @@ import sys
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.soak
+
 SCENE = """
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, SpringMaterial, World, box, rope

@@ -16,6 +16,8 @@ from taichi_soft.profiling import LawCost, Spread, find_compiler
 from taichi_soft.profiling.law_costs import kinds_of
 from taichi_soft.profiling.report import law_table
 
+pytestmark = pytest.mark.soak
+
 SPREAD = Spread(1.0, 1.0, 1.0, 1.0)
 
 

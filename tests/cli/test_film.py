@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+pytestmark = pytest.mark.soak
+
 SCENE = """
 from engine_adapter import FixedStep
 from taichi_soft import BoxShape, Material, World, box

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.soak
+
 GAME = """
 from taichi_soft import Material, World, box
 

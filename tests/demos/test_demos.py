@@ -12,6 +12,8 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
+pytestmark = pytest.mark.soak
+
 
 def run(name: str, seconds: float):
     demo = load_demo(name)

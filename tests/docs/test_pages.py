@@ -44,6 +44,14 @@ PUBLIC = (
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
+def pages(names):
+    """Return pages as parameters; those whose code imports Panda3D need it."""
+    return [
+        pytest.param(name, marks=pytest.mark.needs("panda3d")) if name.startswith("panda3d") else name
+        for name in names
+    ]
+
+
 def prose(name):
     """A page without its code."""
     return re.sub(r"^```.*?^```", "", PAGES[name], flags=re.DOTALL | re.MULTILINE)
@@ -56,7 +64,7 @@ def slug(heading):
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
+@pytest.mark.parametrize("name", pages(name for name, blocks in CODE.items() if blocks))
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict = {"__name__": "page"}
@@ -180,7 +188,7 @@ def test_presets_have_the_numbers_of_the_table():
     assert rows == said
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", pages(PAGES))
 def test_code_of_a_page_imports_public_names_only(name):
     for block in CODE[name]:
         for node in ast.walk(ast.parse(block)):

@@ -14,6 +14,8 @@ import pytest
 from taichi_soft.core.errors import MeshError, SkippedCellsWarning
 from taichi_soft.meshing import TetMesh, load_mesh, save_mesh, sphere
 
+pytestmark = pytest.mark.numpy
+
 meshio = pytest.importorskip("meshio")
 
 BALL = sphere(1.0, 2).translated([0.1, 1 / 3, -1e-7])

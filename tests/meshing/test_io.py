@@ -9,6 +9,8 @@ import pytest
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import ParticleMesh, TetMesh, load_mesh, save_mesh, sphere
 
+pytestmark = pytest.mark.numpy
+
 MESH = sphere(1.0, 2).translated([0.1, 1 / 3, -1e-7])
 OWN = [".npz", ".node", ".ele"]
 WITH_MESHIO = [".msh", ".vtk", ".vtu", ".mesh"]

@@ -21,6 +21,8 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.meshing import delaunay
 from taichi_soft.meshing.delaunay import circumspheres, require_delaunay
 
+pytestmark = pytest.mark.numpy
+
 CORNER = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 1, 2, 3]])
 
 

@@ -10,6 +10,8 @@ from taichi_soft import MeshError
 from taichi_soft.doctor.surface import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 FORMS = ["{0}", "{0}/{1}", "{0}//{2}", "{0}/{1}/{2}"]
 
 

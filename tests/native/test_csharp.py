@@ -13,6 +13,8 @@ from games import lines_of
 from native_build import ROOT
 from scenes import GAMES
 
+pytestmark = pytest.mark.soak
+
 SOURCE = ROOT / "engine_adapter" / "native" / "csharp"
 HEADER = SOURCE.parent / "include" / "taichi_soft.h"
 COMPONENTS = ("TaichiSoft.cs", "SoftWorldBehaviour.cs", "SoftBodyBehaviour.cs")

@@ -23,6 +23,8 @@ from taichi_soft.control.kernels.pins import STILL, WITH_FRAME
 from taichi_soft.control.motors import LARGEST_LIMIT, THINNEST
 from taichi_soft.export.archive import TYPES, written
 
+pytestmark = pytest.mark.soak
+
 HEADERS = Path(ROOT) / "engine_adapter" / "native" / "src"
 
 FORGED = """

@@ -18,6 +18,8 @@ from games import Player, digests
 from scenes import GAMES
 from test_same_bits import drawn
 
+pytestmark = pytest.mark.soak
+
 KEPT = Path(__file__).with_name("kept_bits.json")
 
 OLD_PROCESSOR = {

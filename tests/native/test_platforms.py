@@ -12,6 +12,8 @@ from native_build import NATIVE
 from platforms import RUNNERS, built_for, played
 from test_kept_bits import KEPT
 
+pytestmark = pytest.mark.soak
+
 PLAYED = ("heap", "joined", "laws")  # `make test-platforms` plays all of them
 TARGETS = ",".join(dict.fromkeys(each.platform for each in RUNNERS.values()))
 

@@ -11,6 +11,8 @@ from scenes import GAMES
 from taichi_soft.export.meshes import CREASE
 from taichi_soft.world.world import context_of_world
 
+pytestmark = pytest.mark.soak
+
 
 def drawn(world):
     """How Python draws the world file's meshes: of each asset its skins, or the surfaces of its levels."""

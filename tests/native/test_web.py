@@ -15,6 +15,8 @@ from native_build import ROOT
 from taichi_soft.core.version import VERSION as VERSION_OF_PROJECT
 from taichi_soft.live.three_js import FOLDER, VERSION, fetch_three_js
 
+pytestmark = pytest.mark.soak
+
 PACKAGE = ROOT / "engine_adapter" / "web"
 
 

@@ -1,11 +1,14 @@
 """The comparison of implicit steps with scipy compares the same system. No time is asserted."""
 
 import numpy as np
+import pytest
 
 from taichi_soft import Material, World, box, force_gradient, internal_forces
 from taichi_soft.profiling.implicit import measure_implicit
 from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.sparse import SparseBody
+
+pytestmark = pytest.mark.soak
 
 MESH = box((1.0, 0.8, 0.6), (2, 2, 2))
 MATERIAL = Material(1e5, 0.3, 1000.0, 3.0, damping_ratio=0.0)

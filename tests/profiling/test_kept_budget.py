@@ -9,6 +9,8 @@ from taichi_soft.profiling.kept_budget import Course, first_met, tell
 from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
 
+pytestmark = pytest.mark.soak
+
 FACTS = {"is_kept": True, "is_fixed": False, "tets": 7, "frozen": 0, "stolen": None, "skipped": 0.0}
 FACTS["work"] = Spread.of([1.0])
 

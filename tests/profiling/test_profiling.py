@@ -25,6 +25,8 @@ from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
+pytestmark = pytest.mark.soak
+
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
 
 

@@ -22,6 +22,8 @@ from taichi_soft import (
     torus,
 )
 
+pytestmark = pytest.mark.kernel
+
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1
 

@@ -11,6 +11,8 @@ from taichi_soft import LAWS, Material, ParticleMesh, SpringMaterial, TetMesh, i
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.elements.laws import BondLaw
 
+pytestmark = pytest.mark.kernel
+
 BONDS = [law.name for law in LAWS.values() if isinstance(law, BondLaw)]
 DIRECTIONAL = [name for name in BONDS if LAWS[name].takes_shear]
 

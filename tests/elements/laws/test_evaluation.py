@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from taichi_soft import Material, MeshError, OptionError, ParticleMesh, internal_forces
 from taichi_soft.core.errors import MaterialError
 
+pytestmark = pytest.mark.kernel
+
 MESHES = oracle.MESHES
 BALL = MESHES["sphere"]
 MATERIAL = Material(1e6, 0.3, 1000.0, 50.0)

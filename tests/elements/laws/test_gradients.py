@@ -22,6 +22,8 @@ from taichi_soft import (
     sphere,
 )
 
+pytestmark = pytest.mark.kernel
+
 MODES = [
     (law.name, strain.value if strain else None, flips.value)
     for law in LAWS.values()

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from taichi_soft import Material, TetMesh, internal_forces
 
+pytestmark = pytest.mark.kernel
+
 REST = oracle.ONE_TET.vertices
 MESHES = oracle.MESHES
 EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.params_of(oracle.MODES))

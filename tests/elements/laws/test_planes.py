@@ -7,6 +7,8 @@ import pytest
 from taichi_soft import MeshError, OptionError, TetMesh, box, load_mesh, plane_angles, sphere
 from taichi_soft.core.package_data import ASSETS
 
+pytestmark = pytest.mark.kernel
+
 BALL = sphere(0.7, 1)
 
 

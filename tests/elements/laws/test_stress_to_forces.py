@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from taichi_soft import Material, box, cylinder, internal_forces
 
+pytestmark = pytest.mark.kernel
+
 MESHES = oracle.MESHES
 UPRIGHT = pytest.mark.parametrize("strain", oracle.STRAINS)
 EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.params_of(oracle.MODES))

@@ -20,6 +20,8 @@ from taichi_soft import (
 )
 from taichi_soft.core.serialisation import as_plain, from_plain
 
+pytestmark = pytest.mark.numpy
+
 WOOD = Stiffness.orthotropic((10e9, 1e9, 0.6e9), (0.4, 0.35, 0.3), (0.1e9, 0.6e9, 0.7e9))
 CUBE = box((1, 1, 1), (1, 1, 1))
 COUNT = len(CUBE.tets)

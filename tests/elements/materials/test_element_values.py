@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from taichi_soft import PRESETS, Material, OptionError, box, internal_forces, preset
 from taichi_soft.core.errors import MaterialError, TaichiSoftError
 
+pytestmark = pytest.mark.numpy
+
 CUBE = box((1, 1, 1), (1, 1, 1))
 GOOD = {"young": 1e6, "poisson": 0.3, "density": 1000.0, "damping": 10.0}
 ratios = st.floats(-0.99, 0.499, allow_subnormal=False)

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from taichi_soft.core.errors import MaterialError, OptionError
 from taichi_soft.elements.materials import Stiffness
 
+pytestmark = pytest.mark.numpy
+
 WOOD = {"young": (12e9, 0.9e9, 0.5e9), "poisson": (0.4, 0.45, 0.35), "shear": (0.05e9, 0.6e9, 0.7e9)}
 AXES = ((1, 2), (0, 2), (0, 1))
 seeds = st.integers(0, 2**32 - 1)

@@ -9,6 +9,8 @@ from lab.drop_test import Summary, make_case, run_cases
 from lab.drop_test.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
 from lab.drop_test.trial import PER_SHAPE, batches
 
+pytestmark = pytest.mark.soak
+
 SEED, COUNT = 0, 30
 
 

@@ -16,6 +16,8 @@ from lab.peers.wall import captions, film_wall
 from taichi_soft import OptionError, StateError, VideoError, box, sphere
 from taichi_soft.render import VideoWriter
 
+pytestmark = pytest.mark.soak
+
 SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
 

@@ -13,6 +13,8 @@ from lab.peers.ours import simulate
 from lab.peers.reference import simulate_reference
 from taichi_soft import sphere
 
+pytestmark = pytest.mark.soak
+
 DROP = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 TOUCH = np.sqrt(2 * DROP.height / 9.81)
 ENGINES = {"taichi-soft": simulate, "reference": simulate_reference, **{p.name: p.simulate for p in PEERS}}

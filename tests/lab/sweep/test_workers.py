@@ -12,6 +12,8 @@ from acts import act
 
 from lab.sweep import Task, compute_all
 
+pytestmark = pytest.mark.soak
+
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
 
