@@ -22,6 +22,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
 
 from shares import Shares, place_of  # noqa: E402
+from soaks import SOAKS, changed_since, is_named, left_out, soaks_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
@@ -47,8 +48,18 @@ KINDS = ("numpy", "kernel", "world")
 """Markers for what a test runs; "world" is the default. `soak` stands beside them, for slow tests."""
 
 
+SINCE = "--since"
+NAMED_SOAKS = {soak for soaks in SOAKS.values() for soak in soaks.split()}
+
+
+def pytest_addoption(parser):
+    text = "of the soaks, run those marked guard, and those that guard what changed since a git revision"
+    parser.addoption(SINCE, metavar="REVISION", help=f"{text}; '' if that is not known")
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
+    leave_out_soaks(config, items)
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
     items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
     for item in items:
@@ -58,6 +69,21 @@ def pytest_collection_modifyitems(items):
             missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
             reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
             item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+
+
+def leave_out_soaks(config, items):
+    """Take the soaks out that `--since` does not ask for."""
+    revision = config.getoption(SINCE)
+    if revision is None:
+        return
+    try:
+        changed = changed_since(revision) if revision else []
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from error
+    left = left_out(items, HERE, soaks_of(changed))
+    config.hook.pytest_deselected(items=left)
+    gone = set(left)
+    items[:] = [item for item in items if item not in gone]
 
 
 def kinds_of(item):
@@ -77,7 +103,11 @@ def pytest_runtest_setup(item):
     kinds = kinds_of(item)
     if len(kinds) > 1:
         pytest.fail(f"{item.nodeid} is marked {' and '.join(kinds)}: leave one of them", pytrace=False)
-    if item.get_closest_marker("soak") and time.time() > float(os.environ.get(UNTIL, "inf")):
+    if not item.get_closest_marker("soak"):
+        return
+    if not is_named(item.path.relative_to(HERE), NAMED_SOAKS):
+        pytest.fail(f"no folder in tests/shared/soaks.py names the soak {item.path.name}", pytrace=False)
+    if time.time() > float(os.environ.get(UNTIL, "inf")):
         pytest.skip(TIME_IS_UP)
 
 
