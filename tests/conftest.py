@@ -21,7 +21,7 @@ from taichi_soft.core.runtime import DEBUG
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
 
-from shares import Shares, place_of  # noqa: E402
+from shares import Shares  # noqa: E402
 from soaks import SOAKS, changed_since, is_named, left_out, soaks_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
@@ -61,7 +61,7 @@ def pytest_addoption(parser):
 def pytest_collection_modifyitems(config, items):
     leave_out_soaks(config, items)
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
-    items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
+    items.sort(key=lambda item: (files[item.path], keeps_a_world(item)))
     for item in items:
         if not kinds_of(item) and not item.get_closest_marker("soak"):
             item.add_marker("world")
