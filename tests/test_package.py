@@ -135,6 +135,7 @@ def built(tmp_path_factory):
     return wheel, archive
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_a_source_archive_holds_every_file_of_the_checkout(built):
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
@@ -143,6 +144,7 @@ def test_a_source_archive_holds_every_file_of_the_checkout(built):
     assert set(listed.split("\n")) - {""} - held == set()
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_a_wheel_works_without_the_checkout(built, tmp_path):
     wheel, _ = built

@@ -107,6 +107,7 @@ def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
         np.testing.assert_allclose(rows, moved(body)[0], atol=1e-5)
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 @pytest.mark.parametrize("law", ["virial", "springs", "cmpm2"])
 def test_pinned_vertices_stay_and_hold_the_body(schedule, law):

@@ -107,6 +107,7 @@ def deform(body, F, steps=1, dt=DT):
         body._context.built.step(dt, 1, dt)
 
 
+@pytest.mark.guard
 def test_below_yield_nothing_changes_to_the_bit(fresh):
     body = fresh("plain")
     before = rest_inverses_of(body)
@@ -179,6 +180,7 @@ def test_flow_only_takes_elastic_energy_away(fresh, law):
         assert energies[-1] < 0.9 * energies[0]
 
 
+@pytest.mark.guard
 def test_a_bar_that_was_pulled_stays_as_long_as_return_mapping_says():
     """Stretched at once and let go: it swings, damped, about a length that the yield strain alone tells."""
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))

@@ -95,6 +95,7 @@ SLACK = {"tetgen": 1e-9, "ftetwild": 0.05}
 """By method: how far its outer faces may be from the surface, in cells."""
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("shape", SHAPES)
 @both
 def test_it_fills_the_polyhedron_and_its_outer_vertices_lie_on_it(method, shape):

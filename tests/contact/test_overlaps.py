@@ -106,6 +106,7 @@ def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown
     np.testing.assert_allclose(now, np.add(apart, 1.0), atol=0.02)
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_30_bodies_spawned_at_one_place_over_a_floor_come_to_rest_beside_and_on_each_other():
     world = World(soft_contact=True, sleep_speed=0.02)

@@ -263,6 +263,7 @@ def test_nothing_is_compiled_after_a_first_use(told):
     assert compiled_count() == before
 
 
+@pytest.mark.guard
 def test_the_same_calls_give_the_same_bits(told):
     stories = []
     for _ in range(2):

@@ -224,6 +224,7 @@ def test_no_device_before_the_start():
     assert "DeviceError: Taichi is not started" in done.stderr
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_more_threads_than_cores_are_not_waited_for():
     """The flat schedule's threads wait for each other, so there must be no more than run."""

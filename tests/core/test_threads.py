@@ -214,6 +214,7 @@ print("done")
     assert (status, out) == (0, "done\n"), errors
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_a_spawned_process_makes_the_same_world(tmp_path):
     """Beside a process in which Taichi runs."""

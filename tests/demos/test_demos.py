@@ -345,6 +345,7 @@ def test_puddings_sag_and_wobble_as_they_were_wished_for():
         assert np.abs(body.velocities()).max() < still
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()

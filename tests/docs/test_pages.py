@@ -63,6 +63,7 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", kept)
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("name", pages(name for name, blocks in CODE.items() if blocks))
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
@@ -116,6 +117,7 @@ PROGRAMS = {
 """Modules of command lines, and commands of which a page may name options."""
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("name", sorted(PAGES))
 def test_every_command_and_option_of_a_page_exists(name):
@@ -165,6 +167,7 @@ def test_every_choice_stands_in_its_table(page, names):
         assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize(("program", "its_app"), [("taichi-soft", app), ("python -m lab", lab_app)])
 def test_every_command_stands_in_the_table_of_commands(program, its_app):

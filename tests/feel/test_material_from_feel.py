@@ -93,6 +93,7 @@ def ringing(mesh, feel):
     return hz, -np.log(0.05) / rate
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "wishes"), list(targets(10, seed=5)))
 def test_random_wishes_are_met_to_5_percent_or_refused_with_the_nearest_that_can_be(name, wishes):
@@ -148,6 +149,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_met_is_refused_and_the_nearest_that_is_named_can_be(case):

@@ -358,6 +358,7 @@ def test_bodies_that_cannot_be_cut_say_so():
         flat.build()
 
 
+@pytest.mark.guard
 def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
     """Anisotropic and pinned; and, in the same world, one that has flowed."""
     frames = np.tile(np.eye(3), (len(BAR.tets), 1, 1))

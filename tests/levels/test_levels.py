@@ -341,6 +341,7 @@ def test_snapshots_and_recordings_know_the_level(flying):
     assert (world.state_hash(), body.positions().tobytes()) == (end[0], end[1].tobytes())
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_warming_up_changes_levels_and_leaves_every_bit(flying):
     world, body = flying
@@ -352,6 +353,7 @@ def test_warming_up_changes_levels_and_leaves_every_bit(flying):
     assert (world.state_hash(), body.level, body.positions().tobytes()) == before
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_after_warming_up_no_change_of_a_level_has_anything_to_prepare(monkeypatch):
     kind = SoftBodyAsset.from_surface(RING, RUBBER, cells=(6, 4, 3))
@@ -381,6 +383,7 @@ def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
     assert np.abs(apart - [5.0, 0.0, 0.0]).max() < 5e-5
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_levels_in_contact_change_back_and_forth_and_the_pile_stays_whole():
     world = World(soft_contact=True)

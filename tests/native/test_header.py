@@ -5,7 +5,7 @@ import subprocess
 import pytest
 from native_build import ROOT
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 PROGRAM = """
 #include <cstdio>

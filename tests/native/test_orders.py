@@ -4,7 +4,7 @@ import pytest
 from games import Player, line, lines_of
 from scenes import DT, GAMES, UPRIGHT, turn
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 
 def sleep_that_is_asked_for_after_a_restore():

@@ -14,7 +14,11 @@ from test_kept_bits import KEPT
 
 pytestmark = pytest.mark.soak
 
-PLAYED = ("heap", "joined", "laws")  # `make test-platforms` plays all of them
+PLAYED = (
+    pytest.param("heap", marks=pytest.mark.guard),
+    "joined",
+    "laws",
+)  # `make test-platforms`: all of them
 TARGETS = ",".join(dict.fromkeys(each.platform for each in RUNNERS.values()))
 
 

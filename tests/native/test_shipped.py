@@ -10,7 +10,7 @@ import pytest
 from godot_build import SCRIPTS, told
 from native_build import ROOT
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 
 def test_the_sample_is_built_and_played_with_what_is_shipped_alone(native, export, tmp_path):

@@ -245,6 +245,7 @@ WANTED = {
 }
 
 
+@pytest.mark.guard
 def test_bad_input_is_refused_by_name_and_the_world_goes_on(node, export, tmp_path):
     program = tmp_path / "refused.mjs"
     program.write_text(REFUSED.replace("PACKAGE", PACKAGE.as_posix()))

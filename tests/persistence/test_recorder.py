@@ -67,6 +67,7 @@ def tear_to_pieces(body):
     body.set_motion(body.positions(), fast[:, None] * np.ones(3))
 
 
+@pytest.mark.guard
 def test_a_random_game_is_made_again_bit_by_bit(game, tmp_path):
     world, path = game
     report = replay(path)

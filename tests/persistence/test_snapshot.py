@@ -510,6 +510,7 @@ def bendable():
     return world
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_rest_shapes_come_back(bendable):
     body = bendable.bodies[0]

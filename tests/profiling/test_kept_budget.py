@@ -49,6 +49,7 @@ def test_a_run_that_never_meets_its_budget_is_told_as_a_whole():
     assert run.changing is None
 
 
+@pytest.mark.guard
 def test_the_budget_is_half_of_what_the_same_bodies_take_without_one(monkeypatch):
     def kinds():
         ball = trimesh.creation.icosphere(subdivisions=2, radius=0.4)

@@ -50,6 +50,7 @@ def together():
     return fall(list(KINDS))
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", KINDS)
 def test_a_body_among_others_moves_as_if_alone(together, name):
     """Bit for bit, whatever the others are made of."""

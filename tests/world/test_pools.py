@@ -91,6 +91,7 @@ def told_by_a_world_of_their_own(mode):
     return told
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("mode", MODES)
 def test_a_body_that_comes_later_moves_as_one_of_the_start_and_leaves_no_trace_on_others(mode):
     """Bit for bit: in a slot where one lay on the floor before, and where one broke."""
@@ -300,6 +301,7 @@ def test_the_number_of_substeps_does_not_depend_on_who_lives(empty):
     assert counts == [needed] * 3
 
 
+@pytest.mark.guard
 def test_nothing_is_compiled_when_the_first_body_comes(monkeypatch):
     compiled = []
     prepare = FirstLaunches._prepare  # of a kernel, from its source or from what an earlier process kept

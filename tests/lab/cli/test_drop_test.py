@@ -9,7 +9,7 @@ import pytest
 from lab import drop_test as drops
 from lab.cli import main
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 
 @pytest.mark.parametrize(

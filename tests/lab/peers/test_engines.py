@@ -54,6 +54,7 @@ def test_a_body_falls_by_half_g_t_squared_without_a_change_of_shape_until_it_tou
     np.testing.assert_allclose(fallen, np.broadcast_to(fallen.mean(axis=1)[:, None], fallen.shape), atol=1e-3)
 
 
+@pytest.mark.guard
 def test_a_body_lands_on_the_floor_and_neither_floats_above_it_nor_sinks_in(course):
     lowest = course.positions[:, :, 2].min()
     assert -0.04 < lowest < 0.005

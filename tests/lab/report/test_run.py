@@ -12,7 +12,7 @@ from lab.report import run
 from lab.sweep import Store, SweepError
 from taichi_soft.core.errors import OptionError
 
-pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab"), pytest.mark.guard]
 
 
 @pytest.fixture

@@ -285,6 +285,7 @@ def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
     assert np.abs(body.velocities()).max() < 0.01
 
 
+@pytest.mark.guard
 def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_above_it():
     """Gravity is slanted instead of the floor. The cube settles, and then has g (sin a - mu cos a)."""
     slope, mesh = 0.3, box((0.5, 0.5, 0.5), (3, 3, 3))
@@ -318,6 +319,7 @@ def test_a_stiff_bar_that_bends_falls_as_fast_as_a_soft_one():
         assert start - body.center_of_mass()[2] == pytest.approx(fallen, rel=1e-4)
 
 
+@pytest.mark.guard
 def test_momentum_is_kept_in_flight_and_ringing_fades():
     """By the system as well as by the forces; and implicit Euler takes energy where nothing damps."""
     mesh = sphere(0.5, 2)
