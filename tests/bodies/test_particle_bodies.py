@@ -128,9 +128,9 @@ def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
 @pytest.mark.parametrize(
     ("pinned", "text"),
     [
-        ([99], "pinned names vertex 99: there are 8, from 0 to 7"),
+        ([99], "pinned.*vertex 99.*0 to 7"),
         ([-1], "pinned names vertex -1"),
-        ([0.5], "pinned must be a list of vertex numbers"),
+        ([0.5], "pinned.*list"),
         ("all", "pinned must be a list"),
         ([[0, 1]], "pinned must be a list"),
     ],
@@ -172,9 +172,7 @@ def test_what_needs_tetrahedra_says_so():
 
 def test_a_particle_mesh_takes_springs_only():
     world = World()
-    with pytest.raises(
-        MeshError, match=r"law 'virial' .*no tetrahedra: .* law='springs' with a SpringMaterial"
-    ):
+    with pytest.raises(MeshError, match=r"'virial'.*law='springs'.*SpringMaterial"):
         world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), law="virial", position=(0, 0, 1))
     assert world.bodies == ()
     assert world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), position=(0, 0, 1)).asset.law == "springs"

@@ -222,7 +222,7 @@ def test_others_in_the_same_world_do_not_flow(fresh):
     [
         ({}, r"yield_stress.*yield_strain: got"),
         ({"yield_stress": 1.0, "yield_strain": 1.0}, r"yield_stress.*yield_strain: got"),
-        ({"yield_stress": 0.0}, "yield_stress must be a number above 0 Pa"),
+        ({"yield_stress": 0.0}, "yield_stress.*above 0 Pa"),
         ({"yield_strain": -1.0}, "yield_strain"),
         ({"yield_strain": math.nan}, "yield_strain"),
         ({"yield_strain": 0.1, "creep": 0.0}, "creep"),
@@ -239,7 +239,7 @@ def test_bodies_that_cannot_flow_are_refused():
     clay = Plasticity(yield_strain=0.1)
     with pytest.raises(OptionError, match=r"law 'springs' .* plasticity.*'virial'"):
         SoftBodyAsset(MESH, CLAY, law="springs", plasticity=clay)
-    with pytest.raises(OptionError, match="must be a Plasticity or None"):
+    with pytest.raises(OptionError, match=r"Plasticity.*None"):
         SoftBodyAsset(MESH, CLAY, plasticity=0.1)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
     with pytest.raises(MaterialError, match=r"AnisotropicMaterial .* plasticity"):

@@ -297,7 +297,7 @@ def test_an_attachment_that_would_hold_nothing_bars_the_change_and_stays():
     body.set_level(0)
     other = body.attach([second], frames[1])
     before = world.state_hash()
-    with pytest.raises(StateError, match="would hold nothing at level 2"):
+    with pytest.raises(StateError, match="nothing at level 2"):
         body.set_level(2)
     assert (world.state_hash(), body.level, other.is_attached) == (before, 0, True)
     assert all(hold.is_attached for hold in holds)
@@ -462,7 +462,7 @@ def test_levels_that_are_none_are_refused(monkeypatch):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(SoftBodyAsset(BAR[1], RUBBER),), spare_vertices=10)
     with pytest.raises(OptionError, match="no levels of detail"):
         SoftBodyAsset(BAR[0], RUBBER, law="springs").with_coarser(BAR[1])
-    with pytest.raises(OptionError, match="coarser must be a tuple of assets"):
+    with pytest.raises(OptionError, match=r"coarser.*tuple"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(BAR[1],))
     with pytest.raises(OptionError, match="law and the contact"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(SoftBodyAsset(BAR[1], RUBBER, law="virial"),))

@@ -194,7 +194,7 @@ def test_a_dead_handle_says_so_and_what_it_was_can_still_be_read(empty, name):
     if name in READABLE:
         asked(body, name)
     else:
-        with pytest.raises(StateError, match=rf"body 1 was removed by despawn in step {world.step_count}"):
+        with pytest.raises(StateError, match=rf"body 1 .*despawn.*step {world.step_count}"):
             asked(body, name)
     assert repr(body).endswith("removed)")
     assert repr(again).endswith("active)")
@@ -206,7 +206,7 @@ def test_bodies_can_come_and_go_before_the_world_is_built():
     world.reserve(kind, 3)
     first, second = (world.spawn(kind, position=(x, 0, 0)) for x in (1, 5))
     world.despawn(first)
-    with pytest.raises(StateError, match="body 0 was removed by despawn in step 0"):
+    with pytest.raises(StateError, match=r"body 0.*despawn.*step 0"):
         first.positions()
     build(world)
     assert world.bodies == (second,)

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.kernel
 REST = oracle.ONE_TET.vertices
 MESHES = oracle.MESHES
 EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.params_of(oracle.MODES))
-EACH_STRAIN = pytest.mark.parametrize("strain", oracle.STRAINS)
+EACH_STRAIN = pytest.mark.parametrize("strain", oracle.EACH_STRAIN)
 EACH_LAW_AND_STRAIN = pytest.mark.parametrize(
     ("strain", "law"),
     [

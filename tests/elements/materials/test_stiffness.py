@@ -242,7 +242,7 @@ def test_thirteen_constants_make_one_plane_of_symmetry():
     assert [found.matrix[i, j] for i, j in upper] == values
     assert found.symmetry() == "one plane"
     np.testing.assert_allclose(found.rotated([0, 0, 1, 0]).matrix, found.matrix, atol=1e-12)
-    with pytest.raises(OptionError, match=r"constants must have shape \(13,\)"):
+    with pytest.raises(OptionError, match=r"constants.*\(13,\)"):
         Stiffness.one_plane(values[:9])
 
 
@@ -282,7 +282,7 @@ LOPSIDED[0, 1] = 0.5
 @pytest.mark.parametrize(
     ("matrix", "said"),
     [
-        (LOPSIDED, r"not symmetric: entry \(0, 1\) is 0.5 and \(1, 0\) is 0"),
+        (LOPSIDED, r"symmetric.*\(0, 1\).*0\.5.*\(1, 0\).*0"),
         (np.diag([1, 1, 1, 1, 1, -2.0]), "eigenvalue -2 Pa"),
         (np.diag([1, 1, 1, 1, 1, 0.0]), "eigenvalue 0 Pa"),
         (np.zeros((6, 6)), "eigenvalue 0 Pa"),

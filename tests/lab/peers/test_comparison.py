@@ -94,7 +94,7 @@ def test_steps_are_halved_until_the_body_holds_together(bad):
 
     assert record(SMALL, make, 3).step == 1 / 12
     assert tried == [3, 6, 12]
-    with pytest.raises(StateError, match="explodes even with 192 steps"):
+    with pytest.raises(StateError, match="192 steps"):
         record(SMALL, lambda steps: make(steps, np.inf), 3)
 
 
