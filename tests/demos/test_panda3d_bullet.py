@@ -9,7 +9,7 @@ import pytest
 
 from taichi_soft.core.package_data import DEMOS
 
-pytestmark = [pytest.mark.soak, pytest.mark.guard]
+pytestmark = pytest.mark.soak
 
 pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[panda3d]'")
 

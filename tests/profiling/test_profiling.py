@@ -69,7 +69,6 @@ def test_the_crossover_times_both_schedules():
     assert table.row_count == 1
 
 
-@pytest.mark.guard
 def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
     monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
     monkeypatch.setattr(game, "SETTLING", 3)

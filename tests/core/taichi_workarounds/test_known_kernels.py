@@ -61,7 +61,6 @@ def folder(tmp_path_factory):
     return folder, state, made
 
 
-@pytest.mark.guard
 @pytest.mark.soak
 def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(folder):
     folder, state, made = folder
