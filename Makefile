@@ -1,16 +1,19 @@
 # make demo: set everything up, drop the thesis's sphere, write out/bounce.mp4
-# make test: set everything up, run the tests except the slow ones (minutes); make test-all: run every test (an hour)
+# make test: set everything up, run the tests except the slow ones (minutes); make test-changed: with the slow ones that guard what
+# changed since a revision (half an hour); make test-all: run every test (an hour)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds native test-native test-platforms dist-native lint profile report peers gallery docs clean
+.PHONY: help setup demo test test-fast test-changed test-all test-bounds native test-native test-platforms dist-native lint profile report peers gallery docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
+SINCE := HEAD
 
 help:
 	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
 	@echo "make test     set up, run the tests, except the slow ones"
 	@echo "make test-fast  set up, run the tests that build no world (seconds to minutes)"
+	@echo "make test-changed SINCE=main  set up with every extra, run the tests and the slow ones that guard what changed"
 	@echo "make test-all set up with every extra, run every test (an hour)"
 	@echo "make test-bounds  set up, run kernels with every index checked (minutes)"
 	@echo "make native   set up, build the C library and its sample into out/native"
@@ -40,13 +43,16 @@ test: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "not soak"
 
 test-fast: $(VENV)/.test
-	@$(BIN)/python -m pytest -m "numpy or kernel"
+	@$(BIN)/python -m pytest -m "(numpy or kernel) and not soak"
+
+test-changed: $(VENV)/.dev
+	@$(BIN)/python -m pytest --since "$(SINCE)" $(PYTEST)
 
 test-all: $(VENV)/.dev
 	@$(BIN)/python -m pytest $(PYTEST)
 
 test-bounds: $(VENV)/.test
-	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
+	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds $(PYTEST)
 
 native: $(VENV)/.export
 	@for tool in cmake g++; do command -v $$tool > /dev/null || { echo "make native needs $$tool. Install it first."; exit 1; }; done

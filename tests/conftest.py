@@ -22,7 +22,8 @@ from taichi_soft.world.bare import bare_world
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
 
-from shares import Shares, place_of  # noqa: E402
+from shares import Shares  # noqa: E402
+from soaks import SOAKS, changed_since, is_named, left_out, soaks_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
@@ -44,57 +45,51 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-TIERS = {
-    "cages": "numpy",
-    "cli": "soak",
-    "contact/distances": "kernel",
-    "contact/shapes": "kernel",
-    "core/math": "kernel",
-    "demos": "soak",
-    "doctor": "soak",
-    "elements": "kernel",
-    "elements/laws/test_energy_laws.py": "world",
-    "elements/materials": "numpy",
-    "lab": "soak",
-    "meshing": "numpy",
-    "native": "soak",
-    "profiling": "soak",
-}
-"""Tier of the tests of a folder or file that have no marker for one. The longest path counts; elsewhere it is
-"world"."""
-
-NEEDS = {
-    "lab/experiments/": "lab",
-    "lab/report/": "lab",
-    "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
-    "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
-}
-"""Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
+KINDS = ("numpy", "kernel", "world")
+"""Markers for what a test runs; "world" is the default. `soak` stands beside them, for slow tests."""
 
 
-def tiers_of(item):
-    """Tiers that a test is marked with."""
-    return [tier for tier in ("numpy", "kernel", "world", "soak") if item.get_closest_marker(tier)]
+SINCE = "--since"
+NAMED_SOAKS = {soak for soaks in SOAKS.values() for soak in soaks.split()}
 
 
-def tier_of(path):
-    """Tier of the tests of a file that have no marker for one."""
-    places = (place.as_posix() for place in (path, *path.parents))
-    return next((TIERS[place] for place in places if place in TIERS), "world")
+def pytest_addoption(parser):
+    text = "of the soaks, run those marked guard, and those that guard what changed since a git revision"
+    parser.addoption(SINCE, metavar="REVISION", help=f"{text}; '' if that is not known")
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
+    leave_out_soaks(config, items)
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
-    items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
+    items.sort(key=lambda item: (files[item.path], keeps_a_world(item)))
     for item in items:
-        if not tiers_of(item):
-            item.add_marker(tier_of(item.path.relative_to(HERE)))
-        for start, extra in NEEDS.items():
-            if item.nodeid.removeprefix("tests/").startswith(start):
-                missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
-                reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
-                item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+        if not kinds_of(item) and not item.get_closest_marker("soak"):
+            item.add_marker("world")
+        for extra in [mark.args[0] for mark in item.iter_markers("needs")]:
+            missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
+            reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
+            item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+
+
+def leave_out_soaks(config, items):
+    """Take the soaks out that `--since` does not ask for."""
+    revision = config.getoption(SINCE)
+    if revision is None:
+        return
+    try:
+        changed = changed_since(revision) if revision else []
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from error
+    left = left_out(items, HERE, soaks_of(changed))
+    config.hook.pytest_deselected(items=left)
+    gone = set(left)
+    items[:] = [item for item in items if item not in gone]
+
+
+def kinds_of(item):
+    """Return the markers of a test that tell what it runs."""
+    return [kind for kind in KINDS if item.get_closest_marker(kind)]
 
 
 def keeps_a_world(item):
@@ -106,10 +101,14 @@ def keeps_a_world(item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    tiers = tiers_of(item)
-    if len(tiers) > 1:
-        pytest.fail(f"{item.nodeid} is marked {' and '.join(tiers)}: leave one of them", pytrace=False)
-    if tiers == ["soak"] and time.time() > float(os.environ.get(UNTIL, "inf")):
+    kinds = kinds_of(item)
+    if len(kinds) > 1:
+        pytest.fail(f"{item.nodeid} is marked {' and '.join(kinds)}: leave one of them", pytrace=False)
+    if not item.get_closest_marker("soak"):
+        return
+    if not is_named(item.path.relative_to(HERE), NAMED_SOAKS):
+        pytest.fail(f"no folder in tests/shared/soaks.py names the soak {item.path.name}", pytrace=False)
+    if time.time() > float(os.environ.get(UNTIL, "inf")):
         pytest.skip(TIME_IS_UP)
 
 

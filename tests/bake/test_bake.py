@@ -314,7 +314,7 @@ def test_a_cut_is_refused_with_its_frame_and_what_was_there_stays(game, tmp_path
     try:
         with pytest.raises(
             StateError,
-            match=r"'body_3' was cut, torn or given another level .* frame 11 .*, 0\.333333 seconds",
+            match=r"'body_3'.*frame 11.*0\.333333 s",
         ):
             game.bake(path)
         bake(game.begin(), path, seconds=0.333333, fps=FPS)
@@ -365,25 +365,25 @@ def test_folders_and_files_of_something_else_stay(game, tmp_path):
     [
         ("a.fbx", {}, r"ends in \.glb, \.npz, \.vat, \.usdc"),
         (".glb", {}, "ends in"),
-        ("a.glb", {"seconds": 0}, "seconds must be a number above 0 s"),
+        ("a.glb", {"seconds": 0}, "seconds.*above 0 s"),
         ("a.glb", {"fps": float("nan")}, "fps must be"),
         (
             "a.glb",
             {"fps": 25},
-            r"between the adapter's steps of 0.0166667 s: use 60, 30, 20, 15, or .*1 / 75",
+            r"0\.0166667 s.*60, 30, 20, 15.*1 / 75",
         ),
         ("a.glb", {"fps": 120}, "use 60"),
         ("a.glb", {"interpolation": "cubic"}, "'linear' or 'step'"),
         (
             "a.glb",
             {"limit": 0.1},
-            r"61 frames of [\d,]+ vertices, about [\d.]+ MB, above the limit of 0.1 MB: .*vat",
+            r"61 frames.* MB.*0\.1 MB.*vat",
         ),
         ("a.glb", {"seconds": 2e4, "limit": 1e6}, "4 GiB of a .glb"),
         (
             "a.vat",
             {"seconds": 600, "limit": 1e6},
-            r"18,001 rows, and GPUs support 16,384: bake at most 16,384 frames",
+            "18,001 rows.*at most 16,384",
         ),
         ("a.npz", {"seconds": 1e9}, "at most"),
     ],
@@ -409,7 +409,7 @@ def test_a_body_that_comes_later_counts_towards_the_limit(game, tmp_path):
 def test_a_missing_package_is_named_before_anything_moves(game, tmp_path, monkeypatch):
     adapter = game.begin()
     monkeypatch.setattr(extras, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtraError, match=r"a \.glb file needs pygltflib, pillow.*taichi-soft\[bake\]"):
+    with pytest.raises(MissingExtraError, match=r"\.glb.*pygltflib, pillow.*taichi-soft\[bake\]"):
         bake(adapter, tmp_path / "a.glb", seconds=1)
     with pytest.raises(MissingExtraError, match=r"a \.usdc file needs usd-core.*taichi-soft\[usd\]"):
         bake(adapter, tmp_path / "a.usdc", seconds=1)
@@ -417,7 +417,7 @@ def test_a_missing_package_is_named_before_anything_moves(game, tmp_path, monkey
 
 
 def test_what_is_no_scene_is_refused(tmp_path):
-    with pytest.raises(OptionError, match="must be a World or an EngineAdapter, got str"):
+    with pytest.raises(OptionError, match=r"World.*EngineAdapter, got str"):
         bake("world", tmp_path / "a.npz", seconds=1)
 
 

@@ -107,6 +107,7 @@ def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
         np.testing.assert_allclose(rows, moved(body)[0], atol=1e-5)
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 @pytest.mark.parametrize("law", ["virial", "springs", "cmpm2"])
 def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
@@ -127,9 +128,9 @@ def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
 @pytest.mark.parametrize(
     ("pinned", "text"),
     [
-        ([99], "pinned names vertex 99: there are 8, from 0 to 7"),
+        ([99], "pinned.*vertex 99.*0 to 7"),
         ([-1], "pinned names vertex -1"),
-        ([0.5], "pinned must be a list of vertex numbers"),
+        ([0.5], "pinned.*list"),
         ("all", "pinned must be a list"),
         ([[0, 1]], "pinned must be a list"),
     ],
@@ -171,9 +172,7 @@ def test_what_needs_tetrahedra_says_so():
 
 def test_a_particle_mesh_takes_springs_only():
     world = bare_world()
-    with pytest.raises(
-        MeshError, match=r"law 'virial' .*no tetrahedra: .* law='springs' with a SpringMaterial"
-    ):
+    with pytest.raises(MeshError, match=r"'virial'.*law='springs'.*SpringMaterial"):
         world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), law="virial", position=(0, 0, 1))
     assert world.bodies == ()
     assert world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), position=(0, 0, 1)).asset.law == "springs"

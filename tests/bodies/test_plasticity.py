@@ -107,6 +107,7 @@ def deform(body, F, steps=1, dt=DT):
         body._context.built.step(dt, 1, dt)
 
 
+@pytest.mark.guard
 def test_below_yield_nothing_changes_to_the_bit(fresh):
     body = fresh("plain")
     before = rest_inverses_of(body)
@@ -179,6 +180,7 @@ def test_flow_only_takes_elastic_energy_away(fresh, law):
         assert energies[-1] < 0.9 * energies[0]
 
 
+@pytest.mark.guard
 def test_a_bar_that_was_pulled_stays_as_long_as_return_mapping_says():
     """Stretched at once and let go: it swings, damped, about a length that the yield strain alone tells."""
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
@@ -220,7 +222,7 @@ def test_others_in_the_same_world_do_not_flow(fresh):
     [
         ({}, r"yield_stress.*yield_strain: got"),
         ({"yield_stress": 1.0, "yield_strain": 1.0}, r"yield_stress.*yield_strain: got"),
-        ({"yield_stress": 0.0}, "yield_stress must be a number above 0 Pa"),
+        ({"yield_stress": 0.0}, "yield_stress.*above 0 Pa"),
         ({"yield_strain": -1.0}, "yield_strain"),
         ({"yield_strain": math.nan}, "yield_strain"),
         ({"yield_strain": 0.1, "creep": 0.0}, "creep"),
@@ -237,7 +239,7 @@ def test_bodies_that_cannot_flow_are_refused():
     clay = Plasticity(yield_strain=0.1)
     with pytest.raises(OptionError, match=r"law 'springs' .* plasticity.*'virial'"):
         SoftBodyAsset(MESH, CLAY, law="springs", plasticity=clay)
-    with pytest.raises(OptionError, match="must be a Plasticity or None"):
+    with pytest.raises(OptionError, match=r"Plasticity.*None"):
         SoftBodyAsset(MESH, CLAY, plasticity=0.1)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
     with pytest.raises(MaterialError, match=r"AnisotropicMaterial .* plasticity"):

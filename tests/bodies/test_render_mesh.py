@@ -193,7 +193,7 @@ def test_a_sheet_has_two_sides_with_opposite_normals(zoo):
 
 
 def test_a_rope_has_no_surface_to_draw(zoo):
-    with pytest.raises(MeshError, match=r"no triangles to draw: .*surface=.*ParticleMesh"):
+    with pytest.raises(MeshError, match=r"triangles.*surface=.*ParticleMesh"):
         zoo.rope.render_mesh()
 
 
@@ -225,7 +225,7 @@ def test_after_a_cut_a_mesh_is_outdated_and_a_new_one_has_the_cut_faces(zoo):
     assert mesh.topology_version == body.topology_version - 1
     assert "outdated" in repr(mesh)
     buffers = [np.full((mesh.vertex_count, 3), np.nan, dtype=np.float32) for _ in range(2)]
-    with pytest.raises(StateError, match=r"topology_version 0, now 1\): .*body.render_mesh"):
+    with pytest.raises(StateError, match=r"topology_version 0.*1.*body\.render_mesh"):
         world.read_render_mesh(mesh, 1.0, *buffers)
     assert np.isnan(buffers).all()
     total = 0.0
@@ -259,7 +259,7 @@ BAD_CREASES = (-1, 181.0, float("nan"), float("inf"), "sharp", True, [30.0])
 
 @pytest.mark.parametrize("crease", BAD_CREASES, ids=str)
 def test_a_crease_that_is_no_angle_is_refused(zoo, crease):
-    with pytest.raises(OptionError, match="crease must be an angle from 0 to 180 degrees, or None, got"):
+    with pytest.raises(OptionError, match=r"crease.*0 to 180.*None"):
         zoo.ball.render_mesh(crease=crease)
 
 
@@ -301,7 +301,7 @@ def test_buffers_that_share_memory_are_refused_and_neighbours_in_one_array_are_n
     mesh = zoo.cube.render_mesh(crease=30.0)
     rows = np.zeros((48, 3), dtype=np.float32)
     for one, other in ((rows[:24], rows[:24]), (rows[:24], rows[20:44])):
-        with pytest.raises(OptionError, match="positions and normals share memory"):
+        with pytest.raises(OptionError, match=r"positions.*normals.*memory"):
             zoo.world.read_render_mesh(mesh, 1.0, one, other)
     assert not rows.any()
     zoo.world.read_render_mesh(mesh, 1.0, rows[:24], rows[24:])
@@ -318,11 +318,11 @@ def test_without_buffers_there_are_new_ones(zoo):
 def test_what_is_no_mesh_of_this_world_and_no_alpha_is_refused(zoo):
     world, mesh = zoo.world, zoo.cube.render_mesh()
     for bad in (None, "cube", CUBE):
-        with pytest.raises(OptionError, match="mesh must be a RenderMesh, made by body"):
+        with pytest.raises(OptionError, match=r"mesh.*RenderMesh"):
             world.read_render_mesh(bad, 1.0)
     stranger = bare_world(floor=None).add_body(CUBE, JELLY)
-    with pytest.raises(OptionError, match="mesh must belong to a body of this world"):
+    with pytest.raises(OptionError, match=r"mesh.*this world"):
         world.read_render_mesh(stranger.render_mesh(), 1.0)
     for alpha in (-0.1, 1.1, float("nan"), None, "now"):
-        with pytest.raises(OptionError, match="alpha must be a number from 0 to 1"):
+        with pytest.raises(OptionError, match=r"alpha.*0 to 1"):
             world.read_render_mesh(mesh, alpha)

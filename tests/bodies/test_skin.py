@@ -195,7 +195,7 @@ def test_where_there_is_no_skin_none_is_drawn(zoo):
 
 
 def test_a_rope_takes_no_skin_and_springs_no_cage():
-    with pytest.raises(MeshError, match="skins, because it has no tetrahedra"):
+    with pytest.raises(MeshError, match=r"skins.*no tetrahedra"):
         SoftBodyAsset(rope(1.0, 4, mass=0.1), SpringMaterial(500.0, 0.2), skin=ball())
     with pytest.raises(OptionError, match=r"law .* cage.*'virial'"):
         SoftBodyAsset.from_surface(ball(), JELLY, cells=4, law="springs")

@@ -185,6 +185,7 @@ def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turn
         body.force_across((0, 0), (0, 0, 1))
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 @pytest.mark.parametrize("name", [name for name in CASES if name != "volume_springs"])
 def test_stress_is_that_of_the_forces(name, mirror, still, turned):

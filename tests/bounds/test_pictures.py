@@ -6,6 +6,8 @@ import pytest
 from taichi_soft import sphere
 from taichi_soft.render import Camera, Renderer, Surface
 
+pytestmark = pytest.mark.soak
+
 BALL = sphere(0.05, 3)
 CAMERAS = {
     "usual": Camera((0.0, -2.0, 1.0)),

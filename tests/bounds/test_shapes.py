@@ -14,6 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "contact" / "distances"))
 
 from test_mesh import MESHES, random_blocks, random_tetrahedra, sliver_at_a_junction
 
+pytestmark = pytest.mark.soak
+
 vec8, ivec3 = ti.types.vector(8, ti.f32), ti.types.vector(3, ti.i32)
 PLACES = np.array([0.0, 1e-30, 0.3, 1.0, 40.0, 9.9e6, 3e9, 1e30, np.inf])
 """Coordinates [m] that particles have, and such as they have within a step before they are put back."""

@@ -33,7 +33,7 @@ JELLY = Material(3e4, 0.3, 500.0, 5.0)
 FLAT = [np.diag(each) for each in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, -1), (1e-6, 1e-6, 1e-6))]
 """To a point, a line, a sheet, inside out, and too small for float32 to tell vertices apart."""
 
-pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+pytestmark = [pytest.mark.soak, pytest.mark.filterwarnings("ignore::UserWarning")]
 
 
 def wrecks(body):
@@ -128,6 +128,7 @@ def test_a_crowd_that_was_wrecked(integrator):
     wreck_all(world)
 
 
+@pytest.mark.guard
 def test_a_random_game():
     """With soft contact, colliders on grids, grabs, joints, frames, cuts, spawning, sleep, and taken back."""
     hashes, different = random_play.check(ticks=40)

@@ -22,6 +22,8 @@ from taichi_soft.bodies.sag import sag
 from taichi_soft.cages import build_cage
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0)
 LATTICE_STEP = 0.33
 """Stable step of a lattice that fills space, in the time that sqrt(E / density) takes for a cell."""

@@ -56,6 +56,7 @@ def fall(assets):
     return Fall(assets)
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", BODIES)
 def test_a_difficult_surface_gets_well_shaped_tetrahedra(assets, name):
     quality = assets[name].mesh.quality

@@ -7,6 +7,8 @@ from taichi_soft.cages.graded import GradedLattice, around, balanced, doubled
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.meshing import TetMesh
 
+pytestmark = pytest.mark.numpy
+
 COARSE = Lattice.around_box(np.array([-1.0, 2.0, 0.0]), np.array([-0.3, 2.5, 0.4]), 0.1)
 
 

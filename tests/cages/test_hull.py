@@ -11,6 +11,8 @@ from taichi_soft.cages import tetrahedra_of
 from taichi_soft.cages.hull import hull_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 BALL = surfaces.ball()
 DIRECTIONS = np.random.default_rng(0).normal(size=(400, 3))
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)

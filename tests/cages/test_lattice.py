@@ -6,6 +6,8 @@ import pytest
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.meshing import TetMesh
 
+pytestmark = pytest.mark.numpy
+
 LATTICE = Lattice.around_box(np.array([-1.0, 2.0, 0.0]), np.array([0.0, 2.7, 0.4]), 0.1)
 
 

@@ -95,6 +95,7 @@ SLACK = {"tetgen": 1e-9, "ftetwild": 0.05}
 """By method: how far its outer faces may be from the surface, in cells."""
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("shape", SHAPES)
 @both
 def test_it_fills_the_polyhedron_and_its_outer_vertices_lie_on_it(method, shape):
@@ -172,7 +173,7 @@ def test_ftetwild_takes_holes_turned_triangles_and_parts_that_overlap(method):
 @by_tetgen
 def test_tetgen_refuses_what_is_open_or_crosses_itself_with_the_way_out(method):
     for surface in (without(ball(), 0.02), joined(ball(), ball(at=(1.5, 0, 0)))):
-        with pytest.raises(MeshError, match=r"method 'tetgen' failed .*method='lattice'"):
+        with pytest.raises(MeshError, match=r"'tetgen'.*method='lattice'"):
             meshed(surface, method)
 
 
@@ -354,7 +355,7 @@ def test_what_breaks_in_the_process_is_an_error_and_nothing_is_left(fake, what, 
 @pytest.mark.parametrize("code", [HOLD, "while True: print('x' * 1000)"])
 def test_what_hangs_is_ended_at_its_limit(fake, code):
     number = fake(code)
-    with pytest.raises(MeshError, match=r"took more than 1\.5 s .*killed.*time_limit.*method='lattice'"):
+    with pytest.raises(MeshError, match=r"1\.5 s .*time_limit.*method='lattice'"):
         meshed(ball(subdivisions=1), "tetgen", cells=CELLS, time_limit=1.5)
     assert not is_running(number())
 

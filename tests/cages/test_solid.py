@@ -8,6 +8,8 @@ from surfaces import ball, joined, lens_volume, turned, with_some_turned, with_t
 from taichi_soft.cages.solid import solid_of
 from taichi_soft.cages.voxels import volume_within
 
+pytestmark = pytest.mark.numpy
+
 BALL = ball()
 
 

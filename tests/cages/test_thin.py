@@ -13,6 +13,8 @@ from taichi_soft.cages.marking import part_count
 from taichi_soft.meshing.surfaces import read_surfaces
 from taichi_soft.world.bare import bare_world
 
+pytestmark = pytest.mark.numpy
+
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0)
 TOP = (2.0, 1.2, 0.25)
 FEET = [(x, y) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]

@@ -7,6 +7,8 @@ import sys
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.soak
+
 SCENE = """
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Material, SpringMaterial, World, box, rope
@@ -52,6 +54,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.guard
 def test_a_scene_becomes_a_file_and_its_size_is_told_first(folder):
     done = bake(
         folder, "scene.py:make_world", "--out", "out/a.glb", "--seconds", "0.2", "--fps", "10", "--step"

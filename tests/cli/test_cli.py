@@ -16,6 +16,8 @@ from taichi_soft.profiling import LawCost, Spread, find_compiler
 from taichi_soft.profiling.law_costs import kinds_of
 from taichi_soft.profiling.profile_tables import law_table
 
+pytestmark = pytest.mark.soak
+
 SPREAD = Spread(1.0, 1.0, 1.0, 1.0)
 
 
@@ -103,6 +105,7 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
     ]
 
 
+@pytest.mark.guard
 def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
     film = tmp_path / "films" / "b.webm"
     how = ("--size", "128x96", "--threads", "1", "--slow", "2", "--blur", "2", "--framed")
@@ -115,6 +118,7 @@ def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
     assert done.stderr == ""
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

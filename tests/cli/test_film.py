@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+pytestmark = pytest.mark.soak
+
 SCENE = """
 from engine_adapter import FixedStep
 from taichi_soft import BoxShape, Material, World, box
@@ -65,6 +67,7 @@ def rows_of_body(picture):
     return np.flatnonzero((red - blue > 60).any(axis=1))
 
 
+@pytest.mark.guard
 def test_a_mesh_file_is_filmed_as_it_falls_onto_the_floor_and_stays_in_the_picture(folder):
     done = film(folder, "box.obj", "--seconds", "1", "--out", "box.png", "--orbit", *SMALL)
     assert done.returncode == 0, done.stderr

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.soak
+
 GAME = """
 from taichi_soft import Material, World, box
 
@@ -55,6 +57,7 @@ def kernels_in(folder):
     return {path.name for path in folder.glob("*.tic")}
 
 
+@pytest.mark.guard
 def test_a_game_compiles_nothing_where_its_kernels_came_with_it(tmp_path):
     (tmp_path / "game.py").write_text(GAME)
     done = warm(tmp_path, "game.py:make_world", "--out", "kernels")

@@ -397,14 +397,14 @@ def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_d
     add(world, 7, CUBE, FIRM, position=(0, 0, -0.5))
     add(world, 0, CUBE, FIRM, position=(0, 0, 0.1), pinned=np.flatnonzero(CUBE.vertices[:, 2] < 0))
     wrong = add(world, 1, CUBE, FIRM, position=(0, 0, -0.05))
-    with pytest.raises(OptionError, match=r"body 7 starts 0.3 m inside collider 1, BoxShape"):
+    with pytest.raises(OptionError, match=r"body 7 .*0\.3 m .*collider 1.*BoxShape"):
         world.build()
     assert not world.is_built
     world.despawn(wrong)
     world.build()
     for number, body in enumerate(world.bodies[:5]):
         before = body.positions()
-        with pytest.raises(OptionError, match=rf"body {number} starts 0\.\d+ m inside collider {number}"):
+        with pytest.raises(OptionError, match=rf"body {number} .*0\.\d+ m .*collider {number}"):
             body.teleport((0, 0, 0))
         np.testing.assert_array_equal(body.positions(), before)
     with pytest.raises(OptionError, match=r"starts 0\.3 m inside collider 1"):

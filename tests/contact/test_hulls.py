@@ -82,6 +82,7 @@ def test_a_body_with_thin_parts_rests_on_what_is_drawn_of_it(leg):
     assert gaps[500] < 0.002
 
 
+@pytest.mark.guard
 def test_a_body_lies_on_what_is_drawn_of_another():
     """A plate on a ball, both by their hulls: their drawn surfaces meet to 1 % of the ball."""
     world = bare_world(floor=0.0, soft_contact=True, friction=1.0)
@@ -298,6 +299,7 @@ def bits(world):
     return [each.tobytes() for body in world.bodies for each in (body.positions(), body.velocities())]
 
 
+@pytest.mark.guard
 def test_rewinding_and_recordings_are_exact(tmp_path):
     world = heap()
     for _ in range(50):

@@ -48,6 +48,7 @@ def run(world, seconds, dt=DT):
         world.step(dt)
 
 
+@pytest.mark.guard
 def test_a_block_slides_on_an_incline_at_and_only_at_the_angle_of_friction():
     """Friction 2 % above the tangent holds it, to less than a tenth of a millimetre; 2 % below it does not.
 
@@ -266,6 +267,7 @@ def test_its_rehearsal_leaves_out_the_joints_it_does_not_have():
     assert world.state_hash() == before
 
 
+@pytest.mark.guard
 def test_bodies_that_collide_keep_their_momentum():
     world = bare_world(
         floor=None,
@@ -286,6 +288,7 @@ def test_bodies_that_collide_keep_their_momentum():
     np.testing.assert_allclose(a.momentum() + b.momentum(), before, atol=1e-5 * passed)
 
 
+@pytest.mark.guard
 def test_two_blocks_stand_on_each_other_and_fall_asleep():
     world = bare_world(integrator="implicit_euler", soft_contact=True, sleep_speed=0.02)
     for i in range(2):

@@ -106,6 +106,7 @@ def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown
     np.testing.assert_allclose(now, np.add(apart, 1.0), atol=0.02)
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_30_bodies_spawned_at_one_place_over_a_floor_come_to_rest_beside_and_on_each_other():
     world = bare_world(soft_contact=True, sleep_speed=0.02)
@@ -197,14 +198,14 @@ def test_a_body_may_be_refused_where_it_overlaps_another():
     world = bare_world(floor=None, soft_contact=True)
     asset = world.add_body(CUBE, SOFT).asset
     world.reserve(asset, 3)
-    with pytest.raises(OptionError, match=r"the body starts 0\.04 m inside body 0"):
+    with pytest.raises(OptionError, match=r"0\.04 m .*body 0"):
         world.add_body(CUBE, SOFT, position=(0.36, 0, 0), overlap="refuse")
     world.build()
     before, count = world.state_hash(), len(world.bodies)
     for position in ((0, 0, 0), (0, 0.36, 0), (0.35, 0.35, 0.35)):
         with pytest.raises(OptionError, match="inside body 0"):
             world.spawn(asset, position=position, overlap="refuse")
-    with pytest.raises(OptionError, match="unknown overlap 'push': choose one of 'part', 'refuse'"):
+    with pytest.raises(OptionError, match=r"overlap 'push'.*'part', 'refuse'"):
         world.spawn(asset, overlap="push")
     assert (world.state_hash(), len(world.bodies)) == (before, count)
     world.spawn(asset, position=(0, 0.4, 0), overlap="refuse")

@@ -233,11 +233,11 @@ def test_what_is_dragged_too_far_in_a_step_without_retries_is_told_the_way_out()
     frame = world.add_frame()
     body.attach(SIDE, frame)
     frame.move_to((0, 0, 30))
-    with pytest.warns(FrozenBodyWarning, match=r"1 m large, .* moved it by 30 m .* Frame\.teleport"):
+    with pytest.warns(FrozenBodyWarning, match=r"1 m .*30 m .*Frame\.teleport"):
         world.step(1 / 60, 8)
     world, body = at_rest(world, body)
     body.set_motion(np.full((27, 3), 9.9999e6), np.full((27, 3), 1.9e4))
-    with pytest.warns(FrozenBodyWarning, match="Use more substeps or a softer material"):
+    with pytest.warns(FrozenBodyWarning, match="substeps.*material"):
         world.step(1 / 60, 1)
 
 

@@ -107,6 +107,7 @@ def test_a_cube_that_its_weight_has_flattened_rises_and_does_not_jump(scene):
         assert body.flipped_count() == 0 if len(body.tets) else True
 
 
+@pytest.mark.guard
 def test_a_slider_that_is_drawn_to_and_fro_adds_nothing(scene):
     """Each call begins at the constants that the one before has come to."""
     world = begin(scene)

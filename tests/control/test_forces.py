@@ -33,7 +33,7 @@ def at_rest(world):
     return world, *world.bodies
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=["leapfrog", pytest.param("lazy_leapfrog", marks=pytest.mark.soak), "implicit_euler"])
 def floating(request, made):
     """Two cubes at rest, without gravity."""
     return at_rest(made[request.param])

@@ -176,7 +176,7 @@ def test_a_world_has_sixteen_hands(plain):
     world, body, other = plain
     grabs = [(body, other)[i % 2].grab(i) for i in range(16)]
     before = [b.positions().tobytes() for b in world.bodies]
-    with pytest.raises(StateError, match="all 16 grabs of this world are in use"):
+    with pytest.raises(StateError, match="16 grabs"):
         body.grab(20)
     assert [b.positions().tobytes() for b in world.bodies] == before
     grabs[5].release()

@@ -113,7 +113,7 @@ def test_a_point_that_is_far_from_the_body_is_refused_with_the_distance(moving):
     world, cube, _ = moving
     before = state_of(world)
     nearest = np.linalg.norm(cube.positions().astype(float) - [3, 0, 1], axis=1).min()
-    with pytest.raises(OptionError, match=f"is {nearest:.3g}.* m from the nearest particle of body 0"):
+    with pytest.raises(OptionError, match=f"{nearest:.3g}.* m .*body 0"):
         cube.apply_impulse_at_point((1, 0, 0), (3, 0, 1), 0.9 * nearest)
     assert state_of(world) == before
 
@@ -202,7 +202,7 @@ def test_a_jump_leaves_energy_and_spin_as_they_were(plain, turned):
 def test_a_jump_below_the_floor_is_refused_but_not_one_onto_it(solo, cube, jelly):
     world, body = solo(cube, jelly, position=(0, 0, 2))
     before = state_of(world)
-    with pytest.raises(OptionError, match=r"puts the body 0\.3 m below the floor"):
+    with pytest.raises(OptionError, match=r"0\.3 m below the floor"):
         body.teleport((0, 0, 0.2))
     with pytest.raises(OptionError, match=r"beyond 1e\+07 m"):
         body.teleport((9.9999999e6, 0, 2))

@@ -123,9 +123,7 @@ def test_rows_run_out_and_come_back():
     every = np.arange(512)
     joints = [a.attach_to(b, every, onto=every) for _ in range(JOINT_ROWS // 512)]
     before = state_of(world)
-    with pytest.raises(
-        StateError, match=f"at most {JOINT_ROWS} particles: {JOINT_ROWS} are in use, and 1 more"
-    ):
+    with pytest.raises(StateError, match=f"{JOINT_ROWS} .*{JOINT_ROWS} .*1 more"):
         a.attach_to(b, [0], onto=[0])
     assert state_of(world) == before
     joints[1].release()
@@ -375,7 +373,7 @@ def test_a_full_world_refuses_and_changes_nothing(soft):
     joints = [small.attach_to(big, UNDER[:1]) for _ in range(MOST_JOINTS)]
     block.teleport((0, 0, -1))
     before = state_of(world)
-    with pytest.raises(StateError, match=f"all {MOST_JOINTS} joints of this world are in use"):
+    with pytest.raises(StateError, match=f"{MOST_JOINTS} joints"):
         block.attach_to(big, TOP)
     assert state_of(world) == before
     joints[20].release()

@@ -166,14 +166,14 @@ def test_the_number_of_substeps_follows_at_once():
 @pytest.mark.parametrize(
     ("name", "wrong", "text"),
     [
-        ("virial", SpringMaterial(1.0), "has a Material, and its type cannot change"),
+        ("virial", SpringMaterial(1.0), " Material.*cannot change"),
         (
             "springs",
             Material(1e5, 0.2, 1000.0, damping_ratio=0.0),
-            "has a SpringMaterial, and its type cannot change",
+            "SpringMaterial.*cannot change",
         ),
         ("virial", AnisotropicMaterial(WOOD, 1000.0, damping_ratio=0.0), "cannot change"),
-        ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0, damping_ratio=0.0), "7 values for a mesh of 40"),
+        ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0, damping_ratio=0.0), "7 values.*40"),
         (
             "virial",
             Material(1e5, 0.2, 1000.0, shear_modulus=1e4, damping_ratio=0.0),
@@ -263,6 +263,7 @@ def test_nothing_is_compiled_after_a_first_use(told):
     assert compiled_count() == before
 
 
+@pytest.mark.guard
 def test_the_same_calls_give_the_same_bits(told):
     stories = []
     for _ in range(2):

@@ -170,5 +170,5 @@ def test_a_refused_call_changes_nothing(plain, name):
 def test_a_loose_particle_is_named(plain):
     _, body = plain
     body.pin([0])
-    with pytest.raises(StateError, match="vertex 5 of body 0 is not pinned"):
+    with pytest.raises(StateError, match=r"vertex 5.*body 0.*not pinned"):
         body.set_targets([0, 5], np.zeros((2, 3)))

@@ -381,7 +381,7 @@ def test_a_friction_out_of_range_changes_nothing(slope, bad):
     world, shelf, plate, _ = slope
     before = world.snapshot()
     for call in (world.set_friction, shelf.set_friction, plate.set_friction):
-        with pytest.raises(OptionError, match="friction must be a number from 0 to 1,000,000"):
+        with pytest.raises(OptionError, match=r"friction.*0 to 1,000,000"):
             call(bad)
     assert world.snapshot() == before
 

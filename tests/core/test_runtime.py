@@ -46,7 +46,7 @@ def test_thread_counts_that_are_none(threads):
 @binding
 @pytest.mark.parametrize("cores", [[], [0, 0], [-1], [100_000], ["0"], [0.0], "0", 0, [True]])
 def test_cores_that_are_none_to_bind_to(cores):
-    with pytest.raises(OptionError, match="cores must be distinct numbers from"):
+    with pytest.raises(OptionError, match=r"cores.*distinct"):
         init("cpu", cores=cores)
 
 
@@ -60,7 +60,7 @@ def test_cores_are_for_as_many_threads_of_the_cpu():
 
 def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
     monkeypatch.setattr("taichi_soft.core.cores.sys", SimpleNamespace(platform="win32"))
-    with pytest.raises(OptionError, match="on Linux with /proc only, not on win32"):
+    with pytest.raises(OptionError, match=r"/proc.*win32"):
         init("cpu", cores=[0])
 
 
@@ -224,6 +224,7 @@ def test_no_device_before_the_start():
     assert "DeviceError: Taichi is not started" in done.stderr
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_more_threads_than_cores_are_not_waited_for():
     """The flat schedule's threads wait for each other, so there must be no more than run."""

@@ -13,6 +13,8 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
+pytestmark = pytest.mark.soak
+
 
 def run(name: str, seconds: float):
     demo = load_demo(name)
@@ -344,6 +346,7 @@ def test_puddings_sag_and_wobble_as_they_were_wished_for():
         assert np.abs(body.velocities()).max() < still
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()

@@ -9,6 +9,8 @@ import pytest
 
 from taichi_soft.core.package_data import DEMOS
 
+pytestmark = pytest.mark.soak
+
 pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[panda3d]'")
 
 

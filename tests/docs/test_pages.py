@@ -44,6 +44,14 @@ PUBLIC = (
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
+def pages(names):
+    """Return pages as parameters; those whose code imports Panda3D need it."""
+    return [
+        pytest.param(name, marks=pytest.mark.needs("panda3d")) if name.startswith("panda3d") else name
+        for name in names
+    ]
+
+
 def prose(name):
     """A page without its code."""
     return re.sub(r"^```.*?^```", "", PAGES[name], flags=re.DOTALL | re.MULTILINE)
@@ -55,8 +63,9 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", kept)
 
 
+@pytest.mark.guard
 @pytest.mark.soak
-@pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
+@pytest.mark.parametrize("name", pages(name for name, blocks in CODE.items() if blocks))
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict = {"__name__": "page"}
@@ -108,6 +117,7 @@ PROGRAMS = {
 """Modules of command lines, and commands of which a page may name options."""
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("name", sorted(PAGES))
 def test_every_command_and_option_of_a_page_exists(name):
@@ -157,6 +167,7 @@ def test_every_choice_stands_in_its_table(page, names):
         assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize(("program", "its_app"), [("taichi-soft", app), ("python -m lab", lab_app)])
 def test_every_command_stands_in_the_table_of_commands(program, its_app):
@@ -180,7 +191,7 @@ def test_presets_have_the_numbers_of_the_table():
     assert rows == said
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", pages(PAGES))
 def test_code_of_a_page_imports_public_names_only(name):
     for block in CODE[name]:
         for node in ast.walk(ast.parse(block)):

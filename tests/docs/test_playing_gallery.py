@@ -217,6 +217,7 @@ def test_a_file_of_ten_minutes_ends_with_the_hash_of_their_last_step(tmp_path):
     assert json.loads(done.stdout) == wanted
 
 
+@pytest.mark.guard
 def test_untouched_scenes_have_the_hash_of_python_and_the_back_button_leads_to_the_first(
     browser, site, tmp_path
 ):

@@ -178,6 +178,7 @@ def names(tmp_path_factory):
     return made | {"beginning": made["world"].snapshot()}
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_runs(name, names, monkeypatch):

@@ -17,6 +17,8 @@ from taichi_soft.doctor.mending import write_mended
 from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
+
 RUBBER = Material(young=5e5, poisson=0.4, density=1000.0)
 BALL = ball(0.5)
 

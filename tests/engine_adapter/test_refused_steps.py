@@ -16,7 +16,7 @@ from taichi_soft import (
 )
 from taichi_soft.world.bare import bare_world
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 JELLY = Material(4e4, 0.3, 600.0, 4.0)
 COARSE, FINE = (box((0.4, 0.4, 0.4), cells=(n, n, n)) for n in (1, 3))

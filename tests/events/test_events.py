@@ -229,7 +229,7 @@ def test_too_many_events_are_dropped_with_a_warning_in_the_step(world, monkeypat
     for i in range(2):
         world.spawn(BOUNCY, position=(3 * i, 0, 0.5))
     obstacle = world.add_collider(SphereShape(0.5), position=(0, 0, 1.45))
-    with pytest.warns(DroppedEventsWarning, match="call drain_events in every frame"):
+    with pytest.warns(DroppedEventsWarning, match="drain_events"):
         advance(world)
     assert world.dropped_events == before + 1
     assert {event.b for event in world.drain_events()} == {world.floor_collider, obstacle}

@@ -103,7 +103,7 @@ def test_a_world_that_is_not_built_wrong_axes_an_unknown_platform_and_a_path_tha
 ):
     with pytest.raises(StateError, match="not built"):
         export_world(plain(), tmp_path / "a")
-    with pytest.raises(OptionError, match="unknown platform amiga: choose among linux-x64"):
+    with pytest.raises(OptionError, match=r"platform amiga.*linux-x64"):
         export_world(plain(), tmp_path / "a", platforms=["amiga"])
     world = plain()
     world.build()

@@ -93,6 +93,7 @@ def ringing(mesh, feel):
     return hz, -np.log(0.05) / rate
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "wishes"), list(targets(10, seed=5)))
 def test_random_wishes_are_met_to_5_percent_or_refused_with_the_nearest_that_can_be(name, wishes):
@@ -148,6 +149,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_met_is_refused_and_the_nearest_that_is_named_can_be(case):
@@ -167,7 +169,7 @@ def test_what_cannot_be_met_is_refused_and_the_nearest_that_is_named_can_be(case
     [
         ({}, "sag or wobble_hz must be given"),
         ({"settle_s": 1.0}, "leaves Young's modulus open"),
-        ({"sag": 0.0}, "sag must be a number from 0.001 to 0.3, got 0"),
+        ({"sag": 0.0}, "sag.*0.001 to 0.3, got 0"),
         ({"sag": np.nan}, "sag must be"),
         ({"sag": "much"}, "got 'much'"),
         ({"wobble_hz": -3.0}, "wobble_hz must be"),
@@ -195,9 +197,9 @@ def test_a_body_that_tips_over_has_no_sag_but_a_frequency():
     c, s = np.cos(0.45), np.sin(0.45)
     column = box((0.2, 0.2, 1.0), (2, 2, 6))
     leaning = type(column)(column.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T, column.tets)
-    with pytest.raises(OptionError, match=r"does not stand .* leans by .* wobble_hz"):
+    with pytest.raises(OptionError, match=r"leans by .*wobble_hz"):
         material_from_feel(leaning, sag=0.01)
-    with pytest.raises(OptionError, match=r"does not stand .* leans by .* wobble_hz"):
+    with pytest.raises(OptionError, match=r"leans by .*wobble_hz"):
         material_from_feel(box((0.15, 0.15, 1.0), (2, 2, 12)), sag=0.05, wobble_hz=3.0)
     feel = material_from_feel(leaning, wobble_hz=20.0)
     assert np.isnan(feel.simulated.sag)

@@ -129,6 +129,7 @@ def test_a_cut_body_comes_back_whole_in_every_respect(played):
     assert go_on(played) == then
 
 
+@pytest.mark.guard
 def test_a_world_that_never_saw_the_cuts_goes_on_from_them_bit_by_bit(played, fresh):
     cut_twice(played)
     played.bodies[-1].set_material(Material(2e5, 0.1, 700.0, 9.0))

@@ -303,11 +303,9 @@ def test_what_does_not_fit_is_refused_and_changes_nothing():
         body.set_motion(*start)
         if tries:
             before = everything(world, body)
-            with pytest.raises(StateError, match="2 pieces, and 0 slots are free"):
+            with pytest.raises(StateError, match=r"2 pieces.*0 slots"):
                 body.cut(plane=ALONG)
-            with pytest.raises(
-                StateError, match=r"leave \d+ vertices in body 0.* room for 85.*spare_vertices"
-            ):
+            with pytest.raises(StateError, match=r"\d+ vertices.*body 0.*85.*spare_vertices"):
                 body.cut(
                     triangle=middle + np.array([[-0.7, -9.0, 0.03], [-0.7, 9.0, 0.03], [9.0, 0.0, 0.03]])
                 )
@@ -326,8 +324,8 @@ def test_what_does_not_fit_is_refused_and_changes_nothing():
         ({"plane": ALONG, "triangle": OPEN}, "one of the two"),
         ({"plane": ((0, 0, 0), (0, 0, 0))}, "normal is zero"),
         ({"plane": ((0, 0, np.nan), (0, 0, 1))}, "point must be finite"),
-        ({"plane": (0, 0, 1)}, r"plane must be \(point, normal\)"),
-        ({"plane": 3}, r"plane must be \(point, normal\)"),
+        ({"plane": (0, 0, 1)}, r"plane.*\(point, normal\)"),
+        ({"plane": 3}, r"plane.*\(point, normal\)"),
         ({"triangle": np.zeros((3, 3))}, "triangle has no area"),
         ({"triangle": np.zeros((2, 3))}, "triangle must have shape"),
         ({"triangle": [[0, 0, 0], [1, 1, 1], [2, 2, 2]]}, "triangle has no area"),
@@ -344,20 +342,21 @@ def test_bodies_that_cannot_be_cut_say_so():
     world = bare_world(floor=None)
     whole = world.add_body(BAR, JELLY)
     ready = world.add_body(BAR, JELLY, spare_vertices=50)
-    with pytest.raises(OptionError, match="make its asset with spare_vertices"):
+    with pytest.raises(OptionError, match="spare_vertices"):
         whole.cut(plane=ALONG)
     with pytest.raises(StateError, match="not built"):
         ready.cut(plane=ALONG)
-    with pytest.raises(OptionError, match="law 'springs' does not support spare_vertices"):
+    with pytest.raises(OptionError, match=r"'springs'.*spare_vertices"):
         SoftBodyAsset(BAR, Material(1e5, 0.3, 1000.0, damping_ratio=0.0), law="springs", spare_vertices=5)
-    with pytest.raises(OptionError, match="spare_vertices must be a whole number"):
+    with pytest.raises(OptionError, match=r"spare_vertices.*whole number"):
         bar(spare_vertices=-1)
     flat = bare_world(schedule="flat")
     flat.reserve(bar(), 1)
-    with pytest.raises(OptionError, match="'flat' does not support bodies that are cut"):
+    with pytest.raises(OptionError, match=r"'flat'.* cut"):
         flat.build()
 
 
+@pytest.mark.guard
 def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
     """Anisotropic and pinned; and, in the same world, one that has flowed."""
     frames = np.tile(np.eye(3), (len(BAR.tets), 1, 1))
@@ -399,7 +398,7 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
 def test_what_is_held_is_not_cut_and_what_is_watched_is_watched_on(swinging):
     world, body = swinging()
     grab = body.grab(0)
-    with pytest.raises(StateError, match="body 0 has grabs: release or remove them"):
+    with pytest.raises(StateError, match=r"body 0.*grabs.*release"):
         body.cut(plane=ALONG)
     grab.release()
     body.watch_stress(10.0)

@@ -276,10 +276,10 @@ def test_bad_options_are_refused():
             Tearing(stress)
     with pytest.raises(OptionError, match="most must be"):
         Tearing(1.0, most=0)
-    with pytest.raises(OptionError, match="must be a Tearing or None"):
+    with pytest.raises(OptionError, match=r"Tearing.*None"):
         asset(tearing=3e4)
     with pytest.raises(OptionError, match="needs spare_vertices"):
         asset(spare_vertices=0)
     wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
-    with pytest.raises(MaterialError, match="AnisotropicMaterial does not support tearing"):
+    with pytest.raises(MaterialError, match=r"AnisotropicMaterial.*tearing"):
         SoftBodyAsset(BAR, wood, spare_vertices=5, tearing=Tearing(1.0))

@@ -181,11 +181,11 @@ def test_joints_and_motors_bar_a_change_that_may_not_release_them_and_nothing_is
     held = joined(world, low, high)
     before = world.state_hash(), 0, low.topology_version
     for body, names in ((low, "joints and motors"), (high, "joints")):
-        with pytest.raises(StateError, match=f"has {names} that name its vertices.*release=True"):
+        with pytest.raises(StateError, match=f"{names}.*release=True"):
             body.set_level(1)
     with pytest.raises(OptionError, match="level is 3"):
         low.set_level(3, release=True)
-    with pytest.raises(OptionError, match="release must be True or False, got 1"):
+    with pytest.raises(OptionError, match=r"release.*True.*False.*1"):
         low.set_level(1, release=1)
     low.set_level(0, release=True)  # the level that it has
     assert (world.state_hash(), low.level, low.topology_version) == before
@@ -226,7 +226,7 @@ def test_an_attachment_without_a_vertex_is_released_where_it_may_be_and_others_h
     first, second = np.argsort(np.linalg.norm(BAR[0].vertices - near, axis=1))[:2]
     stays, goes = body.attach([first], frames[0]), body.attach([second], frames[1])
     before = world.state_hash()
-    with pytest.raises(StateError, match="would hold nothing at level 2"):
+    with pytest.raises(StateError, match="nothing at level 2"):
         body.set_level(2)
     assert record_of(body).held is None
     assert (world.state_hash(), body.level) == (before, 0)

@@ -297,7 +297,7 @@ def test_an_attachment_that_would_hold_nothing_bars_the_change_and_stays():
     body.set_level(0)
     other = body.attach([second], frames[1])
     before = world.state_hash()
-    with pytest.raises(StateError, match="would hold nothing at level 2"):
+    with pytest.raises(StateError, match="nothing at level 2"):
         body.set_level(2)
     assert (world.state_hash(), body.level, other.is_attached) == (before, 0, True)
     assert all(hold.is_attached for hold in holds)
@@ -341,6 +341,7 @@ def test_snapshots_and_recordings_know_the_level(flying):
     assert (world.state_hash(), body.positions().tobytes()) == (end[0], end[1].tobytes())
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_warming_up_changes_levels_and_leaves_every_bit(flying):
     world, body = flying
@@ -352,6 +353,7 @@ def test_warming_up_changes_levels_and_leaves_every_bit(flying):
     assert (world.state_hash(), body.level, body.positions().tobytes()) == before
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_after_warming_up_no_change_of_a_level_has_anything_to_prepare(monkeypatch):
     kind = SoftBodyAsset.from_surface(RING, RUBBER, cells=(6, 4, 3))
@@ -381,6 +383,7 @@ def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
     assert np.abs(apart - [5.0, 0.0, 0.0]).max() < 5e-5
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 def test_levels_in_contact_change_back_and_forth_and_the_pile_stays_whole():
     world = bare_world(soft_contact=True)
@@ -459,7 +462,7 @@ def test_levels_that_are_none_are_refused(monkeypatch):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(SoftBodyAsset(BAR[1], RUBBER),), spare_vertices=10)
     with pytest.raises(OptionError, match="no levels of detail"):
         SoftBodyAsset(BAR[0], RUBBER, law="springs").with_coarser(BAR[1])
-    with pytest.raises(OptionError, match="coarser must be a tuple of assets"):
+    with pytest.raises(OptionError, match=r"coarser.*tuple"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(BAR[1],))
     with pytest.raises(OptionError, match="law and the contact"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(SoftBodyAsset(BAR[1], RUBBER, law="virial"),))

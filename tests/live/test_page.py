@@ -332,6 +332,7 @@ def test_too_few_substeps_are_said_beside_the_slider_before_they_are_felt(open_p
     visitor.say("pause", is_paused=False)
 
 
+@pytest.mark.guard
 def test_a_drag_lifts_a_body_and_lets_it_fly_while_a_drag_beside_it_turns_the_view(open_page, visitor):
     page = open_page()
     visitor.until(lambda: visitor.states[0]["time"] > 2.5)

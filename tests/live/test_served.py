@@ -103,6 +103,7 @@ def test_each_slider_gives_the_world_the_value_that_it_shows_and_the_script_keep
         visitor.say("set", name=name, value=value)
 
 
+@pytest.mark.guard
 def test_a_saved_script_goes_on_as_the_world_does_to_the_bit(visitor, tmp_path):
     visitor.say("spawn", name="ring")
     visitor.until(lambda: visitor.states[0]["bodies"] == 7 and visitor.states[0]["time"] > 0.4)
@@ -190,6 +191,7 @@ def test_a_visitor_that_stops_reading_stops_nobody(visitor, served):
         silent.end()
 
 
+@pytest.mark.guard
 def test_a_flood_of_messages_ends_its_connection_and_nothing_else(visitor, served):
     flood = Visitor(served.address)
     assert closing_code(flood, ['{"do": "step", "pane": 0, "x": "' + "y" * 200 + '"}'] * 3000) == 1008

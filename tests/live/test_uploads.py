@@ -9,6 +9,7 @@ from taichi_soft.live.uploads import require_mesh
 from taichi_soft.meshing.surfaces import read_surfaces
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "stem"), [("ball.obj", "ball3"), ("\u7bb1.obj", "mesh2")])
 def test_a_name_that_another_has_gets_a_number_for_bodies_are_told_apart_by_it(tmp_path, name, stem):

@@ -8,6 +8,8 @@ import pytest
 
 from taichi_soft.meshing import load_mesh
 
+pytestmark = pytest.mark.numpy
+
 FOLDER = Path(__file__).parents[2] / "assets"
 ROWS = dict(re.findall(r"^\| `(\w+)\.npz` \| (.*) \|$", (FOLDER / "README.md").read_text(), re.MULTILINE))
 

@@ -6,6 +6,8 @@ import pytest
 from taichi_soft.meshing import box, cloth, sphere
 from taichi_soft.meshing.creases import split_at_creases
 
+pytestmark = pytest.mark.numpy
+
 # Four faces of a straight prism: it bends by 90 degrees along its edges, and by nothing across the diagonals.
 TENT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1]], dtype=float)
 ROOF = np.array([[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 1]])[:, ::-1]

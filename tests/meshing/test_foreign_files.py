@@ -14,6 +14,8 @@ import pytest
 from taichi_soft.core.errors import MeshError, SkippedCellsWarning
 from taichi_soft.meshing import TetMesh, load_mesh, save_mesh, sphere
 
+pytestmark = pytest.mark.numpy
+
 meshio = pytest.importorskip("meshio")
 
 BALL = sphere(1.0, 2).translated([0.1, 1 / 3, -1e-7])
@@ -186,15 +188,15 @@ def refusal(path):
     [
         (GMSH_1.replace("$ELM\n4", "$ELM\n5"), r"section \$ELM .*damaged"),
         (GMSH_1.replace("4 2 3 4 5", "5 2 3 4 5"), r"section \$ELM .*damaged"),
-        (GMSH_1[: GMSH_1.index("$ELM")], r"has no section \$ELM, only \$NOD"),
+        (GMSH_1[: GMSH_1.index("$ELM")], r"\$ELM, only \$NOD"),
         (GMSH_1 + "$NOD\n0\n$ENDNOD\n", r"has two sections \$NOD"),
-        ("(0 grid written by Fluent)\n(2 3)\n", r"not a Gmsh file: it begins with '\(0 grid written.*\.vtu"),
+        ("(0 grid written by Fluent)\n(2 3)\n", r"Gmsh.*'\(0 grid written.*\.vtu"),
     ],
     ids=["short", "wrong width", "no cells", "two meshes", "fluent"],
 )
 def test_gmsh_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, reason):
     (tmp_path / "x.msh").write_text(text)
-    with pytest.raises(MeshError, match=rf"^x\.msh: {reason}"):
+    with pytest.raises(MeshError, match=rf"^x\.msh: .*{reason}"):
         load_mesh(tmp_path / "x.msh")
 
 
@@ -205,15 +207,15 @@ def test_gmsh_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, r
             MEDIT.replace("Tetrahedra\n2", "Tetrahedra\n3"),
             "Tetrahedra .*3 rows of 5 .*10 numbers: .*cut short",
         ),
-        (MEDIT.replace("Dimension\n3", "Dimension 2"), "has dimension 2: a body needs 3"),
-        (MEDIT.replace("Dimension\n3", "Dimension 3\xac"), "has dimension 3.*: a body needs 3"),
-        ("MFEM mesh v1.0\n", "not a Medit text file: it begins with 'MFEM mesh v1.0"),
+        (MEDIT.replace("Dimension\n3", "Dimension 2"), "dimension 2.* 3"),
+        (MEDIT.replace("Dimension\n3", "Dimension 3\xac"), "dimension 3.* 3"),
+        ("MFEM mesh v1.0\n", "Medit.*'MFEM mesh v1.0"),
     ],
     ids=["short", "flat", "no number", "mfem"],
 )
 def test_medit_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, reason):
     (tmp_path / "x.mesh").write_bytes(text.encode("latin-1"))
-    with pytest.raises(MeshError, match=rf"^x\.mesh: {reason}"):
+    with pytest.raises(MeshError, match=rf"^x\.mesh: .*{reason}"):
         load_mesh(tmp_path / "x.mesh")
 
 
@@ -228,7 +230,7 @@ def test_cells_beside_the_tetrahedra_are_counted_in_a_warning(tmp_path, module, 
     write(tmp_path / f"x{suffix}", module, options, meshio.Mesh(np.array(POINTS + CUBE), blocks))
     with pytest.warns(
         SkippedCellsWarning,
-        match=rf"^x\{suffix}: skipped .*\(1 triangle, 1 hexahedron\) .*2 tetrahedra.*divide them",
+        match=rf"^x\{suffix}: .*1 triangle, 1 hexahedron.*2 tetrahedra.*divide",
     ) as caught:
         assert same(load_mesh(tmp_path / f"x{suffix}"), PAIR)
     assert caught[0].filename == __file__
@@ -259,9 +261,7 @@ def vtu(kinds, connectivity, offsets, pieces=1):
 def test_cells_that_meshio_drops_by_itself_are_counted_too(tmp_path):
     voxel = 11
     (tmp_path / "x.vtu").write_text(vtu([10, 10, voxel], [*np.ravel(TETS), *HEXAHEDRON[0]], [4, 8, 16]))
-    with pytest.warns(
-        SkippedCellsWarning, match=r"x\.vtu: skipped .*\(1 of kinds that meshio does not know\)"
-    ):
+    with pytest.warns(SkippedCellsWarning, match=r"x\.vtu: .*1 of kinds"):
         assert same(load_mesh(tmp_path / "x.vtu"), PAIR)
 
 

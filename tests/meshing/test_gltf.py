@@ -16,6 +16,8 @@ from gltf_writer import FACES, TETRAHEDRON, GltfWriter
 from taichi_soft import MeshError
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 HALF = np.sqrt(0.5)
 TARGET = TETRAHEDRON * np.float32(2) + np.float32(1)
 

@@ -7,6 +7,8 @@ from scipy.spatial import Delaunay
 from taichi_soft import OptionError, TetMesh, box, sphere, torus
 from taichi_soft.meshing.splitting import loose_parts
 
+pytestmark = pytest.mark.numpy
+
 
 def delaunay(points, keep=None):
     """All the slivers that random points have, but not what a mesh refuses."""

@@ -16,6 +16,8 @@ from taichi_soft import (
     rope,
 )
 
+pytestmark = pytest.mark.numpy
+
 
 def test_a_rope_is_a_chain_whose_ends_weigh_half():
     mesh = rope(2.0, 4, 8.0)

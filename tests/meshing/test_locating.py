@@ -6,6 +6,8 @@ import pytest
 from taichi_soft.meshing import TetMesh, box, torus
 from taichi_soft.meshing.locating import Locator, nearest_points
 
+pytestmark = pytest.mark.numpy
+
 MESHES = {"box": box((1.0, 0.6, 0.4), (4, 3, 2)), "torus": torus(1.0, 0.3)}
 
 

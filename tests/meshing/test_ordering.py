@@ -17,6 +17,8 @@ from taichi_soft.meshing import (
     tet_order,
 )
 
+pytestmark = pytest.mark.numpy
+
 POINTS = hnp.arrays(
     float, st.tuples(st.integers(1, 60), st.just(3)), elements=st.floats(-1e6, 1e6, allow_subnormal=False)
 )

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing import BodyMesh, ParticleMesh
 
+pytestmark = pytest.mark.numpy
+
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 ROUND = [[0, 1], [1, 2], [2, 3], [3, 0]]
 

@@ -7,6 +7,8 @@ import pytest
 
 from taichi_soft.meshing import TetMesh
 
+pytestmark = pytest.mark.numpy
+
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 
 

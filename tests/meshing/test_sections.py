@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from taichi_soft import box, sphere
 from taichi_soft.meshing.sections import section_areas
 
+pytestmark = pytest.mark.numpy
+
 
 def polygon_area(corners):
     """Of the section of one tetrahedron (4, 3) with z = 0: where its edges cross, round their middle."""

@@ -11,6 +11,8 @@ from hypothesis.extra import numpy as hnp
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import beam, box, cylinder, extrude, sphere, torus, voxels
 
+pytestmark = pytest.mark.numpy
+
 
 def euler(mesh):
     """Vertices - edges + faces - tetrahedra: 1 for a ball, 0 for a ring."""

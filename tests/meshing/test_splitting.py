@@ -8,6 +8,8 @@ from scipy.sparse.csgraph import connected_components
 from taichi_soft import TetMesh, box, sphere, surface_mesh, torus
 from taichi_soft.meshing.splitting import connected, inner_faces, loose_parts, split_vertices
 
+pytestmark = pytest.mark.numpy
+
 MESHES = {"box": box((2.0, 0.5, 0.5), (8, 2, 2)), "sphere": sphere(0.5, 3), "torus": torus()}
 
 

@@ -9,6 +9,8 @@ from PIL import Image
 from taichi_soft import MeshError
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 RNG = np.random.default_rng(5)
 POINTS = RNG.normal(size=(9, 3)).round(3).astype(np.float32)
 NORMALS = np.tile(np.float32([0.6, 0.0, 0.8]), (9, 1))

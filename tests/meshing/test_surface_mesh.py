@@ -7,6 +7,8 @@ import trimesh
 from taichi_soft import MeshError, ParticleMesh, beam, box, cylinder, load_mesh, sphere, surface_mesh, torus
 from taichi_soft.core.package_data import ASSETS
 
+pytestmark = pytest.mark.numpy
+
 SHAPES = {"box": box(), "beam": beam(), "sphere": sphere(), "cylinder": cylinder(), "torus": torus()}
 SHAPES |= {path.stem: load_mesh(path) for path in sorted(ASSETS.glob("*.npz"))}
 

@@ -13,6 +13,8 @@ import trimesh
 from taichi_soft import MeshError, OptionError
 from taichi_soft.meshing.surfaces import assumed_up, read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 
 def textured():
     """A box of single triangles, whose corners have texture coordinates of their own."""

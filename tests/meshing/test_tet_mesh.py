@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, TetMesh, beam, box, cylinder, extrude, sphere, torus, voxels
 
+pytestmark = pytest.mark.numpy
+
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TWO = np.vstack([CORNER, [[1.0, 1, 1]]])
 TWO_TETS = [[0, 1, 2, 3], [4, 2, 1, 3]]

@@ -5,6 +5,8 @@ import pytest
 
 from taichi_soft.meshing.triangulation import triangulated
 
+pytestmark = pytest.mark.numpy
+
 
 def star(rng, corners):
     """Round a centre, at random distances from it."""

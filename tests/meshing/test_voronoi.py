@@ -21,6 +21,8 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.meshing import delaunay
 from taichi_soft.meshing.delaunay import circumspheres, require_delaunay
 
+pytestmark = pytest.mark.numpy
+
 CORNER = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 1, 2, 3]])
 
 
@@ -186,7 +188,7 @@ def test_assets_that_are_delaunay(name):
 
 def test_a_mesh_that_is_not_delaunay_is_refused_and_can_be_reconnected():
     mesh = load_mesh(ASSETS / "cylinder_long.npz")
-    with pytest.raises(MeshError, match=r"vertex \d+ lies inside .* tetrahedron \d+ .*delaunay_mesh"):
+    with pytest.raises(MeshError, match=r"vertex \d+ .*tetrahedron \d+ .*delaunay_mesh"):
         voronoi_graph(mesh)
     made = delaunay_mesh(mesh)
     require_delaunay(made)
@@ -198,7 +200,7 @@ def test_a_mesh_that_is_not_delaunay_is_refused_and_can_be_reconnected():
 def test_a_surface_that_no_delaunay_mesh_has_is_refused():
     """The triangles of this sphere are not those of the hull of its vertices."""
     mesh = load_mesh(ASSETS / "sphere.npz")
-    with pytest.raises(MeshError, match=r"fills 4\.00\d+ m\^3 instead of 4: .*more vertices"):
+    with pytest.raises(MeshError, match=r"4\.00\d+ m\^3 .*4: .*more vertices"):
         delaunay_mesh(mesh)
 
 

@@ -10,6 +10,8 @@ from taichi_soft import MeshError
 from taichi_soft.doctor.triangle_facts import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.numpy
+
 FORMS = ["{0}", "{0}/{1}", "{0}//{2}", "{0}/{1}/{2}"]
 
 
@@ -184,7 +186,7 @@ def test_text_is_read_however_it_is_written(tmp_path, odd):
     ("line", "text"),
     [
         ("f 1 2 9", "face 6 names vertex 8, .*8 vertices.*export it again"),
-        ("f 1 2 -9", "face 6 names a vertex before the first one"),
+        ("f 1 2 -9", "face 6.*vertex before"),
         ("f 1 2 0", "whole numbers from 1"),
         ("f 1 2 1.5", "whole numbers from 1"),
         ("v 1 2", "vertex 8 is '1 2': .*3 numbers"),

@@ -12,6 +12,8 @@ from godot_build import GODOT, SCRIPTS, files_of, told
 from godot_games import HALF_TURN, UPRIGHT, levels_game
 from native_build import ROOT
 
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
+
 DT = 1 / 64
 
 

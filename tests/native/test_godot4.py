@@ -10,6 +10,8 @@ from godot4_host import GODOT, LIBRARY, VERSIONS, Name, Transform, registered, t
 from godot_games import HALF_TURN, UPRIGHT, levels_game
 from native_build import ROOT
 
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
+
 DT = 1 / 64
 
 

@@ -7,6 +7,8 @@ from godot4_host import VERSIONS, registered
 from godot_build import files_of
 from native_build import ROOT
 
+pytestmark = pytest.mark.soak
+
 PROJECT = files_of(4)
 OF_GDSCRIPT = {"Variant", "PI", "TAU", "INF", "NAN", "load", "preload", "range", "len"}
 OF_GLTF = {"bufferViews", "bufferView", "images", "byteLength", "mimeType"}

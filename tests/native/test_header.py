@@ -2,7 +2,10 @@
 
 import subprocess
 
+import pytest
 from native_build import ROOT
+
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 PROGRAM = """
 #include <cstdio>

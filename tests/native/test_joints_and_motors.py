@@ -3,7 +3,10 @@
 import subprocess
 import sys
 
+import pytest
 from library import ARGUMENT, HANDLE, STATE, in_process
+
+pytestmark = pytest.mark.soak
 
 REFUSED = """
 import ctypes

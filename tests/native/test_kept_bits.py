@@ -18,6 +18,8 @@ from games import Player, digests
 from scenes import GAMES
 from test_same_bits import drawn
 
+pytestmark = pytest.mark.soak
+
 KEPT = Path(__file__).with_name("kept_bits.json")
 
 OLD_PROCESSOR = {
@@ -48,6 +50,7 @@ def bits_of(name):
     return digests(told_by(name))
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", [*GAMES, "anything"])
 def test_a_game_has_the_bits_that_are_kept(name):
     kept = json.loads(KEPT.read_text()) if KEPT.exists() else {}

@@ -9,6 +9,8 @@ from test_forged import LOADED, changed, first, read
 
 from taichi_soft.export.archive import written
 
+pytestmark = pytest.mark.soak
+
 REFUSED = """
 scene = soft.load(arguments[0])
 world = soft.create(scene)

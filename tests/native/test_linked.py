@@ -6,6 +6,8 @@ import pytest
 from library import in_process
 from native_build import ROOT, build
 
+pytestmark = pytest.mark.soak
+
 PROGRAM = """
 #include <stdio.h>
 #include <stdlib.h>

@@ -14,6 +14,8 @@ from native_build import ROOT
 
 from engine_adapter import FixedStep, RollbackSession, SessionError
 
+pytestmark = pytest.mark.soak
+
 HERE, WEB = Path(__file__).parent, ROOT / "engine_adapter" / "web"
 NO_TICK = 0xFFFFFFFF
 

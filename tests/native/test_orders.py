@@ -4,6 +4,8 @@ import pytest
 from games import Player, line, lines_of
 from scenes import DT, GAMES, UPRIGHT, turn
 
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
+
 
 def sleep_that_is_asked_for_after_a_restore():
     """Some sleep at the snapshot, and nobody hears of it before: nothing is told of those."""

@@ -12,7 +12,13 @@ from native_build import NATIVE
 from platforms import RUNNERS, built_for, played
 from test_kept_bits import KEPT
 
-PLAYED = ("heap", "joined", "laws")  # `make test-platforms` plays all of them
+pytestmark = pytest.mark.soak
+
+PLAYED = (
+    pytest.param("heap", marks=pytest.mark.guard),
+    "joined",
+    "laws",
+)  # `make test-platforms`: all of them
 TARGETS = ",".join(dict.fromkeys(each.platform for each in RUNNERS.values()))
 
 

@@ -11,6 +11,8 @@ from scenes import GAMES
 from taichi_soft.export.meshes import CREASE
 from taichi_soft.world.world import context_of_world
 
+pytestmark = pytest.mark.soak
+
 
 def drawn(world):
     """How Python draws the world file's meshes: of each asset its skins, or the surfaces of its levels."""
@@ -21,7 +23,9 @@ def drawn(world):
     return found
 
 
-@pytest.mark.parametrize("name", GAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.guard if name == "heap" else ()) for name in GAMES]
+)
 def test_a_game_without_python_has_the_same_bits(name, export, play):
     make, game = GAMES[name]
     calls = list(game())
@@ -47,6 +51,7 @@ def test_a_game_has_the_same_bits_on_one_core(name, export, play):
     assert lines_of(["taskset", "-c", "0", play, folder], calls) == lines_of([play, folder], calls)
 
 
+@pytest.mark.guard
 def test_the_sample_finds_what_its_script_named_and_plays_alike_every_time(native, tmp_path):
     """A ball more each second; the first is carried by the lift, whose top is between 0.2 and 0.8 m."""
     sample, folder = ROOT / "engine_adapter" / "native" / "sample" / "game.py", tmp_path / "game.softworld"

@@ -6,8 +6,11 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from godot_build import SCRIPTS, told
 from native_build import ROOT
+
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 
 def test_the_sample_is_built_and_played_with_what_is_shipped_alone(native, export, tmp_path):

@@ -1,6 +1,9 @@
 """Who makes the parts of a step, how many threads at a time, and how these round, changes no bit of it."""
 
+import pytest
 from library import ARGUMENT, OK, in_process
+
+pytestmark = pytest.mark.soak
 
 STEPS = """
 import ctypes, threading

@@ -8,6 +8,8 @@ from library import in_process
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
 
+pytestmark = pytest.mark.soak
+
 FRAMES = """
 from ctypes import Structure
 class Clock(Structure):

@@ -9,6 +9,8 @@ import pytest
 from library import FILE, HANDLE, VERSION, in_process
 from native_build import build
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def heap(export):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from library import in_process
 
+pytestmark = pytest.mark.soak
+
 DRAWN = """
 from ctypes import Structure
 class Info(Structure):

@@ -15,6 +15,8 @@ from native_build import ROOT
 from taichi_soft.core.version import VERSION as VERSION_OF_PROJECT
 from taichi_soft.live.three_js import FOLDER, VERSION, fetch_three_js
 
+pytestmark = pytest.mark.soak
+
 PACKAGE = ROOT / "engine_adapter" / "web"
 
 
@@ -261,6 +263,7 @@ def test_the_package_has_the_version_of_the_project():
     assert VERSION_OF_PROJECT.split(".dev")[0] == package["version"]
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("module", ["taichi-soft", "rollback"])
 def test_the_types_name_what_the_package_has(module, node):
     """Every class, method and property of the one is in the other."""

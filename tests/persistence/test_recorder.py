@@ -67,6 +67,7 @@ def tear_to_pieces(body):
     body.set_motion(body.positions(), fast[:, None] * np.ones(3))
 
 
+@pytest.mark.guard
 def test_a_random_game_is_made_again_bit_by_bit(game, tmp_path):
     world, path = game
     report = replay(path)
@@ -237,7 +238,7 @@ def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
         made_of["entries"] = [["call", serial, name, [str(tmp_path / "evil")], {"options": {}}]]
         bad = tmp_path / "bad.recording"
         bad.write_bytes(seal(MARK, VERSION, [zlib.compress(to_json(made_of)), snapshot]))
-        with pytest.raises(SnapshotError, match="is not a call that recordings contain"):
+        with pytest.raises(SnapshotError, match="not a call"):
             replay(bad)
     assert not (tmp_path / "evil").exists()
 

@@ -1,12 +1,15 @@
 """The comparison of implicit steps with scipy compares the same system. No time is asserted."""
 
 import numpy as np
+import pytest
 
 from taichi_soft import Material, box, force_gradient, internal_forces
 from taichi_soft.profiling.implicit import measure_implicit
 from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.sparse import SparseBody
 from taichi_soft.world.bare import bare_world
+
+pytestmark = pytest.mark.soak
 
 MESH = box((1.0, 0.8, 0.6), (2, 2, 2))
 MATERIAL = Material(1e5, 0.3, 1000.0, 3.0, damping_ratio=0.0)

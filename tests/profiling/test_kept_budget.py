@@ -9,6 +9,8 @@ from taichi_soft.profiling.kept_budget import Course, first_met, tell
 from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.spread import Spread
 
+pytestmark = pytest.mark.soak
+
 FACTS = {"is_kept": True, "is_fixed": False, "tets": 7, "frozen": 0, "stolen": None, "skipped": 0.0}
 FACTS["work"] = Spread.of([1.0])
 
@@ -47,6 +49,7 @@ def test_a_run_that_never_meets_its_budget_is_told_as_a_whole():
     assert run.changing is None
 
 
+@pytest.mark.guard
 def test_the_budget_is_half_of_what_the_same_bodies_take_without_one(monkeypatch):
     def kinds():
         ball = trimesh.creation.icosphere(subdivisions=2, radius=0.4)

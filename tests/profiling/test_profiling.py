@@ -25,6 +25,8 @@ from taichi_soft.profiling.profile_tables import tables
 from taichi_soft.profiling.spread import Spread
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
+pytestmark = pytest.mark.soak
+
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
 
 
@@ -105,7 +107,7 @@ def test_a_missing_compiler_gives_one_line():
 
 def test_scaling_says_which_process_failed(monkeypatch):
     monkeypatch.setattr(scaling, "_PROGRAM", "raise SystemExit({threads})")
-    with pytest.raises(DeviceError, match=r"process of 1 threads failed: try .*--threads 1"):
+    with pytest.raises(DeviceError, match=r"1 threads.*--threads 1"):
         scaling.measure_scaling(2, (), 3)
 
 
@@ -116,7 +118,7 @@ def test_a_device_is_compared_with_the_processor_scene_by_scene(monkeypatch):
     table = dict(tables({"devices": [one, many]}))
     assert [each.row_count for each in table.values()] == [2]
     monkeypatch.setattr(devices, "_PROGRAM", "raise SystemExit")
-    with pytest.raises(DeviceError, match=r"process on 'cpu' failed: try .*--arch cpu"):
+    with pytest.raises(DeviceError, match=r"'cpu'.*--arch cpu"):
         measure_devices("cuda", 1, (), 3)
 
 

@@ -5,6 +5,8 @@ import pytest
 from taichi_soft.core.errors import DeviceError
 from taichi_soft.profiling import startup
 
+pytestmark = pytest.mark.soak
+
 
 def test_a_full_cache_is_quicker_and_the_first_frame_comes_before_all_is_warm():
     empty, full = startup.measure_startup("cpu", 1, (), ("plain",))

@@ -360,9 +360,9 @@ def built_rope():
 @pytest.mark.parametrize(
     ("world", "error", "said"),
     [
-        (lambda: "world", OptionError, "must be a taichi_soft.World, got str"),
+        (lambda: "world", OptionError, "taichi_soft.World, got str"),
         (World, StateError, r"call world\.build\(\) before Stage\.of"),
-        (built_rope, OptionError, "no body of the world has triangles"),
+        (built_rope, OptionError, "no body.*triangles"),
     ],
 )
 def test_a_stage_is_made_of_a_built_world_with_something_to_see(world, error, said):

@@ -112,7 +112,7 @@ def test_equal_frames_are_all_kept(tmp_path):
     ],
 )
 def test_wrong_frames_are_refused_and_nothing_is_left(tmp_path, bad):
-    with pytest.raises(VideoError, match="frame 1 must be uint8 of shape"):
+    with pytest.raises(VideoError, match=r"frame 1.*uint8"):
         film(tmp_path / "film.mp4", [frame(COLORS[0]), bad])
     assert names(tmp_path) == []
 

@@ -1,29 +1,12 @@
-"""Which worker runs which test files, and in which order."""
+"""Which worker runs which test files."""
 
 import contextlib
 from collections import Counter
 
 from xdist.scheduler import LoadScopeScheduling
 
-FILES = """
-    contact/ solver/test_sleep solver/test_islands solver/test_repeated_steps render/test_props
-    control/ levels/test_holding engine_adapter/test_budget
-    events/ persistence/ engine_adapter/test_rollback
-    core/ world/ cages/ feel/ levels/ bodies/ lab/ doctor/ profiling/ cli/ demos/ docs/
-    solver/ elements/ fracture/ engine_adapter/ render/ bake/ native/ live/
-"""
-"""Files in the order in which they run, by the beginnings of their paths; others come last. Neighbours have
-worlds of the same kinds, whose kernels each worker compiles once."""
-ORDER = FILES.split()
-
 SECONDS = "taichi_soft/seconds"
 """Key in pytest's cache: duration of each test in its first run on this machine [s]."""
-
-
-def place_of(nodeid):
-    """Index in `ORDER` of a test's file."""
-    file = nodeid.removeprefix("tests/")
-    return next((i for i, start in enumerate(ORDER) if file.startswith(start)), len(ORDER))
 
 
 class Shares(LoadScopeScheduling):

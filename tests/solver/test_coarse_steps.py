@@ -118,7 +118,7 @@ def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
     np.testing.assert_array_equal(body.positions(), before)
     small.step(1 / 60)
     body.set_material(Material(1e8, 0.3, 1000.0))
-    with pytest.raises(OptionError, match=r"small or stiff elements.*max_substeps=20"):
+    with pytest.raises(OptionError, match=r"elements.*max_substeps=20"):
         small.step(1 / 60)
 
 
@@ -128,7 +128,7 @@ def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
     world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e9), law="springs", position=(0, 0, 3))
     world.build()
     world.step(1 / 60)
-    with pytest.raises(OptionError, match="substeps is 3; the world allows max_substeps=2"):
+    with pytest.raises(OptionError, match=r"substeps.*3.*max_substeps=2"):
         world.step(1 / 60, 3)
 
 

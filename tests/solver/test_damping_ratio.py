@@ -136,6 +136,7 @@ def pudding_in_space():
     return world, body
 
 
+@pytest.mark.guard
 def test_a_light_vertex_fades_with_the_rest_however_rarely_damping_acts():
     """Damping acts every few substeps. Outermost vertices of this cage vibrate in about three. What damped
     velocities half a substep from the positions pumped them, from 0.3 to 4 m/s in five seconds."""
@@ -167,6 +168,7 @@ def test_no_mode_stands_still_whenever_it_would_be_damped():
     assert np.abs(moving - np.cross(spin, arms)).max() < 0.01
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 def test_damping_however_large_leaves_momentum_and_spin_and_gives_no_energy_by_the_same_substeps(schedule):
     """Nothing is retried here: a substep that damping makes unstable would show."""

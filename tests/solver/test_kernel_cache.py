@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 PROGRAM = """
 from taichi_soft import Material, World, box, init

@@ -10,7 +10,7 @@ from thread_scenes import SCENES
 
 from taichi_soft import init
 
-pytestmark = pytest.mark.soak
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
 
 PROGRAM = Path(__file__).parents[1] / "shared" / "thread_scenes.py"
 

@@ -51,6 +51,7 @@ def together():
     return fall(list(KINDS))
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("name", KINDS)
 def test_a_body_among_others_moves_as_if_alone(together, name):
     """Bit for bit, whatever the others are made of."""
@@ -147,7 +148,7 @@ def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
     finally:
         gc.enable()
     assert other is state
-    with pytest.raises(StateError, match="world of body 0 is gone: keep a reference"):
+    with pytest.raises(StateError, match=r"world.*body 0.*keep a reference"):
         body.positions()
 
 

@@ -91,6 +91,7 @@ def told_by_a_world_of_their_own(mode):
     return told
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("mode", MODES)
 def test_a_body_that_comes_later_moves_as_one_of_the_start_and_leaves_no_trace_on_others(mode):
     """Bit for bit: in a slot where one lay on the floor before, and where one broke."""
@@ -193,7 +194,7 @@ def test_a_dead_handle_says_so_and_what_it_was_can_still_be_read(empty, name):
     if name in READABLE:
         asked(body, name)
     else:
-        with pytest.raises(StateError, match=rf"body 1 was removed by despawn in step {world.step_count}"):
+        with pytest.raises(StateError, match=rf"body 1 .*despawn.*step {world.step_count}"):
             asked(body, name)
     assert repr(body).endswith("removed)")
     assert repr(again).endswith("active)")
@@ -205,7 +206,7 @@ def test_bodies_can_come_and_go_before_the_world_is_built():
     world.reserve(kind, 3)
     first, second = (world.spawn(kind, position=(x, 0, 0)) for x in (1, 5))
     world.despawn(first)
-    with pytest.raises(StateError, match="body 0 was removed by despawn in step 0"):
+    with pytest.raises(StateError, match=r"body 0.*despawn.*step 0"):
         first.positions()
     build(world)
     assert world.bodies == (second,)
@@ -300,6 +301,7 @@ def test_the_number_of_substeps_does_not_depend_on_who_lives(empty):
     assert counts == [needed] * 3
 
 
+@pytest.mark.guard
 def test_nothing_is_compiled_when_the_first_body_comes(monkeypatch):
     compiled = []
     prepare = FirstLaunches._prepare  # of a kernel, from its source or from what an earlier process kept

@@ -103,6 +103,7 @@ def refused(game, call, *arguments, **options):
     return f"changes {changed}" if changed else None
 
 
+@pytest.mark.guard
 @pytest.mark.soak
 @pytest.mark.parametrize("name", NAMES)
 def test_every_bad_value_of_every_argument_is_refused_and_nothing_changes(game, name):

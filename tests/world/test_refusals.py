@@ -247,7 +247,7 @@ def test_an_array_of_another_length(cube, name):
     constants = {"young": 1e5, "poisson": 0.2, "density": 1000.0, "damping": 1.0}
     constants[name] = np.full(39, constants[name])
     world = bare_world(floor=None)
-    with pytest.raises(MaterialError, match="39 values for a mesh of 40"):
+    with pytest.raises(MaterialError, match=r"39 values.*40"):
         world.add_body(cube, Material(**constants))
     assert world.bodies == ()
     world.add_body(cube, Material(1e5, 0.2, 1000.0))
@@ -321,7 +321,7 @@ def test_bodies_out_of_reach(cube, jelly, name):
 def test_bodies_that_start_below_the_floor(cube, jelly, position):
     """The floor would press them flat in one substep. The message says where they fit."""
     world = bare_world()
-    with pytest.raises(OptionError, match=r"starts .* m below the floor: position=\(.*, 0\.5\) puts it on"):
+    with pytest.raises(OptionError, match=r"floor.*position=\(.*, 0\.5\)"):
         world.add_body(cube, jelly, position=position)
     assert world.bodies == ()
     world.add_body(cube, jelly, position=(0, 0, 0.5))

@@ -61,9 +61,9 @@ def test_a_body_that_cannot_begin_so_is_refused_and_nothing_changes(empty, name)
 def test_what_is_no_asset_is_refused(empty, value):
     world, _ = empty
     before = state_of(world)
-    with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
+    with pytest.raises(OptionError, match=r"asset.*SoftBodyAsset"):
         world.spawn(value)
-    with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
+    with pytest.raises(OptionError, match=r"asset.*SoftBodyAsset"):
         bare_world().reserve(value, 1)
     assert state_of(world) == before
 
@@ -72,11 +72,11 @@ def test_a_full_pool_an_unknown_asset_and_a_late_reserve_are_refused(empty):
     world, (kind, other) = empty
     bodies = [world.spawn(kind, position=(3 * i, 0, 0)) for i in range(3)]
     before = state_of(world)
-    with pytest.raises(StateError, match=r"is full: 3 of 3 slots .*Reserve more before build, or despawn"):
+    with pytest.raises(StateError, match=r"3 of 3 .*(Reserve|reserve).*despawn"):
         world.spawn(kind)
-    with pytest.raises(StateError, match="has no pool in this world: call reserve"):
+    with pytest.raises(StateError, match=r"pool.*reserve"):
         world.spawn(cube())
-    with pytest.raises(StateError, match="already built: add_body and reserve come first"):
+    with pytest.raises(StateError, match=r"built.*add_body.*reserve"):
         world.reserve(kind, 1)
     with pytest.raises(StateError, match="already built"):
         world.add_body(MESH, JELLY)
@@ -95,7 +95,7 @@ def test_only_bodies_that_live_here_can_be_removed(empty):
     world.despawn(gone)
     before = state_of(world)
     for value in (stranger, None, 0, kind):
-        with pytest.raises(OptionError, match="body must be a body of this world"):
+        with pytest.raises(OptionError, match=r"body.*this world"):
             world.despawn(value)
     with pytest.raises(StateError, match="body 1 was removed"):
         world.despawn(gone)
@@ -108,23 +108,21 @@ def test_only_bodies_that_live_here_can_be_removed(empty):
 @pytest.mark.parametrize("count", [0, -1, 1.5, True, None, "3", 10**9])
 def test_a_count_that_is_none_is_refused_before_anything_is_reserved(count):
     world, kind = bare_world(floor=None), cube()
-    with pytest.raises(OptionError, match="count must be a whole number from 1"):
+    with pytest.raises(OptionError, match=r"count.*whole number from 1"):
         world.reserve(kind, count)
-    with pytest.raises(StateError, match="has no pool in this world"):
+    with pytest.raises(StateError, match=r"pool.*reserve"):
         world.spawn(kind)
 
 
 def test_more_than_fits_into_a_world_is_refused():
-    with pytest.raises(OptionError, match="the world would have 27,000,000 vertices, at most 10,000,000"):
+    with pytest.raises(OptionError, match=r"27,000,000 vertices.*10,000,000"):
         bare_world(floor=None).reserve(cube(), 1_000_000)
 
 
 def test_nothing_is_put_below_the_floor():
     world, kind = bare_world(floor=1.0), cube()
     world.reserve(kind, 1)
-    with pytest.raises(
-        OptionError, match=r"1.5 m below the floor: position=\(2, 0, 1.5\) puts it on the floor"
-    ):
+    with pytest.raises(OptionError, match=r"1\.5 m .*position=\(2, 0, 1\.5\)"):
         world.spawn(kind, position=(2, 0, 0))
     assert world.bodies == ()
     assert world.spawn(kind, position=(2, 0, 1.5)).index == 0

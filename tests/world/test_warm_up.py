@@ -94,6 +94,7 @@ def test_nothing_is_compiled_where_what_yields_tears(compiled):
     assert compiled == ["find_failed_element"]
 
 
+@pytest.mark.guard
 def test_nothing_is_compiled_while_the_game_is_filled(game):
     assert game.compiled_at_start == []
 

@@ -36,7 +36,7 @@ SOLIDS = {
     "box": (BoxShape(2 * HALF), block),
     "capsule": (CapsuleShape(0.3, 0.8), pill),
 }
-pytestmark = pytest.mark.parametrize("name", SOLIDS)
+pytestmark = [pytest.mark.kernel, pytest.mark.parametrize("name", SOLIDS)]
 
 
 def points_near(seed, count=4000):

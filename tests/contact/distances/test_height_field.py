@@ -6,6 +6,8 @@ from trimesh.triangles import closest_point
 
 from taichi_soft import HeightFieldShape
 
+pytestmark = pytest.mark.kernel
+
 SPACING = 0.5
 
 

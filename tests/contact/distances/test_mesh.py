@@ -9,6 +9,8 @@ from trimesh.triangles import closest_point
 from taichi_soft import MeshShape
 from taichi_soft import box as lattice_box
 
+pytestmark = pytest.mark.kernel
+
 TURN = trimesh.transformations.euler_matrix(0.4, -0.7, 1.1)
 
 

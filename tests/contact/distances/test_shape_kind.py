@@ -7,6 +7,8 @@ import trimesh
 from taichi_soft import BoxShape, CapsuleShape, HeightFieldShape, MeshShape, PlaneShape, SphereShape
 from taichi_soft.contact.distances.shape_kind import CONVEX, ShapeKind
 
+pytestmark = pytest.mark.kernel
+
 RING = trimesh.creation.torus(0.8, 0.25, 16, 10)
 STAIRS = np.where(np.indices((9, 9)).sum(axis=0) % 4 < 2, 0.3, 0.0)
 SOLIDS = {

@@ -8,6 +8,8 @@ import taichi_soft.contact.shapes.mesh as mesh_module
 from taichi_soft import MeshShape
 from taichi_soft.contact.shapes.grid_cache import cache_folder as default_folder
 
+pytestmark = pytest.mark.kernel
+
 CUBE = trimesh.creation.box((1, 1, 1))
 BALL = trimesh.creation.icosphere(subdivisions=1)
 CELL = 0.1

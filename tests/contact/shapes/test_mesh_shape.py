@@ -22,6 +22,8 @@ from taichi_soft import (
 )
 from taichi_soft.world.bare import bare_world
 
+pytestmark = pytest.mark.kernel
+
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1
 
@@ -221,9 +223,7 @@ def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way(source):
 
 
 def test_a_scene_in_the_place_of_a_mesh_shape_is_told_the_way():
-    with pytest.raises(
-        MeshError, match=r'got Scene: read the file by trimesh\.load\(path, force="mesh"\)'
-    ) as caught:
+    with pytest.raises(MeshError, match=r'Scene.*trimesh\.load\(path, force="mesh"\)') as caught:
         MeshShape(trimesh.Scene([CUBE]))
     with pytest.raises(MeshError, match=r"got int$"):
         MeshShape(7)

@@ -9,6 +9,8 @@ import trimesh
 from taichi_soft import BoxShape, CapsuleShape, HeightFieldShape, OptionError, PlaneShape, SphereShape
 from taichi_soft.render import Surface
 
+pytestmark = pytest.mark.kernel
+
 ROUND = {
     "sphere": (SphereShape(0.7), 4 / 3 * np.pi * 0.7**3),
     "box": (BoxShape((0.5, 1.0, 2.0)), 1.0),

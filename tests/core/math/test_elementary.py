@@ -7,6 +7,8 @@ from taichi_soft import init
 from taichi_soft.core.math.elementary import acos, atan2, cos_sin, exp, log
 from taichi_soft.core.runtime import ti
 
+pytestmark = pytest.mark.kernel
+
 COUNT = 200_000
 
 

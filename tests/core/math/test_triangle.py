@@ -8,6 +8,8 @@ from taichi_soft import box
 from taichi_soft.core.math.triangle import closest_point_on_triangle, solid_angle, triangle_touches_box
 from taichi_soft.core.runtime import init, ti
 
+pytestmark = pytest.mark.kernel
+
 
 @ti.kernel
 def run_closest(points: ti.types.ndarray(ndim=3), weights: ti.types.ndarray(ndim=2)):

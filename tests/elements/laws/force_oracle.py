@@ -35,6 +35,10 @@ MESHES = {
 OPPOSITE_FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 
 
+EACH_STRAIN = ("linear", pytest.param("exact", marks=pytest.mark.soak))
+"""Strains of tests whose modes with "exact" no other test of `make test` compiles."""
+
+
 def params_of(modes):
     """Parameters of a test, one for each mode."""
     return [

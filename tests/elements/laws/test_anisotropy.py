@@ -87,6 +87,7 @@ def forces_by_numpy(mesh, material, x, law, strain, flips):
     return forces
 
 
+@pytest.mark.guard
 @EACH_MODE
 @settings(max_examples=4)
 @given(seed=seeds, name=st.sampled_from(["tet", "sphere"]), amount=st.sampled_from([0.01, 0.2, 0.6, 3.0]))
@@ -442,6 +443,7 @@ def test_a_beam_of_oblique_fibres_twists_aside_as_it_is_pulled_down(law):
     np.testing.assert_allclose(shapes["implicit"], shapes["slanted"], atol=2e-3)
 
 
+@pytest.mark.guard
 def test_both_schedules_and_plain_bodies_beside_move_the_same():
     """To float32 round-off: the schedules sum forces in another order."""
     mesh = sphere(0.3, 1)

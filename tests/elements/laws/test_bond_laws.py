@@ -11,6 +11,8 @@ from taichi_soft import LAWS, Material, ParticleMesh, SpringMaterial, TetMesh, i
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.elements.laws import BondLaw
 
+pytestmark = pytest.mark.kernel
+
 BONDS = [law.name for law in LAWS.values() if isinstance(law, BondLaw)]
 DIRECTIONAL = [name for name in BONDS if LAWS[name].takes_shear]
 
@@ -199,7 +201,7 @@ class TestGivenSprings:
         assert material.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.01 / 3]
         each = SpringMaterial.from_young(2e6, [0.01, 0.02], self.MESH.edge_lengths)
         assert each.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.02 / 3]
-        with pytest.raises(MaterialError, match=r"area has 3 values and lengths has 2: .*one per edge"):
+        with pytest.raises(MaterialError, match=r"area.*3.*lengths.*2.*one per edge"):
             SpringMaterial.from_young(2e6, [0.01, 0.02, 0.03], self.MESH.edge_lengths)
 
     def test_a_spring_of_no_length_left_has_no_force(self):
@@ -214,11 +216,11 @@ class TestGivenSprings:
         [
             ({"stiffness": 0.0}, "stiffness is 0 N/m for every edge"),
             ({"stiffness": [0.0, 0.0]}, "stiffness is 0 N/m for every edge"),
-            ({"stiffness": [1.0, 1e-12]}, "stiffness of edge 1 is 1e-12: it must be 0 N/m, or from 1e-09"),
+            ({"stiffness": [1.0, 1e-12]}, "stiffness of edge 1 is 1e-12.*from 1e-09"),
             ({"stiffness": [1.0, -2.0]}, "stiffness of edge 1 is -2"),
             ({"stiffness": 1.0, "damping": -1}, "damping is -1"),
             ({"stiffness": 1.0, "rest_length": 0}, "rest_length is 0"),
-            ({"stiffness": "soft"}, "stiffness must be a number or one number per edge"),
+            ({"stiffness": "soft"}, "stiffness.*one number per edge"),
             ({"stiffness": 1.0, "rest_length": np.nan}, "rest_length is nan"),
             ({"stiffness": [1.0, 2.0], "damping": [1.0, 2.0, 3.0]}, "arrays of different lengths"),
         ],
@@ -230,13 +232,13 @@ class TestGivenSprings:
     def test_what_does_not_fit_together_is_refused(self):
         solid, springs = MESHES["ball"], SpringMaterial(10.0)
         x = self.MESH.vertices
-        with pytest.raises(MaterialError, match="stiffness has 3 values for a mesh of 2 edges"):
+        with pytest.raises(MaterialError, match=r"stiffness.*3 values.*2 edges"):
             internal_forces(self.MESH, SpringMaterial([1.0, 2, 3]), x, law="springs")
-        with pytest.raises(MeshError, match=r"does not support law 'virial' .* TetMesh"):
+        with pytest.raises(MeshError, match=r"'virial'.* TetMesh"):
             internal_forces(self.MESH, springs, x)
-        with pytest.raises(MeshError, match=r"does not support law 'springs' of a Material.*SpringMaterial"):
+        with pytest.raises(MeshError, match=r"'springs'.*SpringMaterial"):
             internal_forces(self.MESH, Material(1e6, 0.3, 1000.0), x, law="springs")
-        with pytest.raises(MaterialError, match="law 'cmpm' needs a Material, got SpringMaterial"):
+        with pytest.raises(MaterialError, match=r"'cmpm'.*Material.*SpringMaterial"):
             internal_forces(solid, springs, solid.vertices, law="cmpm")
         with pytest.raises(MaterialError, match=r"no density.*ParticleMesh"):
             internal_forces(solid, springs, solid.vertices, law="springs")
@@ -261,5 +263,5 @@ def test_options_of_tetrahedral_laws_are_refused(option, value):
 
 def test_cmpm_refuses_a_mesh_that_is_not_delaunay():
     flat = TetMesh([[0, 0, 0], [4, 0, 0], [2, 3, 0], [2, 1, 0.4], [2, 1, -0.4]], [[0, 1, 2, 3], [0, 2, 1, 4]])
-    with pytest.raises(MeshError, match=r"not Delaunay: vertex . lies inside .* delaunay_mesh"):
+    with pytest.raises(MeshError, match=r"vertex . .*delaunay_mesh"):
         internal_forces(flat, Material(1e6, 0.3, 1e3), flat.vertices, law="cmpm")

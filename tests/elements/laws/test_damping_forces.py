@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from taichi_soft import Material, TetMesh, internal_forces
 
+pytestmark = pytest.mark.kernel
+
 MESHES = oracle.MESHES
 names = st.sampled_from(list(MESHES))
 seeds = st.integers(0, 2**32 - 1)

@@ -5,6 +5,8 @@ import pytest
 
 from taichi_soft import Material, box, cylinder, internal_forces, sphere
 
+pytestmark = pytest.mark.kernel
+
 MESHES = {"block": box((1, 1, 1), (4, 4, 4)), "cylinder": cylinder(1.0, 2.0), "ball": sphere(1.0, 3)}
 MATERIAL = Material(1e6, 0.25, 1000.0)
 STRETCH = 0.01

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from taichi_soft import Material, MeshError, OptionError, ParticleMesh, internal_forces
 from taichi_soft.core.errors import MaterialError
 
+pytestmark = pytest.mark.kernel
+
 MESHES = oracle.MESHES
 BALL = MESHES["sphere"]
 MATERIAL = Material(1e6, 0.3, 1000.0, 50.0)
@@ -69,16 +71,16 @@ def test_every_layout_of_the_same_numbers_gives_the_same_forces():
 @pytest.mark.parametrize(
     ("option", "value", "text"),
     [
-        ("law", "spring", r"unknown law 'spring': choose one of 'virial', 'face'"),
+        ("law", "spring", "law 'spring'.*'virial', 'face'"),
         ("law", "", "unknown law"),
         ("law", None, "unknown law"),
-        ("strain", "cubic", r"unknown strain 'cubic': choose one of 'linear', 'exact'"),
+        ("strain", "cubic", "strain 'cubic'.*'linear', 'exact'"),
         ("strain", 3, "unknown strain 3"),
-        ("flips", "maybe", r"unknown flips 'maybe': choose one of 'tolerant', 'recover', 'off'"),
-        ("damping_model", "air", r"unknown damping_model 'air': choose one of 'edge', 'tet_mean'"),
-        ("dtype", np.float16, "dtype must be float64 or float32, got float16"),
-        ("dtype", np.int32, "dtype must be float64 or float32, got int32"),
-        ("dtype", "complex128", "dtype must be float64 or float32, got complex128"),
+        ("flips", "maybe", "flips 'maybe'.*'tolerant', 'recover', 'off'"),
+        ("damping_model", "air", "damping_model 'air'.*'edge', 'tet_mean'"),
+        ("dtype", np.float16, "dtype.*float64.*float32, got float16"),
+        ("dtype", np.int32, "dtype.*float64.*float32, got int32"),
+        ("dtype", "complex128", "dtype.*float64.*float32, got complex128"),
     ],
 )
 def test_unknown_choices_are_refused_with_the_list(option, value, text):
@@ -126,13 +128,13 @@ def test_positions_that_are_no_numbers_are_refused(value):
 
 @pytest.mark.parametrize("value", [None, "ball", BALL.vertices, MATERIAL])
 def test_what_is_no_mesh_is_refused(value):
-    with pytest.raises(MeshError, match="mesh must be a TetMesh or a ParticleMesh, got"):
+    with pytest.raises(MeshError, match=r"mesh.*TetMesh.*ParticleMesh"):
         internal_forces(value, MATERIAL, BALL.vertices)
 
 
 def test_a_mesh_without_tetrahedra_is_refused():
     rod = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], [1.0, 1.0])
-    with pytest.raises(MeshError, match=r"law 'virial' .*no tetrahedra: .* law='springs'"):
+    with pytest.raises(MeshError, match=r"'virial'.*no tetrahedra.*law='springs'"):
         internal_forces(rod, MATERIAL, rod.vertices)
 
 

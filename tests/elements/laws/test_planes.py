@@ -7,6 +7,8 @@ import pytest
 from taichi_soft import MeshError, OptionError, TetMesh, box, load_mesh, plane_angles, sphere
 from taichi_soft.core.package_data import ASSETS
 
+pytestmark = pytest.mark.kernel
+
 BALL = sphere(0.7, 1)
 
 
@@ -88,7 +90,7 @@ def test_a_ring_whose_halves_lie_in_one_line_is_refused():
         if stretch == 1.0:
             assert np.isfinite(plane_angles(bent, "split_ring_plane")).all()
         else:
-            with pytest.raises(MeshError, match=r"no plane across edge 0 .*Use law='best_fitting_plane'"):
+            with pytest.raises(MeshError, match=r"edge 0 .*law='best_fitting_plane'"):
                 plane_angles(bent, "split_ring_plane")
 
 
@@ -102,7 +104,7 @@ def test_many_fitted_planes_of_the_beam_with_a_hole_are_far_from_perpendicular()
 
 @pytest.mark.parametrize("law", ["virial", "springs", "volume_springs", "plane", None])
 def test_laws_without_planes_are_refused(law):
-    with pytest.raises(OptionError, match="has no planes: choose one of 'cmpm', 'cmpm2'"):
+    with pytest.raises(OptionError, match=r"planes.*'cmpm', 'cmpm2'"):
         plane_angles(BALL, law)
 
 

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from taichi_soft import Material, internal_forces
 
+pytestmark = pytest.mark.kernel
+
 MESHES = oracle.MESHES
 EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.params_of(oracle.MODES))
 STIFF = Material(1e6, 0.4, 1000.0)

@@ -20,6 +20,8 @@ from taichi_soft import (
 from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.world.bare import bare_world
 
+pytestmark = pytest.mark.numpy
+
 WOOD = Stiffness.orthotropic((10e9, 1e9, 0.6e9), (0.4, 0.35, 0.3), (0.1e9, 0.6e9, 0.7e9))
 CUBE = box((1, 1, 1), (1, 1, 1))
 COUNT = len(CUBE.tets)
@@ -97,18 +99,18 @@ def test_each_tetrahedron_may_have_a_stiffness_and_a_frame_of_its_own():
     ("arguments", "message"),
     [
         (([], 500.0), "got list"),
-        (([WOOD, 3.0], 500.0), "or one per tetrahedron, got float"),
+        (([WOOD, 3.0], 500.0), "one per tetrahedron.*float"),
         (([WOOD] * 3, [500.0, 500.0]), "arrays of different lengths"),
-        ((1e6, 500.0), r"stiffness must be a taichi_soft\.Stiffness, or one per tetrahedron, got float"),
+        ((1e6, 500.0), r"stiffness.*taichi_soft\.Stiffness.*float"),
         ((np.eye(6), 500.0), r"got ndarray: make it with Stiffness\.orthotropic"),
         ((WOOD, 0.0), "density is 0"),
         ((WOOD, [500.0, -1.0]), "density of tetrahedron 1 is -1"),
         ((WOOD, 500.0, -1.0), "damping is -1"),
-        ((WOOD, "oak"), "density must be a number or one number per tetrahedron"),
-        ((WOOD, 500.0, 0.0, np.diag([1, 1, -1])), r"rotation must be an orthonormal .* determinant \+1"),
-        ((WOOD, 500.0, 0.0, np.stack([np.eye(3), 2 * np.eye(3)])), "frame 1 must be an orthonormal matrix"),
+        ((WOOD, "oak"), "density.*one number per tetrahedron"),
+        ((WOOD, 500.0, 0.0, np.diag([1, 1, -1])), r"rotation.*orthonormal.*\+1"),
+        ((WOOD, 500.0, 0.0, np.stack([np.eye(3), 2 * np.eye(3)])), "frame 1.*orthonormal"),
         ((WOOD, 500.0, 0.0, [0, 0, 0, 0]), "quaternion of length 0"),
-        ((WOOD, 500.0, 0.0, [[0, 0, 0, 1], [0, 0, 1, 1]]), "frame 1 is a quaternion of length 1.41"),
+        ((WOOD, 500.0, 0.0, [[0, 0, 0, 1], [0, 0, 1, 1]]), "frame 1.*length 1.41"),
         ((WOOD, 500.0, 0.0, np.full((2, 3, 3), np.nan)), "frame must be finite"),
         ((WOOD, 500.0, 0.0, "along x"), "must be numbers"),
         ((WOOD, 500.0, 0.0, np.zeros((2, 5))), "frame must have shape"),
@@ -139,11 +141,11 @@ def test_directions_that_are_none_are_refused(directions, message):
     [
         (
             AnisotropicMaterial(WOOD, 500.0, frame=np.stack([np.eye(3)] * 3)),
-            "frame has 3 rotations for a mesh of 5",
+            "frame.*3 rotations.*5",
         ),
-        (AnisotropicMaterial([WOOD] * 4, 500.0), "stiffness has 4 entries for a mesh of 5"),
-        (AnisotropicMaterial(WOOD, [500.0] * 4), "density has 4 values for a mesh of 5"),
-        (AnisotropicMaterial(WOOD, 500.0, [1.0] * 7), "damping has 7 values for a mesh of 5"),
+        (AnisotropicMaterial([WOOD] * 4, 500.0), "stiffness.*4 entries.*5"),
+        (AnisotropicMaterial(WOOD, [500.0] * 4), "density.*4 values.*5"),
+        (AnisotropicMaterial(WOOD, 500.0, [1.0] * 7), "damping.*7 values.*5"),
     ],
 )
 def test_constants_for_another_mesh_are_refused(material, message):
@@ -186,5 +188,5 @@ def test_the_material_of_some_tetrahedra_has_their_values_and_those_given_for_al
 
 @pytest.mark.parametrize("ratio", [-0.001, 1000.1, np.nan])
 def test_a_damping_ratio_out_of_range_is_refused(ratio):
-    with pytest.raises(MaterialError, match=r"damping_ratio is .*: it must be from 0 to 1000"):
+    with pytest.raises(MaterialError, match=r"damping_ratio.*0 to 1000"):
         AnisotropicMaterial(WOOD, 500.0, damping_ratio=ratio)

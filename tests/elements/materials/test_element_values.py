@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from taichi_soft import PRESETS, Material, OptionError, box, internal_forces, preset
 from taichi_soft.core.errors import MaterialError, TaichiSoftError
 
+pytestmark = pytest.mark.numpy
+
 CUBE = box((1, 1, 1), (1, 1, 1))
 GOOD = {"young": 1e6, "poisson": 0.3, "density": 1000.0, "damping": 10.0}
 ratios = st.floats(-0.99, 0.499, allow_subnormal=False)
@@ -112,7 +114,7 @@ def test_errors_are_value_errors_of_this_package():
 def test_arrays_for_another_number_of_tetrahedra_are_refused(name):
     mesh = box(cells=(1, 1, 1))
     material = Material(**{**GOOD, name: np.full(7, 0.2)})
-    with pytest.raises(MaterialError, match=f"7 values for a mesh of {len(mesh.tets)} tetrahedra"):
+    with pytest.raises(MaterialError, match=f"7 values.*{len(mesh.tets)} tetrahedra"):
         material.per_tet(name, len(mesh.tets))
     if name != "density":  # of which forces know nothing
         with pytest.raises(MaterialError, match="7 values"):
@@ -165,7 +167,7 @@ def test_rubber_keeps_its_volume_cork_its_width_and_auxetic_foam_grows_wider():
 
 @pytest.mark.parametrize("name", ["", "Cork", "granite", None, [], 3])
 def test_unknown_presets_are_refused_with_the_list(name):
-    with pytest.raises(OptionError, match=r"unknown material .*choose one of .*'cork'"):
+    with pytest.raises(OptionError, match=r"material .*'cork'"):
         preset(name)
 
 

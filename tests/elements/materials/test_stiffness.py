@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from taichi_soft.core.errors import MaterialError, OptionError
 from taichi_soft.elements.materials import Stiffness
 
+pytestmark = pytest.mark.numpy
+
 WOOD = {"young": (12e9, 0.9e9, 0.5e9), "poisson": (0.4, 0.45, 0.35), "shear": (0.05e9, 0.6e9, 0.7e9)}
 AXES = ((1, 2), (0, 2), (0, 1))
 seeds = st.integers(0, 2**32 - 1)
@@ -240,7 +242,7 @@ def test_thirteen_constants_make_one_plane_of_symmetry():
     assert [found.matrix[i, j] for i, j in upper] == values
     assert found.symmetry() == "one plane"
     np.testing.assert_allclose(found.rotated([0, 0, 1, 0]).matrix, found.matrix, atol=1e-12)
-    with pytest.raises(OptionError, match=r"constants must have shape \(13,\)"):
+    with pytest.raises(OptionError, match=r"constants.*\(13,\)"):
         Stiffness.one_plane(values[:9])
 
 
@@ -280,7 +282,7 @@ LOPSIDED[0, 1] = 0.5
 @pytest.mark.parametrize(
     ("matrix", "said"),
     [
-        (LOPSIDED, r"not symmetric: entry \(0, 1\) is 0.5 and \(1, 0\) is 0"),
+        (LOPSIDED, r"symmetric.*\(0, 1\).*0\.5.*\(1, 0\).*0"),
         (np.diag([1, 1, 1, 1, 1, -2.0]), "eigenvalue -2 Pa"),
         (np.diag([1, 1, 1, 1, 1, 0.0]), "eigenvalue 0 Pa"),
         (np.zeros((6, 6)), "eigenvalue 0 Pa"),

@@ -9,6 +9,8 @@ import pytest
 from lab import drop_test as drops
 from lab.cli import main
 
+pytestmark = [pytest.mark.soak, pytest.mark.guard]
+
 
 @pytest.mark.parametrize(
     ("given", "wanted"),

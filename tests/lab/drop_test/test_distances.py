@@ -6,6 +6,8 @@ import trimesh
 
 from lab.drop_test import distances
 
+pytestmark = pytest.mark.soak
+
 POINTS = np.random.default_rng(3).uniform(-2.0, 2.0, (400, 3))
 SIZE = np.array([1.0, 2.0, 0.5])
 SOLIDS = {

@@ -9,6 +9,8 @@ from lab.drop_test import Summary, make_case, run_cases
 from lab.drop_test.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
 from lab.drop_test.case_runs import PER_SHAPE, batches
 
+pytestmark = pytest.mark.soak
+
 SEED, COUNT = 0, 30
 
 
@@ -67,6 +69,7 @@ def test_all_come_to_rest_and_none_inside_out(outcomes):
         assert outcome.flipped == 0, outcome
 
 
+@pytest.mark.guard
 def test_a_body_knotted_by_an_impact_above_mach_two_comes_to_rest():
     """A knot of flipped tetrahedra drives itself, if nothing but the material's damping brakes it."""
     outcome = next(iter(run_cases([make_case(SEED, 459)])))

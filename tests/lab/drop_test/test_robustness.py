@@ -15,6 +15,8 @@ from taichi_soft import LAWS, sphere
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.math.rotations import matrix_of
 
+pytestmark = pytest.mark.soak
+
 SOUND = Ending(tets=40, failure=None, is_finite=True, flipped=0, speed=6.0, fastest=6.3)
 PLAIN = {
     "group": "own",

@@ -7,6 +7,8 @@ from lab.drop_test.robustness import foreign_meshes
 from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES, flat_body, sliver_lattice
 from lab.drop_test.robustness.own_meshes import OWN_MESHES
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def foreign():

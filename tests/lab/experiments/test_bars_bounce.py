@@ -9,6 +9,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.bars_bounce import DT, bars_mesh, bending, flight_of, frequency_of
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["fig-6.2"]
 
 

@@ -8,6 +8,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft import LAWS
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["beams"]
 SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
 

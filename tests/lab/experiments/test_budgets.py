@@ -9,6 +9,8 @@ from lab.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
 from lab.experiments.dynamics.energy_budget import _damping_power, _energy_density
 from taichi_soft import box
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 @pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hookean"])
 def test_a_small_stretch_holds_half_of_young_times_its_square(law):

@@ -7,6 +7,8 @@ from quick import altered, findings, quick_results, verdicts
 from lab.experiments import Verdict
 from lab.experiments.oscillators import run_oscillators
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EULER = ("explicit_euler", "implicit_euler")
 
 

@@ -10,6 +10,8 @@ from lab.experiments.law_stability import ShakenBody, vibration
 from taichi_soft import Material, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 def ring_and_fit(mesh, e):
     """Angle [degrees] between edge `e` and the plane that numpy fits to the particles round it."""

@@ -10,6 +10,8 @@ from lab.experiments.directional_stiffness import directions
 from taichi_soft import Material, voronoi_graph
 from taichi_soft.meshing import EdgeRings
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 SHARE = Material(1.0, 0.25, 1.0)
 RIGHT = SHARE.lame_lambda + 2 * SHARE.lame_mu
 

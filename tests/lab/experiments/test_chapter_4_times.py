@@ -8,6 +8,8 @@ from lab.experiments import Effort, Verdict
 from lab.experiments.cmpm_drop import FRAME, FRAMES
 from lab.experiments.implicit_step import points
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 def test_the_best_fitting_plane_is_judged_by_time_step_and_growth():
     results = quick_results("best-fitting-plane-cost")

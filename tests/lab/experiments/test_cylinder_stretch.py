@@ -8,6 +8,8 @@ from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["fig-6.3b"]
 
 

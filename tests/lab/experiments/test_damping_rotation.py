@@ -9,6 +9,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.damping_rotation import body_mesh, rate
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["damping-rotation"]
 
 

@@ -7,6 +7,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 from lab.experiments.density_bounce import DT, block, density_of, side
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["density-bounce"]
 
 

@@ -10,6 +10,8 @@ from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.energy_drift import damping_ratio, growth
 from taichi_soft import Material, box, internal_forces
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["energy-drift"]
 
 

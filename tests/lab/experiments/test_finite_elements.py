@@ -2,9 +2,12 @@
 
 from copy import deepcopy
 
+import pytest
 from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 EXPERIMENT = EXPERIMENTS["finite-elements"]
 SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")

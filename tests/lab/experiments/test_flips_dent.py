@@ -11,6 +11,8 @@ from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft import load_mesh
 from taichi_soft.core.package_data import ASSETS
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["flips-dent"]
 
 

@@ -10,6 +10,8 @@ from lab.experiments.dynamics.contact_elements import contact_forces
 from lab.experiments.dynamics.pressed_sphere import DEPTHS, RADIUS, graded_sphere
 from taichi_soft import Material, box
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 HERTZ_FORCES = 4 / 3 * 1e6 / (1 - 0.3**2) * np.sqrt(RADIUS) * (RADIUS * np.array(DEPTHS)) ** 1.5
 
 

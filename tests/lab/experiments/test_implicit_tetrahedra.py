@@ -1,11 +1,14 @@
 """Implicit Euler for tetrahedra: free fall against closed forms, and verdicts for given times."""
 
 import numpy as np
+import pytest
 from quick import altered, findings, quick_results, verdicts
 
 from lab.experiments import Effort, Verdict
 from lab.experiments.cmpm_drop import FRAME
 from lab.experiments.implicit_tetrahedra import BODIES, THESIS, points
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 NAME = "implicit-tetrahedra"
 

@@ -6,6 +6,8 @@ from lab.experiments import EXPERIMENTS, Finding, Results, Section, Verdict
 from lab.experiments.judgement import judged_but_for
 from lab.report.judgements import judge
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 @pytest.mark.parametrize(
     ("agrees", "exceptions", "verdict", "why"),

@@ -7,6 +7,8 @@ from quick import altered, findings, quick_results, verdicts
 from lab.experiments import Verdict
 from lab.experiments.large_strain import reach, width_limit
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 NAME = "large-strain"
 
 

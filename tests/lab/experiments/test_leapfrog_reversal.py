@@ -1,8 +1,11 @@
 """Running backwards."""
 
+import pytest
 from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 
 def test_leapfrog_comes_back_and_the_euler_methods_do_not():

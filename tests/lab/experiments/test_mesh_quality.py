@@ -10,6 +10,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.mesh_quality import cubes, spoilt_cube
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["mesh-quality"]
 
 

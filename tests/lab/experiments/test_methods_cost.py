@@ -2,9 +2,12 @@
 
 import copy
 
+import pytest
 from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 EXPERIMENT = EXPERIMENTS["methods-cost"]
 COST = {

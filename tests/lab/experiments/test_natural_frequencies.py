@@ -16,6 +16,8 @@ from lab.experiments.dynamics.beam_theory import (
 from lab.experiments.dynamics.vibration_modes import bending_frequency
 from taichi_soft import Material, box
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 BEAM = Beam(2.0, 0.3, 0.2, 1e6, 0.3, 1000.0)
 
 

@@ -1,10 +1,13 @@
 """The patch test: what is left is of second order, and nothing is left inside."""
 
 import numpy as np
+import pytest
 from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 from lab.experiments.patch_test import TETRAHEDRAL
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 EXPERIMENT = EXPERIMENTS["patch-test"]
 

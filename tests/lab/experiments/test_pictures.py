@@ -6,6 +6,8 @@ import pytest
 from lab.experiments.pictures import picture
 from taichi_soft import OptionError, box
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 SIZE = (160, 120)
 
 

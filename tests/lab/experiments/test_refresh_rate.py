@@ -1,8 +1,11 @@
 """Drawing at 40 Hz: the parts that are timed, and verdicts for given times. No test asserts a duration."""
 
+import pytest
 from quick import altered, findings, quick_results, verdicts
 
 from lab.experiments import EXPERIMENTS, Verdict
+
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 NAME = "refresh-rate"
 

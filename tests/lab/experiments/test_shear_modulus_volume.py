@@ -5,6 +5,8 @@ from quick import quick_results
 
 from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["shear-modulus-volume"]
 
 

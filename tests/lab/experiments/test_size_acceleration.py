@@ -7,6 +7,8 @@ from quick import altered, findings, quick_results, verdicts
 from lab.experiments import Verdict
 from taichi_soft import Material, internal_forces, sphere
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 NAME = "size-acceleration"
 
 

@@ -8,6 +8,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.sphere_real_time import nanoseconds, real_time_factor
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["sphere-real-time"]
 
 

@@ -11,6 +11,8 @@ from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 from lab.experiments.sphere_outcomes import outcomes, window
 from lab.experiments.stability_map import sphere_mesh
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["stability-map"]
 
 

@@ -10,6 +10,8 @@ from lab.experiments.statics import Loading, NoEquilibriumError, StaticBody
 from taichi_soft import Material, edges_as_particles, force_gradient
 from taichi_soft.elements.laws.springs import spring_bonds
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0)
 BLOCK = irregular_block(2.0, 1.0, 2)
 

@@ -7,6 +7,8 @@ from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, secti
 from lab.experiments.irregular import cube
 from taichi_soft import Material, internal_forces
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["volume-springs-limit"]
 
 

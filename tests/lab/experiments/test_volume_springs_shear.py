@@ -10,6 +10,8 @@ from quick import quick_results
 from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from lab.experiments.irregular import cube
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 EXPERIMENT = EXPERIMENTS["fig-5.1-5.2"]
 
 

@@ -7,6 +7,8 @@ from quick import quick_results
 from lab.experiments import Result, Results, Verdict, section_of
 from lab.experiments.dynamics import WAVE_SPEED
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 SPEED = np.sqrt(1e6 / 1000)
 
 

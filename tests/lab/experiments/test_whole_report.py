@@ -9,6 +9,8 @@ from quick import quick_folder
 
 from lab.experiments import CLAIMS, EXPERIMENTS
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab"), pytest.mark.guard]
+
 TIMED = {claim for each in EXPERIMENTS.values() if each.is_timing for claim in each.claims}
 """Judged by a clock, which other tests disturb."""
 

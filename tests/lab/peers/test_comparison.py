@@ -16,6 +16,8 @@ from lab.peers.wall import captions, film_wall
 from taichi_soft import OptionError, StateError, VideoError, box, sphere
 from taichi_soft.render import VideoWriter
 
+pytestmark = pytest.mark.soak
+
 SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
 
@@ -92,7 +94,7 @@ def test_steps_are_halved_until_the_body_holds_together(bad):
 
     assert record(SMALL, make, 3).step == 1 / 12
     assert tried == [3, 6, 12]
-    with pytest.raises(StateError, match="explodes even with 192 steps"):
+    with pytest.raises(StateError, match="192 steps"):
         record(SMALL, lambda steps: make(steps, np.inf), 3)
 
 

@@ -13,6 +13,8 @@ from lab.peers.reference import simulate_reference
 from lab.peers.trajectory import RATE
 from taichi_soft import sphere
 
+pytestmark = pytest.mark.soak
+
 DROP = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 TOUCH = np.sqrt(2 * DROP.height / 9.81)
 ENGINES = {"taichi-soft": simulate, "reference": simulate_reference, **{p.name: p.simulate for p in PEERS}}
@@ -52,6 +54,7 @@ def test_a_body_falls_by_half_g_t_squared_without_a_change_of_shape_until_it_tou
     np.testing.assert_allclose(fallen, np.broadcast_to(fallen.mean(axis=1)[:, None], fallen.shape), atol=1e-3)
 
 
+@pytest.mark.guard
 def test_a_body_lands_on_the_floor_and_neither_floats_above_it_nor_sinks_in(trajectory):
     lowest = trajectory.positions[:, :, 2].min()
     assert -0.04 < lowest < 0.005

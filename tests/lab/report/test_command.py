@@ -11,6 +11,8 @@ from lab import cli
 from lab.report import run
 from taichi_soft.core.runtime import Device
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 @pytest.fixture
 def report(monkeypatch, capfd, measured, here, tmp_path):

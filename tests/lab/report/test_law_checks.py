@@ -5,6 +5,8 @@ import pytest
 from lab.experiments import EXPERIMENTS, Result, Results, Section
 from lab.report.law_checks import law_table
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 NOTHING = Section((), ())
 
 

@@ -32,6 +32,8 @@ from lab.report.plots import png_of
 from lab.report.wording import duration, legible, readable
 from taichi_soft import OptionError
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
 

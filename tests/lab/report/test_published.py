@@ -13,6 +13,8 @@ from lab.experiments import CLAIMS, EXPERIMENTS, Effort, Result, Results, Verdic
 from lab.report.markdown import escaped
 from lab.report.wording import legible
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "report"
 MANY = {

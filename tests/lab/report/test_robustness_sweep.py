@@ -12,6 +12,8 @@ from lab.report import robustness
 from lab.sweep import Store
 from taichi_soft.core.errors import OptionError
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 VERDICTS = ("ok", "frozen", "inverted", "too slow")
 
 

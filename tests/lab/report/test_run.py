@@ -12,6 +12,8 @@ from lab.report import run
 from lab.sweep import Store, SweepError
 from taichi_soft.core.errors import OptionError
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab"), pytest.mark.guard]
+
 
 @pytest.fixture
 def console():

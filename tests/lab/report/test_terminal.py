@@ -10,6 +10,8 @@ from lab.experiments import CLAIMS
 from lab.report.judgements import judge
 from lab.report.terminal import print_section, print_verdicts
 
+pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
+
 
 def printed(show, *arguments, **options):
     """The lines that it prints, 80 columns wide."""

@@ -7,6 +7,8 @@ from rich.console import Console
 
 from lab.sweep import progress, show_progress
 
+pytestmark = pytest.mark.soak
+
 
 def shown(console):
     with show_progress(console, 4) as advance:

@@ -8,6 +8,8 @@ from acts import act, root
 
 from lab.sweep import Outcome, Task, compute_all, schedule
 
+pytestmark = pytest.mark.soak
+
 
 def tasks(groups, function=root, **point):
     return [Task(group, function, {"x": x, **point}) for x, group in enumerate(groups)]

@@ -8,6 +8,8 @@ import pytest
 from lab.sweep import Outcome, Store, SweepError, origin
 from lab.sweep.provenance import sources
 
+pytestmark = pytest.mark.soak
+
 MINE = {"sources": "0123456789abcdef", "arch": "cpu"}
 OTHER = {"sources": "fedcba9876543210", "arch": "cpu"}
 

@@ -12,6 +12,8 @@ from acts import act
 
 from lab.sweep import Task, compute_all
 
+pytestmark = pytest.mark.soak
+
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
 
@@ -30,6 +32,7 @@ def rough():
     return compute([{"x": x, "do": do, "seconds": 600} for x, do in enumerate(acts)])
 
 
+@pytest.mark.guard
 def test_every_point_has_an_outcome_whatever_happens_to_others(rough):
     assert sorted(rough) == list(range(12))
     for x in (0, 2, 4, 6, 8, 11):

@@ -285,6 +285,7 @@ def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
     assert np.abs(body.velocities()).max() < 0.01
 
 
+@pytest.mark.guard
 def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_above_it():
     """Gravity is slanted instead of the floor. The cube settles, and then has g (sin a - mu cos a)."""
     slope, mesh = 0.3, box((0.5, 0.5, 0.5), (3, 3, 3))
@@ -318,6 +319,7 @@ def test_a_stiff_bar_that_bends_falls_as_fast_as_a_soft_one():
         assert start - body.center_of_mass()[2] == pytest.approx(fallen, rel=1e-4)
 
 
+@pytest.mark.guard
 def test_momentum_is_kept_in_flight_and_ringing_fades():
     """By the system as well as by the forces; and implicit Euler takes energy where nothing damps."""
     mesh = sphere(0.5, 2)
@@ -368,9 +370,7 @@ def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite
         for _ in range(40):
             world.step(1 / 60)
 
-    with pytest.warns(
-        SolverWarning, match=r"body 0 ended with a residual of 0\.00\d+ instead of 0\.001 within 2"
-    ):
+    with pytest.warns(SolverWarning, match=r"body 0 .*residual.*0\.00\d+ .*0\.001 .*2"):
         fall()
     assert np.isfinite(body.positions()).all()
     with warnings.catch_warnings():
@@ -452,11 +452,11 @@ def test_a_rope_swings_from_a_pin_and_falls_into_line_without_substeps():
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"schedule": "flat"}, "'flat' does not support implicit_euler"),
-        ({"tolerance": 0}, "tolerance must be a number from 1e-06 to 0.5, got 0"),
+        ({"schedule": "flat"}, "'flat'.*implicit_euler"),
+        ({"tolerance": 0}, "tolerance.*1e-06 to 0.5, got 0"),
         ({"tolerance": 1.0}, "tolerance"),
         ({"tolerance": "fine"}, "tolerance"),
-        ({"most_iterations": 0}, "most_iterations must be a whole number from 1"),
+        ({"most_iterations": 0}, "most_iterations.*whole number from 1"),
         ({"most_iterations": 1.5}, "most_iterations"),
     ],
 )

@@ -52,6 +52,7 @@ def random_motion(mesh, seed, speed=0.3):
     )
 
 
+@pytest.mark.guard
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_free_fall_follows_the_sum_of_its_steps(flight, integrator, substeps):
@@ -112,6 +113,7 @@ def there_and_back(flight, integrator, mesh, steps, h, seed=0):
     return np.abs(body.positions() - mesh.vertices).max(), np.abs(body.velocities() + v0).max(), away
 
 
+@pytest.mark.guard
 def test_leapfrog_run_backwards_returns_to_its_start(flight):
     """Thesis section 3.5.2. Explicit Euler does not, by orders of magnitude."""
     h = 0.1 / fastest_mode(BALL, JELLY)[0]
