@@ -13,6 +13,7 @@ from native_build import ROOT
 from taichi_soft.export.archive import TYPES, written
 
 pytestmark = pytest.mark.soak
+
 FORGED = """
 import random, struct, zlib
 scene = soft.load(arguments[0])

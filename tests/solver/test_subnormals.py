@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, box
-from taichi_soft.persistence.kernels.packing import carried, owners
 from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import context_of_world
 
@@ -23,8 +22,8 @@ def subnormals(world):
     """How many of the numbers that the next step depends on are smaller than normal ones of float32."""
     state = context_of_world(world).built.state
     count = 0
-    for owner in owners(state):
-        for field, _, _ in carried(state, owner):
+    for group in state.kept.values():
+        for field, _, _ in group:
             numbers = np.asarray(field.to_numpy())
             if numbers.dtype.kind == "f":
                 count += int(((numbers != 0) & (np.abs(numbers) < np.finfo(np.float32).tiny)).sum())
