@@ -25,7 +25,7 @@ from taichi_soft.control.joints import Joints
 from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.errors import OptionError, SolverWarning, StateError
+from taichi_soft.core.errors import OptionError, SolverWarning
 from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
@@ -341,10 +341,3 @@ class Simulation:
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
         """Find the first failure of the body in a slot."""
         return find_failure(self.state, self.program, self.scene, slot, failed)
-
-
-def require_built(simulation: Simulation | None) -> Simulation:
-    """Raises: StateError before `World.build`."""
-    if simulation is None:
-        raise StateError("the world is not built: call world.build() after the last add_body")
-    return simulation

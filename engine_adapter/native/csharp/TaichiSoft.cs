@@ -900,7 +900,7 @@ namespace TaichiSoft
             return new Motor(this, motor);
         }
 
-        /// <summary>Adds a collider, if the world was exported with collider_room. Returns: its number.</summary>
+        /// <summary>Adds a collider, if the world has room: World(collider_room=...). Returns: its number.</summary>
         public int AddCollider(Shape shape, Pose pose)
         {
             int collider;

@@ -376,7 +376,7 @@ typedef struct ts_shape {
                           usually 1 and -1 */
 } ts_shape;
 
-/* Add a collider, if the world was exported with `collider_room`. It gets the lowest free number. */
+/* Add a collider, if the world has room: `World(collider_room=...)`. It gets the lowest free number. */
 TS_API ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* collider);
 /* Remove a collider. A later collider can get its number. */
 TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);

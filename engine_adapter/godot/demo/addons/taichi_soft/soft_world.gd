@@ -2,7 +2,7 @@
 #
 # Physics bodies below this node, or in the group "soft_colliders", are colliders of the soft bodies, by their
 # CollisionShape3Ds: spheres, boxes, capsules and planes (WorldBoundaryShape3D). Those that move are followed in each
-# physics frame, and rigid bodies are pushed. The world file needs room for them: World(collider_room=...).
+# physics frame, and rigid bodies are pushed. The world file has room for 15 by default: World(collider_room=...).
 class_name SoftWorld
 extends Node3D
 
