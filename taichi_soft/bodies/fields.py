@@ -146,7 +146,7 @@ class BodyFields(FieldGroup):
     hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
     hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
     # Largest of the last step, relative to the load.
-    body_residual = declare(BODY, REAL, keep=BODY, when="implicit")
+    body_residual = declare(BODY, REAL, start=0, keep=BODY, inherited=True, when="implicit")
     solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, largest number of iterations
 
     # Schedule `flat`.
@@ -177,7 +177,9 @@ class BodyFields(FieldGroup):
     body_model = declare(BODY, ti.i32, start=LOADED)
     body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
     # Substep by half of which leapfrog lags.
-    body_velocity_lag = declare(BODY, REAL, unit="s", start=0, keep=BODY, most=FINITE, native=True)
+    body_velocity_lag = declare(
+        BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
+    )
     # Bounding box at the last query that used it.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
@@ -187,22 +189,34 @@ class BodyFields(FieldGroup):
     # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
     body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
     body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
-    body_calm_time = declare(BODY, REAL, unit="s", keep=BODY)  # since it was faster than `sleep_speed`
-    body_drives = declare(BODY, ti.i32, start=0, keep=BODY, native=True)  # bits, see `bodies.status`
-    body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, most=FINITE, native=True)
+    body_calm_time = declare(
+        BODY, REAL, unit="s", start=0, keep=BODY
+    )  # since it was faster than `sleep_speed`
+    body_drives = declare(
+        BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True
+    )  # bits, see `bodies.status`
+    body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE, native=True)
     # Rate of damping of velocities relative to the world.
-    body_damping = declare(BODY, REAL, unit="1/s", start=0, keep=BODY, most=FINITE, native=True)
-    body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY)  # decay rate of vibrations
-    body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY)  # longest between dampings
+    body_damping = declare(
+        BODY, REAL, unit="1/s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
+    )
+    body_fading = declare(
+        BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True
+    )  # decay rate of vibrations
+    body_fading_interval = declare(
+        BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True
+    )  # longest between dampings
     body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
-    body_patience = declare(BODY, ti.i32, start=0, keep=BODY)  # steps with inverted tetrahedra: `untangling`
+    body_patience = declare(
+        BODY, ti.i32, start=0, keep=BODY, inherited=True
+    )  # steps with inverted tetrahedra: `untangling`
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was too coarse
     # Substeps that its shape needs, over those at rest.
-    body_refinement = declare(BODY, REAL, start=1, keep=BODY, most=FINITE)
+    body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
     body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge of its surface
     # Distance of sound in the longest stable substep at rest.
     body_stride = declare(BODY, REAL, unit="m", start=LOADED)
-    body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, most=FINITE)
+    body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, inherited=True, most=FINITE)
     # Largest number of retries of a failed step, each twice as fine.
     retries = declare(WORLD, ti.i32)
     block_model = declare(BLOCK, ti.i32, start=LOADED)
@@ -221,6 +235,14 @@ class BodyFields(FieldGroup):
         self.loader = Loader()
         self.real = ti.f64 if capacity.double else ti.f32
         super().__init__(capacity, self.real)
+        fields = [(each, field) for _, each, field in self.declared()]
+        # What `spawn_body` resets in a slot, and what a piece of a cut body gets from it.
+        self.body_starts = [
+            (field, each.start)
+            for each, field in fields
+            if (each.rows, each.keep) == (BODY, BODY) and isinstance(each.start, (int, float))
+        ]
+        self.inherited = [field for each, field in fields if each.inherited]
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, except those for which `loader` already has rows.

@@ -37,7 +37,7 @@ class BondArrays:
 
 @dataclass(frozen=True)
 class HullArrays:
-    """Contact surface of a body in place of its own: see `bodies.hull`."""
+    """Contact surface of a body in place of its own: see `bodies.bound_hull`."""
 
     vertices: Ints  # (h, 4) particles of this body that carry each point
     weights: Floats  # (h, 4)

@@ -64,6 +64,7 @@ class Declaration:
     below: Below | dict[str, Below] | None
     most: float
     native: bool
+    inherited: bool
     when: str
     layout: Any
 
@@ -131,6 +132,7 @@ def declare(
     below: Below | dict[str, Below] | None = None,
     most: float = ANY,
     native: bool = False,
+    inherited: bool = False,
     when: str = "",
     layout: Any = None,
 ) -> Any:
@@ -149,11 +151,26 @@ def declare(
         below: bounds of the whole numbers that a snapshot may have there; of each member, in rows with some.
         most: bound of the size of the floats that a snapshot may have there.
         native: True if the C library reads or writes it between steps.
+        inherited: True if a piece of a cut body gets the numbers of the body.
         when: attribute of a capacity that says whether it has the field; "" if all have it.
         layout: a `ti.Layout` other than the default.
     """
     return Declaration(
-        rows, number, size, unit, each, beyond, start, keep, native_keep, below, most, native, when, layout
+        rows,
+        number,
+        size,
+        unit,
+        each,
+        beyond,
+        start,
+        keep,
+        native_keep,
+        below,
+        most,
+        native,
+        inherited,
+        when,
+        layout,
     )
 
 

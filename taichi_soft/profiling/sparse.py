@@ -1,7 +1,7 @@
 """The same implicit steps with scipy: sparse assembly of all tetrahedra, and conjugate gradients.
 
 Only for the virial law with the linear strain, normal or inverted, in free fall. Written in numpy from the
-equations in `laws.stiffness` and `kernels.rigid_rotation`, independently of the kernels.
+equations in `laws.force_gradients` and `kernels.rigid_rotation`, independently of the kernels.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     integrator = INTEGRATORS[settings.integrator]
     if integrator.only_flat:
         if asked is Schedule.PER_BODY:
-            raise OptionError(ONLY_FLAT.message())
+            raise OptionError(ONLY_FLAT.message(f"integrator '{settings.integrator.value}'"))
         asked = Schedule.FLAT
     for feature, is_asked in {
         "bodies that are cut or have levels of detail": any(

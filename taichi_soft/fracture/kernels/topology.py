@@ -120,18 +120,9 @@ def write_body(
         state.body_edge_blocks[body] = ti.Vector([c0, c0 + edge_blocks.shape[0]])
         state.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
         state.body_outer[body] = ti.Vector([o0, o0 + outer.shape[0]])
-        state.body_velocity_lag[body] = state.body_velocity_lag[model_of]
-        state.body_drives[body] = state.body_drives[model_of]
-        state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
-        state.body_damping[body] = state.body_damping[model_of]
-        state.body_patience[body] = state.body_patience[model_of]
-        state.body_refinement[body] = state.body_refinement[model_of]
-        state.body_sound_speed[body] = state.body_sound_speed[model_of]
-        state.body_fading[body] = state.body_fading[model_of]
-        state.body_fading_interval[body] = state.body_fading_interval[model_of]
+        for field in ti.static(state.inherited):
+            field[body] = field[model_of]
         state.body_calm_time[body] = 0.0
-        if ti.static(state.capacity.implicit):
-            state.body_residual[body] = state.body_residual[model_of]
         state.body_status[body] = status
 
 

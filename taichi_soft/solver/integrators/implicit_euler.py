@@ -1,6 +1,6 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26), with the forces of the new positions.
 
-One linear solve per substep and body (`solver.kernels.implicit_euler`) finds them. Its equations include
+One linear solve per substep and body (`solver.kernels.implicit_solve`) finds them. Its equations include
 grabs, pins and the colliders under the body. Forces are linearised, so a substep that changes a shape too
 much is retried in halves.
 """

@@ -37,7 +37,7 @@ class IntegratorModel:
     drifts_at_once: bool = True  # the kick can move a single body at once
     halvings: int = 0  # of failed substeps; 0: the world's `retries`
     work: int = 1  # approximate cost of a substep over one of leapfrog
-    only_flat: bool = False  # it has no colliders
+    only_flat: bool = False  # it moves particles in a way that `drift.py` does not
     warning: str = ""  # shown to its users
 
     @property

@@ -114,7 +114,7 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
     if ti.static(state.capacity.contact.hull):
         clear_warm_start(state, body)
     if ti.static(program.has_soft_contact):
-        clear_candidates(state, body)  # not stored: the island searches again before it continues
+        clear_candidates(state, body)  # the island searches again before it continues
 
 
 @ti.real_func

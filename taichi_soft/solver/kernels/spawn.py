@@ -40,17 +40,10 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             if ti.static(state.capacity.contact.soft):
                 state.soft.kept_normal_impulse[p] = 0.0
             i = row_behind(i)
-        state.body_velocity_lag[body] = 0.0
-        state.body_drives[body] = 0
-        state.body_gravity_scale[body] = 1.0
-        state.body_damping[body] = 0.0
-        state.body_patience[body] = 0
-        state.body_refinement[body] = 1.0
-        if ti.static(state.capacity.implicit):
-            state.body_residual[body] = 0.0
+        for field, start in ti.static(state.body_starts):
+            field[body] = start
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
-        state.body_calm_time[body] = 0.0
         state.body_overlap[body] = JUST_PLACED
         particles = state.body_particles[body]
         p = particles[0]
