@@ -1,4 +1,4 @@
-"""Force laws by name. A new law is one file with its functions one entry here and its name in `core.types`."""
+"""Force laws by name. A new law is one file, one entry here and its name in `core.types`."""
 
 from dataclasses import replace
 from functools import partial

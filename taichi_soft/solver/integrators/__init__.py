@@ -1,5 +1,5 @@
-"""Integrators. A new one is one file, one line here and its name in `core.types`, if forces are evaluated once in
-each substep."""
+"""Integrators. A new one is one file, one line here and its name in `core.types`, if it evaluates forces once
+in a substep."""
 
 from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
 from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER
