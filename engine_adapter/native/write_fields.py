@@ -1,6 +1,6 @@
-"""Write the headers by which the C library knows the fields of a world: `python write_fields.py`.
+"""Write the C++ headers of the fields of a world: `python write_fields.py`.
 
-They follow from the declarations in Python: names, sizes, and bounds of the numbers in a snapshot.
+The headers contain names, sizes, and bounds for snapshots. All follow from the declarations in Python.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ ENUMS = {
 }
 
 COUNTS = {WORLD: "1", BODY: "bodies", PARTICLE: "particles", COLLIDER: "collider_room"}
-"""Numbers of rows, by what a field has rows for."""
+"""C++ expression for the number of rows, by `rows` of a declaration."""
 
 CONDITIONS = {
     "": "",
@@ -80,7 +80,8 @@ CONDITIONS = {
     "has_soft_contact": "has_soft_contact",
     "implicit": "is_implicit",
 }
-"""Which scenes have a field, by `when` of its declaration. Every exported world has contact."""
+"""Member of `Scene` that is true if it has a field, by `when` of its declaration. Every exported world has
+contact."""
 
 THINGS = {"": "kNothing", PARTICLE: "kParticles", BODY: "kBodies", COLLIDER: "kColliders", FRAME: "kFrames"}
 
@@ -146,8 +147,8 @@ struct Fields {{
 {"".join(_bindings())}  }}
 }};
 
-// Whole numbers of a field lie from 0 to the number of things plus `beside`, not included. The size of floats
-// is at most `most`; if that is infinite, they may be anything.
+// Bounds of a field. Integers are at least 0 and less than the number of `things` plus `beside`. The absolute
+// values of floats are at most `most`; infinity means no bound.
 struct Bound {{
   enum Things {{ {", ".join(THINGS.values())} }};
   const char* field;
@@ -174,7 +175,7 @@ def _groups() -> Iterator[tuple[str, type[FieldGroup]]]:
 
 
 def _members() -> Iterator[str]:
-    """Lines that declare the fields of a group, in a struct of its name."""
+    """Lines that declare the fields: each group is a struct with the name of the group."""
     for prefix, group in _groups():
         inner = "  " if prefix else ""
         lines = []
@@ -194,7 +195,7 @@ def _members() -> Iterator[str]:
 
 
 def _bindings() -> Iterator[str]:
-    """Lines that find the fields in memory."""
+    """Lines that bind the fields to their places in memory."""
     for prefix, group in _groups():
         for name, each in group.declarations().items():
             if not each.native:
@@ -232,7 +233,7 @@ def _bound(path: str, below: Below | None, most: float) -> str:
 
 
 def _type(number: object) -> str:
-    plain = getattr(number, "dtype", number)  # of a vector in a row with members
+    plain = getattr(number, "dtype", number)  # `number` is a vector if a member has several components
     return "int32_t" if plain == ti.i32 else "float"
 
 

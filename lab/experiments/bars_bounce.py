@@ -41,7 +41,7 @@ energy of vibration in flight over that of the impact."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """One fall; a second one half as stiff for a full report."""
+    """Points: one fall; for a full report also a fall of a body half as stiff."""
     stiffnesses = (1.0,) if effort is Effort.QUICK else (1.0, 0.5)
     return [{"stiffness": share} for share in stiffnesses]
 

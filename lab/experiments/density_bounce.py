@@ -29,7 +29,7 @@ from taichi_soft.world.bare import bare_world
 
 SIZE = (3.0, 1.5, 1.5)  # [m]
 LIGHT, HEAVY, YOUNG, POISSON, DAMPING = 200.0, 2000.0, 4e5, 0.2, 20.0
-DROP = 3.0  # below the body [m]
+DROP = 3.0  # initial height of the body's lower face [m]
 DT, SUBSTEPS = 0.01, 10
 TOUCH = 1e-3  # height below which a vertex lies on the floor [m]
 

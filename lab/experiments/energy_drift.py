@@ -1,7 +1,8 @@
 """Undamped kinetic energy over time (thesis section 6.4): it accumulates, and very little damping stops it.
 
-The thesis's stress is not the derivative of an energy, except at nu = 1/4, where the virial law's is that of
-W = 1/2 lambda (J (tr b - 5) + 2), b = F F^T. There, and under a law with an energy, it must not accumulate.
+The thesis's stress is not the derivative of an energy. The exception is the virial law at nu = 1/4, with
+W = 1/2 lambda (J (tr b - 5) + 2), b = F F^T. In this case, and under a law with an energy, the kinetic energy
+must not accumulate.
 """
 
 from __future__ import annotations

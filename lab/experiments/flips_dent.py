@@ -1,7 +1,7 @@
 """Tetrahedra inverted by a hard impact (thesis section 6.6): they stay as dents.
 
-The thesis's sphere is thrown at the floor with its treatment of flips, with none, and with one that restores
-them.
+The thesis's sphere is thrown at the floor with three treatments of inverted tetrahedra: the thesis's, none,
+and one that restores them.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ CLOSE = 0.1
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: strains up to 100 % of each deformation."""
+    """Points: both deformations, at strains up to 100 %."""
     steps = 100 if effort is Effort.FULL else 20
     return [{"kind": kind, "steps": steps} for kind in KINDS]
 

@@ -61,10 +61,10 @@ def run_oscillators(
 
 
 def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
-    """Largest modulus of the eigenvalues of a step of each oscillator, (m,); it grows above 1.
+    """Largest modulus of the eigenvalues of a step of each oscillator, (m,). Above 1, the oscillation grows.
 
-    Computed from two different starts after two and three steps, for methods whose state is position and
-    velocity at the same time.
+    The eigenvalues follow from the states after two and three steps, for two different starts. The state of
+    the method must be position and velocity at the same time.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     amount = np.full(len(k), 1e-2 * LENGTH)

@@ -122,7 +122,7 @@ def _linear_limit(mesh: TetMesh, nu: float) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the windows by the thesis's."""
+    """Compare the windows with those of the thesis."""
     drops = results.where(part="drop")
     findings = [_window_finding(results, nu) for nu in WINDOWS] + [_collapse_finding(results)]
     limits = Table(

@@ -177,7 +177,7 @@ def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
 
 
 def _read(without: Numbers, with_3: Numbers) -> dict[str, Any]:
-    """Figures of a mesh, and whether the claims hold on it."""
+    """Derive the numbers of one mesh from its two runs, and whether the claims hold for it."""
     found: dict[str, Any] = {}
     for name, nu, n in (("0", 0.0, without), ("3", 0.3, with_3)):
         shear, volume = np.array(n["shear"]), np.array(n["volume"])

@@ -1,8 +1,8 @@
 """Taichi fields of the particles, edges and tetrahedra of bodies.
 
 Fields exist as long as the process: Taichi compiles kernels per set of fields, and destroying a field stalls
-a running game. A closed world therefore returns its fields, and the next world that fits into them reuses
-them with their compiled kernels.
+a running game. A closed world therefore returns its fields. The next world that fits into them reuses them
+and their compiled kernels.
 """
 
 import gc
@@ -42,7 +42,7 @@ from taichi_soft.core.threads import in_turn
 
 
 class BodyFields(FieldGroup):
-    """Particles, edges, tetrahedra and bodies, with one field for each quantity.
+    """Particles, edges, tetrahedra and bodies: one field for each quantity.
 
     Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
     with K entries is at (b K + k) LANES + l. The arrays are flat because Taichi 1.7 confuses stores at a
@@ -55,7 +55,7 @@ class BodyFields(FieldGroup):
     particle_velocity = declare(  # see body_velocity_lag
         PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
     )
-    # Zero between steps. It has a fourth component because four floats load and store at once.
+    # Zero between steps. Four components, because the CPU loads and stores four floats at once.
     particle_force = declare(PARTICLE, REAL, 4, unit="N", start=0)
     particle_mass = declare(PARTICLE, REAL, unit="kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True)
     particle_inv_mass = declare(  # 0 if pinned
@@ -63,27 +63,28 @@ class BodyFields(FieldGroup):
     )
     particle_body = declare(PARTICLE, ti.i32, start=LOADED)
     particle_of_vertex = declare(PARTICLE, ti.i32, start=LOADED)  # particle of each of the caller's vertices
-    # Before the last fixed step.
+    # State before the last fixed step.
     prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
     prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
     rest_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED)
-    # Target of a pinned particle, see `control.kernels.pins`, and its position in world or frame axes.
+    # Kind of target of a pinned particle, see `control.kernels.pins`; position of the target, in the axes of
+    # the world or of a frame.
     particle_aim = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(FRAME, WITH_FRAME), native=True
     )
     particle_target = declare(PARTICLE, REAL, 3, unit="m", keep=PARTICLE, most=FINITE, native=True)
-    # External force, if the body is `PUSHED`.
+    # External force. It acts if the body is `PUSHED`.
     particle_push = declare(PARTICLE, REAL, 3, unit="N", keep=PARTICLE, most=FINITE)
-    # Reaction on its constraint, in the last step and before the step.
+    # Impulse on the pin in the last step; its value before the step, for retries.
     particle_reaction = declare(PARTICLE, REAL, 3, unit="N s", keep=PARTICLE, native=True)
     prev_reaction = declare(PARTICLE, REAL, 3, unit="N s")
 
-    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if held in the last substep
-    # Relative to the velocity that its island shares, before contact.
+    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if touched in the last substep
+    # Speed before contact, relative to the mean velocity of the island.
     particle_speed = declare(PARTICLE, REAL, unit="m/s")
 
     tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
-    tet_rest_inverse = declare(  # column by column; it changes only if a body can flow
+    tet_rest_inverse = declare(  # column by column; changes only if the body is plastic
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
     )
     tet_original_inverse = declare(  # before any plastic flow
@@ -94,15 +95,15 @@ class BodyFields(FieldGroup):
     tet_stiffness = declare(  # upper triangle row by row
         BLOCK, REAL, unit="Pa", each=21 * LANES, start=LOADED, when="anisotropic"
     )
-    tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)  # by the mean velocity
+    tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)  # towards the mean velocity
 
     edge_vertices = declare(EDGE, ti.i32, 2, start=LOADED, layout=ti.Layout.SOA)
-    edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row and number of each block
+    edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row, and number of edges, of each block
     edge_damping = declare(EDGE, REAL, unit="N s/m", start=LOADED)
     edge_bond = declare(  # see `laws.bonds.Bonds`
         EDGE, REAL, 4, start=LOADED, when="rings", layout=ti.Layout.SOA
     )
-    edge_ring = declare(EDGE, ti.i32, 2, start=LOADED, when="rings")  # range in the rings
+    edge_ring = declare(EDGE, ti.i32, 2, start=LOADED, when="rings")  # range of rows in the ring fields
     ring_members = declare(  # particles, or slots of tetrahedra
         RING, ti.i32, 4, start=LOADED, when="rings"
     )
@@ -114,18 +115,19 @@ class BodyFields(FieldGroup):
         BLOCK, REAL, unit="Pa", each=LANES, start=LOADED, when="rings"
     )
     tet_pressure = declare(BLOCK, REAL, unit="Pa", each=LANES, when="rings")  # E nu dV / V0
-    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # of all tetrahedra around it
+    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum over the tetrahedra around it
     tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
 
-    # Implicit integration: blocks of the system, on the diagonal and in the row of an edge's first end and
-    # the column of its second.
+    # Implicit integration. 3 x 3 blocks of the system: diagonal blocks by particle, off-diagonal blocks by
+    # edge, in the row of the first end and the column of the second.
     particle_block = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_block_inverse = declare(PARTICLE, REAL, (3, 3), when="implicit")
-    particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass, and inertia of grabs
+    particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass plus inertia of grabs
     edge_block = declare(EDGE, REAL, (3, 3), when="implicit")
     edge_normal = declare(EDGE, REAL, 3, when="solves_bonds")  # from the last evaluation of forces
     edge_compared = declare(EDGE, REAL, 3, unit="m", when="solves_bonds")
-    # Prepared by `rigid_rotation`: K W by particle, W^T K W, and the centre relative to the first particle.
+    # Written by `rigid_rotation`: K W by particle, W^T K W, inverse inertia, and centre of mass relative to
+    # the first particle.
     particle_turning = declare(PARTICLE, REAL, (3, 3), when="implicit")
     body_turning = declare(BODY, REAL, (3, 3), when="implicit")
     body_inverse_inertia = declare(BODY, REAL, (3, 3), unit="1/(kg m^2)", when="implicit")
@@ -134,22 +136,21 @@ class BodyFields(FieldGroup):
     residual = declare(PARTICLE, REAL, 3, when="implicit")
     direction = declare(PARTICLE, REAL, 3, when="implicit")
     image = declare(PARTICLE, REAL, 3, when="implicit")
-    # 1 if the floor holds it, or the number of a collider plus 1; and before part of a step that can be
-    # undone.
+    # Index plus 1 of the collider that constrains the particle, 0 if none; its value before the step.
     particle_contact = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(COLLIDER, 1), native=True, when="implicit"
     )
     prev_contact = declare(PARTICLE, ti.i32, when="implicit")
-    # Of constrained particles, see `held_particles`: the normal and 1 if they stick, velocity of the surface,
-    # friction on sliding particles.
+    # Constraint of a particle, see `held_particles`: normal, and STICKS or SLIDES; velocity of the surface;
+    # friction while it slides.
     particle_hold = declare(PARTICLE, REAL, 4, when="implicit")
     hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
     hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
-    # Largest of the last step, relative to the load.
+    # Largest residual of a solve in the last step, over the load.
     body_residual = declare(BODY, REAL, start=0, keep=BODY, inherited=True, when="implicit")
-    solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, largest number of iterations
+    solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, maximum number of iterations
 
-    # Schedule `flat`.
+    # Only for the schedule `flat`.
     corner_force = declare(  # corner by corner in each block
         BLOCK, REAL, 4, unit="N", each=4 * LANES, when="parallel"
     )
@@ -164,10 +165,10 @@ class BodyFields(FieldGroup):
     )
     barrier = declare(1, ti.i32, when="parallel")
 
-    triangle_vertices = declare(TRIANGLE, ti.i32, 3, start=LOADED)  # outward
+    triangle_vertices = declare(TRIANGLE, ti.i32, 3, start=LOADED)  # oriented outwards
     outer_particle = declare(OUTER, ti.i32, start=LOADED)  # particles of the surface, body by body
 
-    # Ranges of rows.
+    # Ranges of rows of each body.
     body_particles = declare(BODY, ti.i32, 2, start=LOADED)
     body_triangles = declare(BODY, ti.i32, 2, start=LOADED)
     body_outer = declare(BODY, ti.i32, 2, start=LOADED)
@@ -176,7 +177,7 @@ class BodyFields(FieldGroup):
     body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
     body_model = declare(BODY, ti.i32, start=LOADED)
     body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
-    # Substep by half of which leapfrog lags.
+    # Last substep of leapfrog: velocities are half of it behind positions.
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
@@ -184,44 +185,40 @@ class BodyFields(FieldGroup):
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
     body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
-    # With others, in a world in which bodies touch each other: CLEAR, JUST_PLACED or OVERLAPPING.
+    # Overlap with other bodies, in a world with soft contact: CLEAR, JUST_PLACED or OVERLAPPING.
     body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
-    # Corners of a box: around the path in a step, of the search in an island, or where a body sleeps.
+    # Bounding box: of the path in a step, of the surface at a search for contacts, or of a sleeping body.
     body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
     body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
-    body_calm_time = declare(
-        BODY, REAL, unit="s", start=0, keep=BODY
-    )  # since it was faster than `sleep_speed`
-    body_drives = declare(
-        BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True
-    )  # bits, see `bodies.status`
+    # Rest timer: time since a particle was faster than `sleep_speed`.
+    body_calm_time = declare(BODY, REAL, unit="s", start=0, keep=BODY)
+    # Bits, see `bodies.status`.
+    body_drives = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True)
     body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE, native=True)
-    # Rate of damping of velocities relative to the world.
+    # Damping rate of velocities in the world frame.
     body_damping = declare(
         BODY, REAL, unit="1/s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
-    body_fading = declare(
-        BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True
-    )  # decay rate of vibrations
-    body_fading_interval = declare(
-        BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True
-    )  # longest between dampings
+    # Decay rate of vibrations.
+    body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True)
+    # Longest time between two dampings of vibrations.
+    body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True)
     body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
-    body_patience = declare(
-        BODY, ti.i32, start=0, keep=BODY, inherited=True
-    )  # steps with inverted tetrahedra: `untangling`
+    # Steps with inverted tetrahedra, see `untangling`.
+    body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was too coarse
-    # Substeps that its shape needs, over those at rest.
+    # Number of substeps that the present shape needs, over the number at rest.
     body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
     body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge of its surface
-    # Distance of sound in the longest stable substep at rest.
+    # Distance that sound travels in the longest stable substep at rest.
     body_stride = declare(BODY, REAL, unit="m", start=LOADED)
     body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, inherited=True, most=FINITE)
-    # Largest number of retries of a failed step, each twice as fine.
+    # Maximum number of retries of a failed step, each with twice the substeps.
     retries = declare(WORLD, ti.i32)
     block_model = declare(BLOCK, ti.i32, start=LOADED)
 
-    sleep_speed = declare(WORLD, REAL, unit="m/s", start=LOADED)  # below which bodies fall asleep; 0: never
+    # Bodies below this speed fall asleep; 0 turns sleep off.
+    sleep_speed = declare(WORLD, REAL, unit="m/s", start=LOADED)
     gravity = declare(WORLD, REAL, 3, unit="m/s^2", native=True)
     wind = declare(  # velocity [m/s], density times drag coefficient [kg/m^3]
         WORLD, REAL, 4, start=0, keep=WORLD, most=FINITE, native=True
@@ -229,7 +226,7 @@ class BodyFields(FieldGroup):
     floor = declare(WORLD, REAL, 3, native=True)  # height [m], restitution, friction
 
     def __init__(self, capacity: BodyCapacity) -> None:
-        """Allocate fields of `capacity`; contents are zero until `load`."""
+        """Allocate fields of `capacity`, filled with zeros until `load`."""
         self.capacity = capacity
         self.programs: set[Program] = set()  # programs that used these fields
         self.loader = Loader()
@@ -247,11 +244,11 @@ class BodyFields(FieldGroup):
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, except those for which `loader` already has rows.
 
-        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_stride`,
+        `models[i]` is the index of body i's force model. `kinds[i]` contains its `body_edge`, `body_stride`,
         `body_sound_speed`, `body_fading` and `body_fading_interval`.
 
-        All bodies are absent, with particles at the positions of their meshes, until `spawn_body` places
-        them.
+        All bodies are absent until `spawn_body` places them. Until then, their particles are at the positions
+        of their meshes.
         """
         fill, ranges, bodies = self.loader.fill, scene.ranges, scene.bodies
         position = _laid_out(scene, "particles", lambda b: b.rest_position)
@@ -322,7 +319,7 @@ class BodyFields(FieldGroup):
         return found
 
     def _load_bonds(self, scene: Scene) -> None:
-        """Load the constants and rings of pairwise laws; zeros for the edges of other bodies."""
+        """Load the constants and rings of pairwise laws. Edges of bodies with other laws get zeros."""
         fill, bodies = self.loader.fill, scene.bodies
         constants, rings, members, weights = [], [], [], []
         for body, place, rows in zip(bodies, scene.ranges, _spans(scene, "edges"), strict=True):
@@ -356,15 +353,16 @@ class BodyFields(FieldGroup):
 
 
 def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Append `LANES` rows of zeros to a body's edges, which lead from its first particle to itself."""
+    """Append `LANES` rows of zeros to a body's edges: spare edges from its first particle to itself."""
     return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
 
 
 def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
     """Rows of all bodies, each at the start of its range and padded with zeros.
 
-    `counted_from`: kind of rows that the numbers in them refer to, which become rows of the world; `columns`:
-    how many leading columns hold such numbers, all if None.
+    Args:
+        counted_from: kind of rows that the numbers refer to. They become rows of the world.
+        columns: number of leading columns with such numbers; None for all columns.
     """
     parts = []
     for body, place, span in zip(scene.bodies, scene.ranges, _spans(scene, kind), strict=True):
@@ -426,9 +424,10 @@ Kind = TypeVar("Kind", bound=BodyFields)
 
 @in_turn
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
-    """Return fields of a kind and capacity: the smallest free ones, if possible with `program` compiled.
+    """Return free fields of a kind that fit a capacity, or make new ones.
 
-    Otherwise new fields are made. The garbage of closed worlds is collected first if that can free some.
+    Fields for which `program` is compiled are preferred, then the smallest. The garbage of closed worlds is
+    collected first if that can free such fields.
     """
     fields = _best(kind, capacity, program)
     if (fields is None or program not in fields.programs) and len(_free) < len(_made):
@@ -444,7 +443,7 @@ def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
 
 
 def _best(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind | None:
-    """Best of the free fields, or None."""
+    """The best free fields that fit, or None."""
     fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
     return min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms), default=None)
 

@@ -140,7 +140,9 @@ class StaticBody:
         return self._in_mesh_order(total)
 
     def system_stiffness(self) -> Floats:
-        """The same in implicit Euler's system: projected, in blocks of particles and edges."""
+        """-df/dx as in implicit Euler's system, (n, 3, n, 3) [N/m]: projected, from blocks of particles and
+        edges.
+        """
         n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
         compute_system_stiffness(self._state, self._program)
         total = np.zeros((n, n, 3, 3))

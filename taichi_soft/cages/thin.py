@@ -246,7 +246,7 @@ def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: Float
     region = around(around(cubes_of(lattice, far)))
     points, triangle = points_on(corners, PITCH * lattice.edge)
     bare = cubes_of(lattice, points) & ~cubes_of(lattice, mesh.vertices) & region
-    # Where a limb leaves the cage, cubes contain both.
+    # A cube where a limb leaves the cage contains points of the limb and of the cage.
     roots = points[_are_in(lattice, points, around(bare) & ~bare)]
     cubes = bare | cubes_of(
         lattice, roots[_distances(Locator(mesh), mesh, roots) > ROOT_DISTANCE * lattice.edge]

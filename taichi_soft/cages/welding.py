@@ -23,7 +23,10 @@ def places_of(vertices: FloatArray, size: float) -> Ints:
 
 
 def welded(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
-    """Vertices in use (k, 3), one per position, and triangles between three of them (j, 3), each once."""
+    """Merge vertices at the same position, and drop unused vertices, degenerate and duplicate triangles.
+
+    Returns: vertices (k, 3), triangles (j, 3).
+    """
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     corners = places_of(vertices, size)[triangles]
     corners, points = corners.reshape(-1), vertices[triangles.reshape(-1)]

@@ -1,4 +1,4 @@
-"""The Taichi fields of contact: colliders, and what each body has to do with them in the present step."""
+"""The Taichi fields of contact: colliders, and the contacts of bodies with colliders and with each other."""
 
 import math
 from dataclasses import dataclass
@@ -23,52 +23,52 @@ from taichi_soft.core.field_table import (
 from taichi_soft.core.runtime import ti
 
 NO_COLLIDER = -1
-"""Kind of a row of which the collider was removed."""
+"""Kind of a row whose collider was removed."""
 
 FOUND = 16
-"""Triangles that a search may find for one vertex: where three bodies meet, and their triangles beside."""
+"""Maximum number of triangles that a search keeps for one vertex: enough where three bodies meet."""
 
 SLOTS = 8
-"""Room for what is found for the vertices of a body, for each of them. Most have nothing near."""
+"""Slots for candidates of a body, per vertex. Most vertices have none, so that others can use more."""
 
 PAIR_ROWS = 32
-"""Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
-for each of more to touch 64 others."""
+"""Pairs of bodies whose impulses can be recorded, per body of an island. This is enough for all pairs of 65
+bodies, and in a larger island for 64 partners of each body."""
 
 MAX_PARTNERS = 32
-"""Bodies from which one is parted at a time. One that overlaps more touches no other body meanwhile."""
+"""Bodies from which a body is moved apart at a time. A body that overlaps more of them touches no other."""
 
 NO_CONTACT = 1e30
-"""Gap of a candidate that is out of reach."""
+"""Gap of a candidate that is out of range."""
 
 MAX_IMPULSE = 1e30
-"""Largest impulse of a contact that a snapshot may have [N s]."""
+"""Largest valid impulse of a contact in a snapshot [N s]."""
 
 
 @dataclass(frozen=True)
 class ContactCapacity:
-    """Room for contact; all zero in a world without."""
+    """Capacity for contact; all zero in a world without contact."""
 
     colliders: int = 0
     samples: int = 0  # of the grids of height fields and meshes
-    soft: bool = False  # whether bodies touch each other
-    hull: bool = False  # whether any of them does so by a hull
+    soft: bool = False  # True if bodies touch each other
+    hull: bool = False  # True if any body has a hull
 
 
 class ColliderFields(FieldGroup):
-    """Colliders as rows of fields, and for each pair of a body and a collider a row of what passes between.
+    """Colliders, and contacts: one row for each pair of a body and a collider.
 
-    The row of body b and collider c is b * colliders + c. A collider moves through a fixed step with the
-    velocity and the spin it has here, from the pose it has here.
+    The row of body b and collider c is b * colliders + c. In a fixed step, a collider starts at `position`
+    and `rotation`, and moves with the constant `velocity` and `spin`.
     """
 
     owner, when = "contact", "has_contact"
-    count = declare(WORLD, ti.i32, native=True)  # rows in use, removed ones among them
+    count = declare(WORLD, ti.i32, native=True)  # rows in use, including those of removed colliders
     kind = declare(COLLIDER, ti.i32, native=True)  # a `ShapeKind`, or NO_COLLIDER
     parameters = declare(COLLIDER, ti.f32, 8, native=True)
     resolution = declare(COLLIDER, ti.i32, 3)
-    offset = declare(COLLIDER, ti.i32)  # of its first sample
-    # At the start of the step.
+    offset = declare(COLLIDER, ti.i32)  # row of its first sample
+    # Pose at the start of the step, and motion in it.
     position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
     rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
     velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
@@ -78,103 +78,105 @@ class ColliderFields(FieldGroup):
     # Box around its path in the step.
     lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
     upper = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
-    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # of its fastest point, at most
+    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # upper bound for its fastest point
     samples = declare(SAMPLE, ti.f32)
 
-    near = declare(CONTACT, ti.i32)  # colliders within reach of a body, packed to the front
+    near = declare(CONTACT, ti.i32)  # colliders near a body, at the front of its rows
     near_count = declare(BODY, ti.i32, start=0)
-    reach = declare(BODY, ti.f32, unit="m")  # distance after which other colliders may be near
-    gone = declare(BODY, ti.f32, unit="m")  # longest distance moved since the near ones were searched
-    # On the collider in this step, and about its position. Slots that stay empty have them too: the impulse
-    # of a collider is a sum over all.
+    reach = declare(BODY, ti.f32, unit="m")  # distance after which other colliders can be near
+    gone = declare(BODY, ti.f32, unit="m")  # farthest distance travelled since the last search for them
+    # Impulse on the collider in this step, and angular impulse about its position. Empty slots contain zeros:
+    # the total on a collider is the sum over all slots.
     impulse = declare(CONTACT, ti.f32, 3, unit="N s", start=0, keep=CONTACT)
     angular_impulse = declare(CONTACT, ti.f32, 3, unit="N m s", start=0, keep=CONTACT)
     normal_impulse = declare(CONTACT, ti.f32, 3, unit="N s")  # on the body in this substep
-    # Of the normal impulses of its particles: their sum [N s], and those times the speed along the normal
-    # with which the surface came, and with which particle and surface came together [N].
+    # Sums over the particles of the body: normal impulse [N s]; normal impulse times the speed of the surface
+    # along the normal [J]; normal impulse times the speed of approach [J].
     normal_impulse_rates = declare(CONTACT, ti.f32, 3)
-    # Speed at which the body may leave, 0 if apart; and before the step.
+    # Speed at which the body can leave the collider, 0 without contact; its value before the step.
     rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
     prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
     body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
-    # From all that is near, when that was searched. Inside a body nothing is near.
+    # Distance from all near colliders at the last search. Inner particles count as far away.
     particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)
 
     def __init__(self, capacity: Any, real: Any) -> None:
         """Allocate; contents are zero."""
         super().__init__(capacity, real)
         self.capacity: ContactCapacity = capacity.contact
-        self.loader = Loader()  # of what does not change when a collider moves
+        self.loader = Loader()  # of data that do not change when a collider moves
 
 
 class SoftContactFields(FieldGroup):
-    """What bodies need to touch each other: a grid of vertices, and candidates.
+    """Contact between bodies: a grid of vertices, and candidates.
 
-    Each body has a part of them, which it uses for one other body after the next.
+    Each body has its own part of the grid, which it fills again for each other body.
     """
 
     owner, when = "contact", "has_soft_contact"
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
     cell_first = declare(GRID_CELL, ti.i32)
-    item = declare(OUTER, ti.i32)  # rows of `outer_particle` that may be near the other body
-    # The same, cell by cell, and their positions.
+    item = declare(OUTER, ti.i32)  # rows of `outer_particle` near the other body
+    # The same rows in the order of their cells, and the positions of their particles.
     cell_item = declare(OUTER, ti.i32)
     cell_position = declare(OUTER, ti.f32, 3, unit="m")
-    # At the search: corners of boxes, and positions.
+    # State at the last search: corners of the boxes of triangles, and positions.
     triangle_lower = declare(TRIANGLE, ti.f32, 3, unit="m")
     triangle_upper = declare(TRIANGLE, ti.f32, 3, unit="m")
     searched_position = declare(PARTICLE, ti.f32, 3, unit="m")
-    # Relative to what the bodies of an island share: distances for which a search holds, and how far each
-    # body and each vertex is from where it was then.
+    # Relative to the mean motion of the island: the distance up to which the results of a search are valid,
+    # and the distances that each body and each vertex are from their positions at that search.
     body_reach = declare(BODY, ti.f32, unit="m")
-    body_lost = declare(BODY, ti.f32, unit="m")  # distance for which the vertices of a pair had room enough
+    body_lost = declare(BODY, ti.f32, unit="m")  # the same, limited by triangles without a slot
     body_gone = declare(BODY, ti.f32, unit="m")
     particle_gone = declare(PARTICLE, ti.f32, unit="m")
     found_count = declare(OUTER, ti.i32)
     found_triangle = declare(OUTER, ti.i32, each=FOUND)
-    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # at the search
-    # Candidates, of each body vertex by vertex, without gaps. Code reads the last `LANES` rows and never
-    # uses them.
+    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # at the last search
+    # Candidates of each body, vertex by vertex, without gaps. The last `LANES` rows are read, but never used.
     slot_count = declare(BODY, ti.i32, start=0)
-    # The vertex, and the triangle's corners.
+    # Vertex and corners of the triangle.
     slot_vertices = declare(OUTER, ti.i32, 4, each=SLOTS, beyond=LANES)
     slot_triangle = declare(OUTER, ti.i32, each=SLOTS)
-    # Distance at the search beyond the thickness.
+    # Distance at the last search, minus the thickness.
     slot_spare = declare(OUTER, ti.f32, unit="m", each=SLOTS, beyond=LANES)
-    near_slot = declare(OUTER, ti.i32, each=SLOTS, beyond=LANES)  # near now; behind them, old ones
-    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # beyond the thickness; or NO_CONTACT
+    # Slots of the candidates that are near now. The rows after them are outdated.
+    near_slot = declare(OUTER, ti.i32, each=SLOTS, beyond=LANES)
+    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # distance minus thickness; or NO_CONTACT
     slot_weights = declare(OUTER, ti.f32, 3, each=SLOTS)  # barycentric, of the nearest point
     slot_normal = declare(OUTER, ti.f32, 3, each=SLOTS)  # from the triangle to the vertex
-    slot_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=SLOTS)  # along it in this substep
+    slot_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=SLOTS)  # along the normal in this substep
     slot_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=SLOTS)  # on the vertex
-    # Contacts of this substep; between a search and the gaps, those of the last one. Slots of each body
-    # from its first slot on; no other slot has an impulse.
+    # Slots of the contacts of this substep, without gaps for each body. Between a search and the narrow
+    # phase, they are the contacts of the last substep. All other slots have no impulse.
     contact_count = declare(BODY, ti.i32, start=0)
     contact_slot = declare(OUTER, ti.i32, each=SLOTS)
-    # What the solves of a contact share: inverse masses of the vertex and the corners; whether the bodies of
-    # the two move (1); normal of the triangle; shares of the corners in the impulse on the vertex, and height
-    # over the triangle times the gradients of the weights.
+    # Terms of a contact that stay constant during the solver's sweeps: inverse masses of the vertex and the
+    # corners; 1 if the body of the vertex, or of the triangle, can move; normal of the triangle; fractions of
+    # the impulse that the corners get; height above the triangle times the gradients of the weights.
     slot_inv_mass = declare(OUTER, ti.f32, 4, unit="1/kg", each=SLOTS)
     slot_moves = declare(OUTER, ti.f32, 2, each=SLOTS)
     slot_face = declare(OUTER, ti.f32, 3, each=SLOTS)
     slot_shares = declare(OUTER, ti.f32, 3, each=SLOTS)
     slot_levers = declare(OUTER, ti.f32, (3, 3), each=SLOTS)
-    # The contact with the largest normal impulse on a particle at the end of the last step; 0 for none.
+    # Contact with the largest normal impulse on a particle at the end of the last step. The impulse is 0 if
+    # there was none.
     kept_triangle = declare(PARTICLE, ti.i32, keep=PARTICLE)
     kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MAX_IMPULSE)
     kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MAX_IMPULSE)
     records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the rows below are filled
-    # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
+    # Pairs of bodies, the smaller index first; zeros in a free row. Grouped by island.
     pair_bodies = declare(BODY, ti.i32, 2, each=PAIR_ROWS, start=0)
-    pair_impulse = declare(BODY, ti.f32, 3, unit="N s", each=PAIR_ROWS, start=0)  # on the second in a step
-    pairs_lost = declare(WORLD, ti.i32, start=0)  # 1 if some had no row
+    # Impulse on the second body in a step.
+    pair_impulse = declare(BODY, ti.f32, 3, unit="N s", each=PAIR_ROWS, start=0)
+    pairs_lost = declare(WORLD, ti.i32, start=0)  # 1 if pairs were lost because no row was free
     # Bodies placed inside each other: see `kernels/parting.py`.
-    partner_count = declare(BODY, ti.i32, start=0)  # bodies that each overlaps in this step
+    partner_count = declare(BODY, ti.i32, start=0)  # bodies that it overlaps in this step
     partner = declare(BODY, ti.i32, each=MAX_PARTNERS)
     center = declare(BODY, ti.f32, 3, unit="m")  # of mass, after the step
     displacement = declare(BODY, ti.f32, 3, unit="m")  # of the centre in the step
     mean_velocity = declare(BODY, ti.f32, 3, unit="m/s")  # of the centre
     size = declare(BODY, ti.f32, unit="m")  # largest side
     mobility = declare(BODY, ti.f32, unit="1/kg")  # inverse mass; 0 if pinned or not moving
-    parting_shift = declare(BODY, ti.f32, 3, unit="m")  # displacement that all partners ask for
+    parting_shift = declare(BODY, ti.f32, 3, unit="m")  # sum of the displacements away from all partners
     parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # change of velocity

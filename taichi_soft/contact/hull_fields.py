@@ -1,8 +1,9 @@
-"""The Taichi fields of hulls: what touches of each body, in place of the surface of its tetrahedra.
+"""The Taichi fields of hulls: surfaces for contact, in place of the surfaces of the tetrahedra.
 
-In a world where any body has a hull these fields are all bodies' touching surfaces. A body without a hull has
-its own there. The points of a hull are rows of the particles' fields, behind those of its body: contact reads
-their places as those of particles, and passes on to the particles that carry them what it does to them.
+If any body of a world has a hull, these fields contain the contact surfaces of all bodies. For a body without
+a hull, this is the surface of its tetrahedra. The points of a hull are additional rows of the particle
+fields, after the particles of its body. Contact reads their positions like those of particles, and applies
+impulses and displacements to the particles that carry them.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from taichi_soft.core.field_table import BODY, LOADED, OUTER, PARTICLE, TRIANGLE
 from taichi_soft.core.runtime import ti
 
 TOUCHES = 4
-"""Colliders that a point of a hull may meet in a substep."""
+"""Maximum number of colliders that a hull point can touch in a substep."""
 
 
 class HullFields(FieldGroup):
-    """Touching surfaces, and carriers of each particle that touches: itself, or four for a hull's point."""
+    """Contact surfaces, and the carriers of their points: the particle itself, or four for a hull point."""
 
     owner, when = "contact", "has_hulls"
-    # As those of the same names in `BodyFields`.
+    # Same meaning as the fields of the same names in `BodyFields`.
     body_outer = declare(BODY, ti.i32, 2, start=LOADED)
     body_triangles = declare(BODY, ti.i32, 2, start=LOADED)
     outer_particle = declare(OUTER, ti.i32, start=LOADED)
     triangle_vertices = declare(TRIANGLE, ti.i32, 3, start=LOADED)
-    body_points = declare(BODY, ti.i32, 2, start=LOADED)  # rows of the points; none without a hull
+    body_points = declare(BODY, ti.i32, 2, start=LOADED)  # range of hull points; empty without a hull
     carriers = declare(PARTICLE, ti.i32, 4, start=LOADED)
     weights = declare(PARTICLE, ti.f32, 4, start=LOADED)
-    # Contacts with colliders in a substep, of each body from its first one on: normal of the collider, its
-    # velocity there, allowed speed of the point along the normal relative to it; how far behind the surface
-    # its path would end that began at the place with the velocity.
+    # Contacts with colliders in a substep, without gaps for each body: normal and velocity of the collider's
+    # surface; smallest allowed speed of the point along the normal, relative to the surface; signed distance
+    # from the surface at the end of the path from `touch_start` with `touch_start_velocity`.
     touch_point = declare(OUTER, ti.i32, each=TOUCHES)
     touch_collider = declare(OUTER, ti.i32, each=TOUCHES)
     touch_normal = declare(OUTER, ti.f32, 3, each=TOUCHES)
@@ -45,22 +46,22 @@ class HullFields(FieldGroup):
     touch_beyond = declare(OUTER, ti.f32, unit="m", each=TOUCHES)
     touch_start = declare(OUTER, ti.f32, 3, unit="m", each=TOUCHES)
     touch_start_velocity = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)
-    touch_inv_mass = declare(OUTER, ti.f32, unit="1/kg", each=TOUCHES)  # of the point
-    touch_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=TOUCHES)  # on the point
+    touch_inv_mass = declare(OUTER, ti.f32, unit="1/kg", each=TOUCHES)  # inverse mass of the point
+    touch_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=TOUCHES)  # impulse on the point
     touch_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=TOUCHES)
-    # Two colliders that each point touched in the last substep, counted from 1, or 0, and their impulses on
-    # it. The impulses of other points mean nothing.
+    # Indices plus 1 of up to two colliders that a point touched in the last substep, 0 for none; and their
+    # impulses on the point. Without a collider, the impulses are undefined.
     held_by = declare(PARTICLE, ti.i32, 2, start=0, keep=PARTICLE)
     held_normal_impulse = declare(PARTICLE, ti.f32, 2, unit="N s", keep=PARTICLE)
     held_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
     held_second_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
-    # Of each contact of bodies: change of velocity of one corner of the triangle by an impulse of 1 N s at
-    # another.
+    # For each contact between bodies: velocity that an impulse of 1 N s at one corner of the triangle gives
+    # another corner.
     slot_mobility = declare(OUTER, ti.f32, (3, 3), unit="1/kg", each=SLOTS, when="has_soft_contact")
 
     @property
     def held_impulses(self) -> list[Any]:
-        """Fields of the impulses that a substep begins with."""
+        """Fields of the impulses with which a substep starts."""
         return [self.held_normal_impulse, self.held_friction_impulse, self.held_second_friction_impulse]
 
     def load(self, loader: Loader, scene: Scene) -> None:
@@ -91,8 +92,10 @@ class HullFields(FieldGroup):
 def touching_rows(
     body: BodyArrays, place: Ranges
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
-    """What touches of a body, counted from its first particle: particles (k,), triangles (t, 3); and of the
-    points of its hull the carriers (h, 4) and their weights (h, 4)."""
+    """Contact surface of a body, numbered from its first particle.
+
+    Returns: particles (k,), triangles (t, 3); carriers of its hull points (h, 4), and their weights (h, 4).
+    """
     hull = body.hull
     if hull is None:
         carriers, weights = np.zeros((0, 4), dtype=np.int32), np.zeros((0, 4), dtype=np.float32)

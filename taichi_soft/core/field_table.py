@@ -1,8 +1,8 @@
 """Declarations of Taichi fields.
 
-A group of fields is a class that lists each field once, with `declare`. The list says what is allocated, what
-a world starts with, what a snapshot stores and which values it refuses, which layout a world file has, and
-how the C library reaches the fields (`engine_adapter/native/write_fields.py`).
+A group of fields is a class that declares each of its fields once, with `declare`. From the declarations
+follow the allocation, the initial values, the contents of a snapshot and their bounds, the layout of exported
+worlds, and the C++ headers (`engine_adapter/native/write_fields.py`).
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ REAL = "real"
 """Type of a field's numbers: float32; float64 in fields that evaluate forces with doubles."""
 
 LOADED = "loaded"
-"""`start` of a field whose first contents depend on the bodies: the `load` of its group fills it."""
+"""`start` of a field whose initial values depend on the bodies: `load` of its group fills it."""
 
 ANY = float("inf")
 FINITE = float(np.finfo(np.float32).max)
-"""`most` of a field whose numbers may be anything, or are only required to be finite."""
+"""`most` of a field with any numbers, or with any finite numbers."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
-"""What a field can have rows for. A contact is a pair of a body and a collider; `outer` are the particles of
-surfaces, and `WORLD` stands for a single row."""
+"""`rows` of a field: what each row belongs to. A contact is a pair of a body and a collider. OUTER stands for
+particles of surfaces, and WORLD for a single row."""
 
 SHAPE = "shape"
-"""Group of a snapshot's rows: entries of the rest shapes of tetrahedra that may flow."""
+"""`keep` of the rest shapes of tetrahedra, which change only if the body is plastic."""
 
 
 @dataclass(frozen=True)
 class Below:
-    """Whole numbers from 0 to the number of things there are, plus `beside`, not included."""
+    """Integers from 0 up to, but not including, the number of `things` plus `beside`."""
 
-    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; nothing for a fixed number
+    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; "" counts none, so that `beside` is the bound
     beside: int = 0
 
 
@@ -50,7 +50,7 @@ FRAME = "frame"
 
 @dataclass(frozen=True, eq=False)
 class Declaration:
-    """All that is known of a field: see `declare`."""
+    """Properties of a field: see `declare`."""
 
     rows: str | int
     number: Any
@@ -69,7 +69,7 @@ class Declaration:
     layout: Any
 
     def __get__(self, group: object, kind: type) -> Any:
-        """Fields of a group that has the field hide this; other groups have only the declaration."""
+        """Raise an AttributeError if a group lacks the field. If it has the field, that hides this method."""
         if group is None:
             return self
         name = next(name for name, each in kind.declarations().items() if each is self)  # type: ignore[attr-defined]
@@ -77,12 +77,12 @@ class Declaration:
 
     @property
     def is_bounded(self) -> bool:
-        """Whether `require` checks it."""
+        """True if `require` checks its values."""
         return self.below is not None or self.most < ANY
 
     @property
     def is_struct(self) -> bool:
-        """Whether a row has named members."""
+        """True if its rows have named members."""
         return isinstance(self.number, ti.lang.struct.StructType)
 
     def count(self, counts: Mapping[str, int]) -> int:
@@ -91,7 +91,7 @@ class Declaration:
         return rows * self.each + self.beyond
 
     def make(self, counts: Mapping[str, int], real: Any) -> Any:
-        """Allocate the field; contents are zero."""
+        """Allocate the field, filled with zeros."""
         shape = () if self.rows == WORLD else self.count(counts)
         if self.is_struct:
             return self.number.field(shape=shape)
@@ -106,16 +106,16 @@ class Declaration:
     def require(self, rows: NDArray[Any], things: Mapping[str, int]) -> None:
         """Check rows of a snapshot. Raises: ValueError with the value and the bounds.
 
-        Args: things: how many there are of what `Below` names.
+        Args: things: number of things, by their name in `Below`.
         """
         if rows.dtype.kind == "f":
             size = float(np.abs(rows).max(initial=0.0))
             if self.most < ANY and not size <= self.most:
-                raise ValueError(f"has {size:g}, beyond {self.most:g}")
+                raise ValueError(f"has a number of size {size:g}; allowed are numbers up to {self.most:g}")
         elif isinstance(self.below, Below):
             end = things[self.below.things] + self.below.beside
             if rows.size and not (rows.min() >= 0 and rows.max() < end):
-                raise ValueError(f"has {rows.min()} to {rows.max()}, and not only 0 to {end - 1}")
+                raise ValueError(f"has numbers from {rows.min()} to {rows.max()}; allowed are 0 to {end - 1}")
 
 
 def declare(
@@ -139,20 +139,22 @@ def declare(
     """Declare a field in the body of a `FieldGroup`.
 
     Args:
-        rows: what it has a row for (WORLD, PARTICLE ...), or a fixed number of rows.
+        rows: what each row belongs to (WORLD, PARTICLE ...), or a fixed number of rows.
         number: type of its numbers: `ti.i32`, `ti.f32`, REAL, or a `ti.dataclass` for rows with members.
         size: numbers per row; (rows, columns) for a matrix.
         unit: SI unit of its numbers.
-        each, beyond: rows for each thing, and further rows that code reads beyond the last.
-        start: number in all rows of a new world; LOADED if they depend on the bodies; None if a step writes
-            them before it reads them.
-        keep: group of a snapshot's rows with it, if the next step depends on it.
-        native_keep: the same in snapshots of the C library only: Python stores it with the handles.
-        below: bounds of the whole numbers that a snapshot may have there; of each member, in rows with some.
-        most: bound of the size of the floats that a snapshot may have there.
-        native: True if the C library reads or writes it between steps.
-        inherited: True if a piece of a cut body gets the numbers of the body.
-        when: attribute of a capacity that says whether it has the field; "" if all have it.
+        each, beyond: number of rows per particle, edge ..., and of spare rows after the last, which code can
+            read.
+        start: initial number in all rows; LOADED if it depends on the bodies; None if a step writes the rows
+            before it reads them.
+        keep: group of rows of a snapshot that stores the field; "" if the next step does not depend on it.
+        native_keep: `keep` in snapshots of the C library only, because Python stores the data with the
+            handles.
+        below: bounds of integers in a snapshot; a dictionary by member for rows with members.
+        most: largest absolute value of floats in a snapshot.
+        native: True if the C library reads or writes the field between steps.
+        inherited: True if a piece of a cut body gets the values of the body.
+        when: attribute of the capacity that is true if it has the field; "" if all capacities have it.
         layout: a `ti.Layout` other than the default.
     """
     return Declaration(
@@ -175,25 +177,25 @@ def declare(
 
 
 class FieldGroup:
-    """Fields with one owner. Subclasses list them; kernels take a group, or what holds it, as a template."""
+    """Fields with one owner, declared by a subclass. Kernels get a group or a `State` as a template."""
 
     owner: ClassVar[str] = ""
-    """Folder of the kernels that write it; "" if all may."""
+    """Folder of the kernels that can write it; "" if all can."""
     when: ClassVar[str] = ""
-    """Attribute of a capacity that says whether it has the group; "" if all have it."""
+    """Attribute of the capacity that is true if it has the group; "" if all capacities have it."""
 
     def __init_subclass__(cls) -> None:
         holds_fields(cls)
 
     def __init__(self, capacity: Any, real: Any) -> None:
-        """Allocate. Args: capacity: has `counts` of rows; real: type of REAL."""
+        """Allocate the fields. Args: capacity: has the `counts` of rows; real: type of REAL."""
         for name, each in self.declarations().items():
             if not each.when or getattr(capacity, each.when):
                 setattr(self, name, each.make(capacity.counts, real))
 
     @classmethod
     def declarations(cls) -> dict[str, Declaration]:
-        """Declarations of all its fields by name, those of base classes first."""
+        """Declarations of all fields by name, those of base classes first."""
         return {
             name: value
             for base in reversed(cls.__mro__)
@@ -202,7 +204,7 @@ class FieldGroup:
         }
 
     def declared(self) -> list[tuple[str, Declaration, Any]]:
-        """Name, declaration and field of all fields that it has; for rows with members once per member."""
+        """Name, declaration and field of each allocated field, or of each member if its rows have members."""
         found = []
         for name, each in self.declarations().items():
             if name not in vars(self):
@@ -218,7 +220,7 @@ class FieldGroup:
         return found
 
     def fill_starts(self, loader: Loader) -> None:
-        """Fill the fields that every world starts with the same numbers in."""
+        """Fill the fields whose initial number is the same in every world."""
         for _, each, field in self.declared():
             if isinstance(each.start, (int, float)):
                 loader.fill_all(field, each.start)

@@ -20,22 +20,22 @@ class Settings:
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height [m]
     restitution: float | None  # of the floor; None uses that of the bodies
-    friction: float  # of the floor
+    friction: float  # coefficient of the floor
     integrator: Integrator  # of all bodies
     tolerance: float  # of implicit solves: residual over load
     most_iterations: int  # of an implicit solve
-    retries: int  # how often a failed step is retried, each time with twice the substeps
+    retries: int  # maximum retries of a failed step, each with twice the substeps
     schedule: Schedule  # as chosen by `World.build`; AUTO until then if not given
 
 
 DEFAULT_SLEEP_SPEED = 0.02
 """Default `sleep_speed` [m/s], within the 0.01 to 0.05 m/s of engines of rigid bodies (Box2D, Jolt).
 
-The stop of a body of game size, 0.1 m to 10 m, is not visible at this speed: it moves a third of a millimetre
-between two frames. With a lower value, bodies would tremble visibly longer before they fall asleep."""
+At this speed, a body of 0.1 m to 10 m can stop without a visible jump: it moves a third of a millimetre
+between two frames. With a lower value, bodies would tremble longer before they fall asleep."""
 
 DEFAULT_COLLIDER_ROOM = 15
-"""Default `collider_room`: with the floor 16, a power of two, to which the room is rounded up."""
+"""Default `collider_room`: 16 rows with the floor. The number of rows is rounded up to a power of two."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ class ContactRequest:
         """Replace each None by its default.
 
         Args:
-            can_touch: True if bodies, or parts of one body, can touch each other. Otherwise contact between
-                bodies would only be compiled in vain.
-            is_flat: True for the schedule "flat", which supports none of this.
+            can_touch: True if bodies, or parts of one body, can touch each other. If not, contact between
+                bodies is off by default, because compiling it takes time.
+            is_flat: True for the schedule "flat", which supports neither contact nor sleep.
         """
         defaults = (False, 0.0, 0) if is_flat else (can_touch, DEFAULT_SLEEP_SPEED, DEFAULT_COLLIDER_ROOM)
         soft, sleep_speed, collider_room = defaults

@@ -67,7 +67,7 @@ class StressExceeded(Event):
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) that did not exceed it before, ascending
+    tetrahedra: Ints  # (k,) that newly exceed the given stress, ascending
     stress: Floats  # (k,) von Mises stress [Pa], see `Body.tet_stress`
 
 
@@ -79,7 +79,7 @@ class TearCandidates(Event):
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) that did not exceed it before, ascending
+    tetrahedra: Ints  # (k,) that newly exceed the given stress, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
     normals: Floats  # (k, 3) direction of that stress, which is the normal of the tear; either sign
 

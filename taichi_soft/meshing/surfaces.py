@@ -180,8 +180,7 @@ def _silent(log: logging.Logger) -> Iterator[None]:
 def _with_valid_normals(surface: Surface) -> Surface:
     """Recompute normals that point away from all triangles around their vertex.
 
-    Normals are kept if the triangles face inwards: most normals disagree with them, and the volume is
-    negative.
+    If most normals point away and the volume is negative, the triangles face inwards. Their normals are kept.
     """
     corners = surface.vertices[surface.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

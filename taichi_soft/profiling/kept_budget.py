@@ -54,8 +54,8 @@ class KeptBudget:
     late: float  # fraction of steps longer than the budget
     late_settled: float  # the same after the budget was met, or of all steps
     met_after: int | None  # steps until the budget was met; None if it was never met
-    deciding: Spread | None  # [ms]: frame without its step, in frames without a change
-    changing: Spread | None  # [ms]: the same in frames with changes; None without such frames
+    deciding: Spread | None  # [ms]: `frame` minus `step`, in frames without a change of level
+    changing: Spread | None  # [ms]: `frame` minus `step`, in frames with one; None without such frames
     frames_with_changes: int
     skipped: float  # fraction of skipped steps over all bodies
     levels: dict[int, int]  # number of bodies by level at the end

@@ -16,8 +16,8 @@ from taichi_soft.render.opencv import cv2
 from taichi_soft.render.raster import CENTER, Raster
 
 COARSE = int(COARSE_TEXELS)
-SIZE = 384  # texels along the sun's map
-CONTACT_SIZE = 192  # texels along the contact map, seen from the floor
+SIZE = 384  # texels per side of the sun's shadow map
+CONTACT_SIZE = 192  # texels per side of the contact map, seen from the floor
 # In units of the scene's size: blur of a shadow cast from just above the floor, and of one cast from
 # `FAR_HEIGHT` or more; blur and fade height of contact shadows.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3

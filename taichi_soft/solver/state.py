@@ -1,4 +1,4 @@
-"""All Taichi fields of one world: those of its bodies, and of what a game switches on."""
+"""All Taichi fields of one world: those of its bodies, and those of the features that it uses."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -34,28 +34,28 @@ _NO_CONTACT = ContactCapacity()
 
 @dataclass(frozen=True)
 class Capacity(BodyCapacity):
-    """Room in a state."""
+    """Capacity of a state, with that for contact."""
 
     contact: ContactCapacity = _NO_CONTACT
 
     @property
     def has_contact(self) -> bool:
-        """Whether there are fields of contact."""
+        """True if the state has fields of contact."""
         return self.contact != _NO_CONTACT
 
     @property
     def has_soft_contact(self) -> bool:
-        """Whether there are fields for bodies that touch each other."""
+        """True if the state has fields for contact between bodies."""
         return self.contact.soft
 
     @property
     def has_hulls(self) -> bool:
-        """Whether there are fields of hulls."""
+        """True if the state has fields of hulls."""
         return self.contact.hull
 
     @property
     def counts(self) -> dict[str, int]:
-        """As `BodyCapacity.counts`."""
+        """Numbers of rows, as `BodyCapacity.counts`, with those of contact."""
         colliders = self.contact.colliders
         return super().counts | {
             COLLIDER: colliders,
@@ -66,7 +66,7 @@ class Capacity(BodyCapacity):
 
 
 class State(BodyFields):
-    """The fields of bodies, and those of each slice that a world has."""
+    """The fields of bodies, and the groups of fields of the slices that a world uses."""
 
     capacity: Capacity
     grabs: GrabFields
@@ -78,7 +78,7 @@ class State(BodyFields):
     hull: HullFields
     jobs: JobFields
 
-    progress = declare(BODY, Progress, below={}, native=True)  # of each island
+    progress = declare(BODY, Progress, below={}, native=True)  # progress of each island
 
     GROUPS: ClassVar[dict[str, type[FieldGroup]]] = {
         "grabs": GrabFields,
@@ -93,29 +93,29 @@ class State(BodyFields):
     """Further groups of fields, by the attribute that holds them."""
 
     def __init__(self, capacity: Capacity) -> None:
-        """Allocate `capacity`; contents are zero until `load`."""
+        """Allocate fields of `capacity`, filled with zeros until `load`."""
         super().__init__(capacity)
         self.groups: dict[str, FieldGroup] = {}
         for name, kind in self.GROUPS.items():
             if not kind.when or getattr(capacity, kind.when):
                 self.groups[name] = kind(capacity, self.real)
                 setattr(self, name, self.groups[name])
-        # As `FieldGroup.declared`, of all groups; names are those of kernels, as `grabs.body`.
+        # `FieldGroup.declared` of all groups, with the names that kernels use, such as `grabs.body`.
         self.fields = self.declared()
         for prefix, group in self.groups.items():
             self.fields += [(f"{prefix}.{name}", each, field) for name, each, field in group.declared()]
-        # Fields that the next step, or a read before it, depends on: (field, column, width) by group of rows.
-        # All other fields are constant, follow from the assets, or are written in each step before they are
-        # read.
+        # Fields in a snapshot, by group of rows: (field, column, width). The next step, or a read before it,
+        # depends on them. All other fields are constant, follow from the assets, or are written in each step
+        # before they are read.
         self.kept = self._kept()
 
     @property
     def touching(self) -> Any:
-        """Where the fields are that say what of each body touches others."""
+        """Group of fields with the contact surfaces of bodies."""
         return self.hull if self.capacity.contact.hull else self
 
     def is_kept(self, declared: Declaration) -> bool:
-        """Whether snapshots have a field; rest shapes only change if a body can flow."""
+        """True if snapshots store a field. Rest shapes change only if a body is plastic."""
         return declared.keep != "" and (declared.keep != SHAPE or self.capacity.plastic)
 
     def _kept(self) -> dict[str, list[tuple[Any, int, int]]]:
@@ -127,14 +127,15 @@ class State(BodyFields):
         return found
 
     def write_surroundings(self, settings: Settings) -> None:
-        """Write what holds for all bodies: gravity, the floor of a world without colliders, how exact a step
-        is."""
+        """Write the settings common to all bodies: gravity, the floor of a world without colliders, tolerance
+        and iterations of implicit Euler, and the number of retries.
+        """
         floor = settings.floor or 0.0, settings.restitution or 0.0, settings.friction
         solver = settings.tolerance, settings.most_iterations
         write_surroundings(self, np.array([*settings.gravity, *floor, *solver, settings.retries]))
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
-        """As `BodyFields.load`."""
+        """Fill all groups from `scene`. The arguments are those of `BodyFields.load`."""
         if self.capacity.has_contact:
             self.islands.load(self.loader, len(scene.bodies))
         if self.capacity.has_hulls:

@@ -8,10 +8,10 @@ from taichi_soft.world.world import World
 
 
 def bare_world(**options: Any) -> World:
-    """Make a world without contact between bodies, sleep and room for more colliders, unless asked for.
+    """Make a world without contact between bodies, without sleep, and without room for more colliders.
 
-    For experiments, measurements and tests of one feature. Sleep would damp slow bodies, and contact between
-    bodies takes longer to compile.
+    Use it for experiments, measurements and tests of one feature: sleep would damp slow bodies, and contact
+    between bodies takes longer to compile. Options turn these features on.
     Args:
         options: arguments of `World`.
     """

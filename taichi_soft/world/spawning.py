@@ -120,8 +120,10 @@ def _place(
     rotation: ArrayLike | None,
     on_floor: bool,
 ) -> ArrayLike:
-    """Position of the mesh's origin, (3,) [m]; with `on_floor` its height is relative to standing on the
-    floor.
+    """Position of the mesh's origin, (3,) [m].
+
+    With `on_floor`, `position` is relative to a body that stands on the floor: its z is the height of the
+    lowest point above the floor.
 
     Raises: OptionError for invalid values, and for `on_floor` in a world without a floor.
     """

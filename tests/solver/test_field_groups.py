@@ -1,6 +1,6 @@
-"""Kernels say which groups of fields they touch, and only the owner of a group writes it.
+"""Docstrings of kernel files list the groups of fields that they use; only the owner of a group writes it.
 
-The groups are those of `State`. The particles, bodies and elements of `BodyFields` belong to all kernels.
+The groups are those of `State`. The fields of particles, bodies and elements in `BodyFields` have no owner.
 """
 
 import ast
@@ -18,10 +18,10 @@ pytestmark = pytest.mark.numpy
 ROOT = Path(taichi_soft.__file__).parent
 GROUPS = State.GROUPS
 ALIASES = {"touching": "hull"}
-"""Attributes of a state that stand for a group."""
+"""Other names of groups in a state."""
 
 FILLS_SLOTS = {"solver/kernels/spawn.py", "fracture/kernels/topology.py"}
-"""Kernels that begin a body in a slot write what a new body has in every group."""
+"""Kernels that place a body in a slot. They write its initial values in every group."""
 
 
 def kernel_files():
@@ -33,7 +33,7 @@ FILES = kernel_files()
 
 
 def path_of(node):
-    """Names from the root of `a.b[i].c`, with the indices left out."""
+    """Names in a path such as `a.b[i].c`, without indices: a, b, c."""
     names = []
     while isinstance(node, (ast.Attribute, ast.Subscript)):
         if isinstance(node, ast.Attribute):
@@ -43,7 +43,7 @@ def path_of(node):
 
 
 def group_of(names, known):
-    """The group that a path leads into, and the field there."""
+    """Group of fields to which a path belongs, or None."""
     if names and names[0] in known:
         names = ["state", known[names[0]], *names[1:]]
     if len(names) < 2 or names[0] != "state":
@@ -53,7 +53,7 @@ def group_of(names, known):
 
 
 def touched(tree):
-    """Groups that the functions of a file read, and those that they write."""
+    """Groups that the functions of a file only read, and groups that they write."""
     read, written = set(), set()
     for function in ast.walk(tree):
         if not isinstance(function, ast.FunctionDef):
@@ -85,7 +85,7 @@ def pairs(target, value):
 
 
 def targets(node):
-    """What a statement assigns to."""
+    """Indexed targets of a statement or an atomic operation."""
     if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("ti.atomic"):
         return node.args[:1]
     found = node.targets if isinstance(node, ast.Assign) else []
@@ -97,7 +97,7 @@ def targets(node):
 
 
 def as_said(read, written):
-    """How the docstring of a file says what it touches."""
+    """Sentence that the docstring of a file must contain; "" if it uses no groups."""
     parts = [f"reads {', '.join(sorted(read))}"] if read else []
     parts += [f"writes {', '.join(sorted(written))}"] if written else []
     return f"Groups of fields: {'; '.join(parts)}." if parts else ""

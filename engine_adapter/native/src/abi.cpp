@@ -497,7 +497,7 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
 }
 
 #if defined(__wasm__)
-// Ends a `Frame` that an exception of JavaScript has left.
+// Ends a `Frame` that a JavaScript exception left open.
 TS_API ts_result ts_web_end_frame(ts_world world) {
   worlds().find(world)->end_frame();
   return TS_OK;

@@ -182,8 +182,8 @@ struct Fields {
   }
 };
 
-// Whole numbers of a field lie from 0 to the number of things plus `beside`, not included. The size of floats
-// is at most `most`; if that is infinite, they may be anything.
+// Bounds of a field. Integers are at least 0 and less than the number of `things` plus `beside`. The absolute
+// values of floats are at most `most`; infinity means no bound.
 struct Bound {
   enum Things { kNothing, kParticles, kBodies, kColliders, kFrames };
   const char* field;

@@ -75,7 +75,10 @@ class Player:
 
 
 def play(player: Player, is_fast: bool) -> None:
-    """Play until `play.py` reports that both know all inputs. With `is_fast` it also drives the clock."""
+    """Play until `play.py` reports that both players know all inputs.
+
+    Args: is_fast: True if `play.py` also drives the clock.
+    """
     due = time.monotonic()
     while True:
         if not is_fast:

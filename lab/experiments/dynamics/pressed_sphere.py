@@ -63,7 +63,7 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
-    """The same force with a plane that rises, from the impulse that it reports."""
+    """Force on a plane that rises by each depth against the sphere [N], from the impulse on the plane."""
     ground = float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))

@@ -1,4 +1,4 @@
-"""The horizontal floor: an inelastic or restituting plane with Coulomb friction."""
+"""The horizontal floor: a plane with restitution and Coulomb friction."""
 
 from taichi_soft.core.runtime import ti
 

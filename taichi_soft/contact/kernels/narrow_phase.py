@@ -119,12 +119,12 @@ def _merge_contacts(soft: ti.template(), lost, kept):
 
 @ti.func
 def _merge_duplicate_contacts(soft: ti.template(), first, at, lead):
-    """Of contacts that push a vertex in the same direction keep the nearest: this one, or an earlier one.
+    """Keep the nearest of the contacts that push a vertex in the same direction: this or an earlier one.
 
-    It inherits the impulses of the other, so that a vertex that crosses an edge stays supported. In front of
-    an edge, the distances to both triangles are equal up to rounding. There the triangle that carries the
-    load keeps it: the other distributes friction to other corners, and each change would be a jolt that keeps
-    heaps from coming to rest.
+    The nearest contact inherits the impulses of the others, so that a vertex that crosses an edge stays
+    supported. In front of an edge, the distances to both triangles are equal up to rounding. There the
+    triangle that carries the load keeps its contact: the other triangle distributes friction to other
+    corners, and each change would be a jolt that prevents heaps from coming to rest.
 
     Args:
         first, at: rows of `near_slot`: that of the vertex's first contact, and of this one.

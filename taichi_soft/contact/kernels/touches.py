@@ -86,8 +86,8 @@ def read_touches(
     """Read the status of all bodies, and the pairs that touched in the last step, in a fixed order.
 
     Args:
-        status: (bodies + 2,): the statuses of the last call, or 0. Receives the present ones, then not 0 if
-            the table was too small for all pairs, then the number of rows written.
+        status: (bodies + 2,): the statuses from the last call, zeros in the first. Receives the current
+            statuses, then 1 if the table was too small for all pairs, then the number of rows written.
         who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
         impulses: (rows, 3): impulse of the first on the second [N s].
     """

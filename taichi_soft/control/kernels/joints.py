@@ -63,12 +63,12 @@ class JointFields(FieldGroup):
     )
     # Largest closing speed of a gap.
     draw_speed = declare(MOST_JOINTS, ti.f32, unit="m/s", keep=ALL_JOINTS, most=FINITE)
-    # On the first body in the last step.
+    # Impulse on the first body in the last step.
     impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
     share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # of the last impulse
-    # On the first end, in the last substep.
+    # Impulse on the first end in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap
     is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if it is the first end of a row

@@ -104,7 +104,7 @@ class FirstLaunches:
         self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its arrays, digest
 
     def make_flag(self) -> None:
-        """Create the field that short bodies set, when Taichi starts."""
+        """Create the flag that short bodies set. Called when Taichi starts."""
         self._flag = ti.field(ti.i32, ())
 
     def open(self, known: KnownKernels) -> None:

@@ -48,7 +48,7 @@ class ElementModel:
 
     @property
     def has_simple_edges(self) -> bool:
-        """True if an edge needs only its two ends, and the pull of its tetrahedra."""
+        """True if the force of an edge depends only on its two ends and the pull of its tetrahedra."""
         return not isinstance(self.law, BondLaw) or self.law.ring in (Ring.NONE, Ring.EXPANSION)
 
     @property

@@ -8,13 +8,13 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 
 @ti.func
 def whole_substep(lag, h, s):
-    """Forces act for the whole substep [s]."""
+    """Time for which forces act in a substep: all of it [s]."""
     return h
 
 
 @ti.func
 def before_each(h, s, substeps):
-    """External forces act for the whole substep, before it [s]."""
+    """Time for which external forces act before a substep: all of it; 0 after the last substep [s]."""
     return ti.select(s < substeps, h, 0.0)
 
 

@@ -68,7 +68,7 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        # Skip touched particles: between contact impulses, a weight on them would creep.
+        # Skip touched particles: damping them between contact impulses would make a weight on them creep.
         if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)

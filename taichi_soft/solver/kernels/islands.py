@@ -109,7 +109,7 @@ def _join_held(state: ti.template()):
 
 @ti.func
 def _is_listed(state: ti.template(), body, end):
-    """1 if a body, whose parent is the root, and its root have a status below `end`."""
+    """1 if a body and its root have a status below `end`. The parent of the body must be the root."""
     root = state.islands.parent[body]
     return int(state.body_status[body] < end) & int(state.body_status[root] < end)
 

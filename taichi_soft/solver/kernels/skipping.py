@@ -31,10 +31,11 @@ def begin_skips(state: ti.template(), body_count: ti.i32):
 
 @ti.kernel
 def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
-    """Make the bodies that skipped a step active again. They are drawn where they are, touched nothing, and
-    lose the forces of force fields.
+    """Make the bodies that skipped a step active again.
 
-    Returns: how many skipped it.
+    Frames draw them at their current positions. Their contacts and the forces of force fields are cleared.
+
+    Returns: the number of bodies that skipped the step.
     """
     skipped = 0
     ti.loop_config(serialize=True)
