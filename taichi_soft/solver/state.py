@@ -1,7 +1,10 @@
 """All Taichi fields of one world: those of its bodies, and those of the features that it uses."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any, ClassVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +68,10 @@ class Capacity(BodyCapacity):
         }
 
 
+_FIELDS: WeakKeyDictionary[State, list[tuple[str, Declaration, Any]]] = WeakKeyDictionary()
+"""`State.fields`. As attributes of a state, declarations would be part of the keys of cached kernels."""
+
+
 class State(BodyFields):
     """The fields of bodies, and the groups of fields of the slices that a world uses."""
 
@@ -100,14 +107,18 @@ class State(BodyFields):
             if not kind.when or getattr(capacity, kind.when):
                 self.groups[name] = kind(capacity, self.real)
                 setattr(self, name, self.groups[name])
-        # `FieldGroup.declared` of all groups, with the names that kernels use, such as `grabs.body`.
-        self.fields = self.declared()
+        _FIELDS[self] = self.declared()
         for prefix, group in self.groups.items():
-            self.fields += [(f"{prefix}.{name}", each, field) for name, each, field in group.declared()]
+            _FIELDS[self] += [(f"{prefix}.{name}", each, field) for name, each, field in group.declared()]
         # Fields in a snapshot, by group of rows: (field, column, width). The next step, or a read before it,
         # depends on them. All other fields are constant, follow from the assets, or are written in each step
         # before they are read.
         self.kept = self._kept()
+
+    @property
+    def fields(self) -> list[tuple[str, Declaration, Any]]:
+        """`FieldGroup.declared` of all groups, with the names that kernels use, such as `grabs.body`."""
+        return _FIELDS[self]
 
     @property
     def touching(self) -> Any:
