@@ -11,7 +11,7 @@ from taichi_soft import Contact, Material, SoftBodyAsset, World, box
 
 TOY = Path(__file__).with_name("elephant.glb")  # a copy of assets/elephant.glb
 
-world = World(floor=None)
+world = World(floor=None, sleep_speed=0.05, collider_room=8)
 plush = Material(young=3e4, poisson=0.4, density=200, damping_ratio=0.1)
 elephant = SoftBodyAsset.from_surface(
     TOY, plush, cells=5, up="y", contact=Contact(friction=0.9, thickness=0.005)
