@@ -95,10 +95,10 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 def _prism_tets(triangles: NDArray[np.integer], stride: int, layers: int, levels: int) -> NDArray[np.int64]:
-    """Three tetrahedra for every prism between a level and the next (the first level may follow the last).
+    """Return three tetrahedra for each prism between one level and the next; the first can follow the last.
 
-    Vertex i of the triangulation is vertex i + level * stride. In each side face of a prism the diagonal
-    starts at the lower of the two vertex numbers below. Neighbours choose the same one, so their faces match.
+    Vertex i of the triangulation is vertex i + level * stride. The diagonal of a prism's side face starts at
+    the lower-numbered of its two bottom vertices. Neighbours use the same diagonal, so their faces match.
     """
     a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
     level = np.arange(layers)[:, None] * stride

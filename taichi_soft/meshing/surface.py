@@ -19,7 +19,7 @@ class Surface:
     vertices: FloatArray  # (n, 3) [m]
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
-    visual: Any = None  # trimesh's: texture coordinates, material, colours; None without any
+    visual: Any = None  # trimesh visual: texture coordinates, material, colours; None without any
     notes: tuple[str, ...] = ()  # what the reader assumed, repaired or skipped, one sentence each
 
 
@@ -32,10 +32,10 @@ def surface_of(
     visual: Any = None,
     notes: tuple[str, ...] = (),
 ) -> Surface:
-    """Make a surface from checked copies.
+    """Make a surface from copies of the arrays, after checking them.
 
     Args:
-        normals: (n, 3), of any length. Where None, NaN or 0, the triangles around the vertex decide.
+        normals: (n, 3), of any length. Normals that are None, NaN or 0 are computed from the triangles.
     Raises: MeshError for invalid vertices or triangles.
     """
     points = as_points(vertices)
@@ -54,7 +54,7 @@ def surface_of(
 
 
 def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Concatenate surfaces: vertices (n, 3) [m] and triangles (m, 3)."""
+    """Concatenate surfaces. Returns: vertices (n, 3) [m] and triangles (m, 3)."""
     starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
     triangles = [
         each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)
@@ -63,7 +63,7 @@ def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]
 
 
 def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
-    """Means of the normals of the triangles around each vertex, weighted by their angles there, (n, 3)."""
+    """Unit normals of vertices, (n, 3): means of the triangles' normals, weighted by their angles there."""
     corners = points[triangles]
     to_next, to_previous = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     across = np.cross(to_next, to_previous)  # along the normal, at each corner

@@ -17,7 +17,7 @@ LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 
 
 
 def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
-    """Edges (k, 2), rows i < j in ascending order, and the rows of each tetrahedron's edges (m, 6)."""
+    """Return edges (k, 2), i < j, in ascending order; and the rows of each tetrahedron's edges, (m, 6)."""
     pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
     stride = int(tets.max()) + 1
     keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
