@@ -1,7 +1,7 @@
-"""Kernels for queries between steps: rays, closest points, overlaps. They change nothing.
+"""Kernels for queries between steps: rays, closest points, overlaps. They do not change the motion.
 
-Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. So the first
-face of the first body wins a tie, for any number of threads.
+Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. In a tie, the
+first face of the first body is therefore returned, for any number of threads.
 """
 
 from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_result
