@@ -120,7 +120,7 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
-    """Gradient of each tetrahedron's size at its corner `vertices` (k,), by finite differences, (k, 3)."""
+    """Numerical gradient (k, 3) of each tetrahedron's size with respect to its corner `vertices` (k,)."""
     rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
     own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
     step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)

@@ -12,7 +12,7 @@ DEFAULT_CREASE = 60.0
 of an icosahedron (42), smaller than between faces of a box (90)."""
 
 _COSINE_TOLERANCE = 1e-9
-"""Tolerance of the cosine, so that rounding does not split triangles that bend by just the crease angle."""
+"""Tolerance of the cosine: rounding must not split triangles that bend by exactly the crease angle."""
 
 
 def split_at_creases(
@@ -60,8 +60,8 @@ def _neighbours(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return, for each side of each triangle, the same side in its neighbour, and the cosine of the bend.
 
-    Sides are numbered by the corner at which they begin. Among several neighbours, the one that bends least
-    counts. The cosine is -2 if there is no neighbour. A triangle without area counts as flat.
+    Sides are numbered by the corner at which they begin. If a side has several neighbours, the one that bends
+    least is used. The cosine is -2 if there is no neighbour. A triangle without area counts as coplanar.
     """
     a, b, c = (positions[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)

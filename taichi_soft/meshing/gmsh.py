@@ -25,7 +25,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
             "Nodes": _section(path, found, "NOD"),
             "Elements": _modern_elements(path, _section(path, found, "ELM")),
         }
-    # Binary files may lack the line break before `$End...`; a second one is harmless.
+    # Binary files can lack the line break before `$End...`; a second one is harmless.
     return b"".join(
         b"$%b\n%b\n$End%b\n" % (name.encode(), _section(path, found, name), name.encode()) for name in NEEDED
     )
@@ -40,7 +40,7 @@ def _section(path: Path, sections: dict[str, bytes], name: str) -> bytes:
 
 
 def _sections(path: Path, content: bytes) -> dict[str, bytes]:
-    """Return the bytes of each section by name. Parse in order, because binary data can contain any bytes."""
+    """Return the bytes of each section by name, parsed in order, because binary data can contain anything."""
     sections: dict[str, bytes] = {}
     position = 0
     while opening := OPENING.match(content, position):

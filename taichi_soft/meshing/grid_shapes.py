@@ -62,7 +62,7 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
 
 
 def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh:
-    """Make a body with one cell for every True in a grid: frames, letters, scanned shapes.
+    """Make a body with one cell for every True in a grid, such as a frame, a letter or a scanned shape.
 
     Args:
         mask: bool (nx, ny, nz), True for filled cells. The bounding box of the filled cells is centred at

@@ -1,7 +1,7 @@
 """Remove the few tetrahedra that force small time steps, by flips, collapses and vertex moves.
 
 Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity. It
-applies those with the largest gain that share no vertex, so the smallest size of the mesh never decreases.
+applies the changes with the largest gain that share no vertex: the smallest size of the mesh never decreases.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MIN_GAIN = 1.02  # factor by which the smallest size of a cavity must grow, so 
 _VOLUME_TOLERANCE = 0.01  # total change of volume at the surface, relative to the body's volume
 _MIN_NORMAL_COSINE = 0.77  # limit between the normals of a new surface triangle and the old ones
 _DRIFT_PENALTY = 0.9  # relative reduction of a gain that uses the full surface tolerance
-_FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex may slide
+_FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex can slide
 _GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, relative to the step to the target size
 _RANDOM_STEPS = (
     0.1,
@@ -49,7 +49,7 @@ class Improved(NamedTuple):
 def improve(
     vertices: FloatArray, tets: IntArray, surface: IntArray, *, size: float | None, tolerance: float
 ) -> Improved | None:
-    """Improve a mesh until its tetrahedra have at least a given size, where possible.
+    """Improve a mesh until its tetrahedra have at least a given size, if possible.
 
     Args:
         size: smallest size, as `cavities.sizes` defines it [m]; None: `SMALL` times the median.

@@ -178,7 +178,7 @@ def _quiet(failure: str) -> Iterator[io.StringIO]:
 
 def _reason(error: BaseException) -> str:
     text = " ".join(str(error).split())[:200]
-    if isinstance(error, KeyError):  # its text is only the key
+    if isinstance(error, KeyError):  # its text is only the missing key
         return f"meshio does not know {text}: if that is a kind of cell, save only the tetrahedra"
     if not text:
         return (

@@ -123,7 +123,7 @@ class _Bins:
     """Elements sorted into bins by their centroids."""
 
     def __init__(self, corners: FloatArray) -> None:
-        """Args: corners: corners of each element, (m, c, 3)."""
+        """Sort elements into bins. Args: corners: corners of each element, (m, c, 3)."""
         self.centroids = corners.mean(axis=1)
         self.radius = float(np.linalg.norm(corners - self.centroids[:, None], axis=2).max())
         self.search_range = self.radius  # `candidates` finds all elements within this distance
@@ -136,7 +136,7 @@ class _Bins:
         self._begins = np.cumsum(self._counts) - self._counts
 
     def candidates(self, points: FloatArray) -> tuple[Ints, Ints]:
-        """All pairs of a point and an element in its bin or an adjacent one."""
+        """Indices of all pairs of a point and an element in the point's bin or an adjacent one, (k,) each."""
         places = np.floor(points / self._pitch) - self._low
         is_in = ((places >= 1) & (places < self._shape - 1)).all(axis=1)
         inner, own_bin = np.flatnonzero(is_in), self._bins(points[is_in])

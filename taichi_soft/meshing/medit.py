@@ -25,7 +25,7 @@ KEYWORD = re.compile(rb"(?<![\w.+-])([A-Za-z]\w*)")
 def mesh_sections(path: Path, content: bytes) -> bytes:
     """Return a Medit file with only the vertices and cells, in the layout that meshio reads.
 
-    Raises: MeshError if the content is not such a file, or a section does not match its count.
+    Raises: MeshError if the content is not a Medit text file, or a section does not match its count.
     """
     _, *words = KEYWORD.split(re.sub(rb"#[^\n]*", b"", content))
     if not words or words[0] != b"MeshVersionFormatted":

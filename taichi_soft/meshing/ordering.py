@@ -60,9 +60,9 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
 def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     """Choose which end owns each edge, so that most vertices own a multiple of `group` edges.
 
-    Greedy: every vertex first takes as many full groups as its edges allow. Then the vertex with most unowned
-    edges takes them all, repeatedly. Finally, partly full groups move to vertices with free places. Groups
-    are much fuller than if the lower number owned every edge.
+    The method is greedy. Every vertex first takes as many full groups as its edges allow. Then the vertex
+    with the most unowned edges takes them all, repeatedly. Finally, edges of partly full groups move to
+    vertices with free places. Groups are much fuller than if the end with the lower number owned every edge.
     Args:
         edges: (k, 2) vertex indices.
     Returns: vertex that owns each edge, int32 (k,).

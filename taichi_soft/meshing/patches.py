@@ -31,7 +31,7 @@ def pairs(first_of: Ints, second_of: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 def area_vectors(p: FloatArray) -> FloatArray:
-    """Vectors (k, 3) along the normals of triangles (k, 3, 3), twice their areas long [m^2]."""
+    """Normal vectors (k, 3) of triangles (k, 3, 3), with twice the areas as lengths [m^2]."""
     return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 

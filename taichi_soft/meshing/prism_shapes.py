@@ -15,7 +15,7 @@ def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: fl
     """Extrude a flat triangulation along z, from -height/2 to height/2.
 
     Args:
-        points: (n, 2) points in the plane [m]; their bounding box is moved to the origin.
+        points: (n, 2) points in the plane [m]. The bounding box of the result is centred at the origin.
         triangles: (t, 3) vertex indices, in either orientation.
         layers: number of layers of prisms.
         height: total height [m].

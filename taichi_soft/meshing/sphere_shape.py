@@ -101,7 +101,7 @@ def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
     angle = np.arccos(face[0] @ face[1])
     # Sines of fractions of the angle give even spacing along a great circle, the same from both sides.
     weights = np.sin(lattice[:, :3] / np.maximum(step, 1)[:, None] * angle)
-    direction = (weights[:, :, None] * face).sum(axis=1)  # in a fixed order on every machine
+    direction = (weights[:, :, None] * face).sum(axis=1)  # summed in a fixed order on every machine
     length = np.linalg.norm(direction, axis=1)
     radius = step / lattice.sum(axis=1)
     points: FloatArray = direction * (radius / np.where(length > 0, length, 1.0))[:, None]

@@ -17,7 +17,7 @@ class InnerFaces(NamedTuple):
     """Faces between two tetrahedra."""
 
     tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each face, the lower number first
-    corners: NDArray[np.int64]  # (f, 2, 3) the face's vertices as corners of each tetrahedron
+    corners: NDArray[np.int64]  # (f, 2, 3) its vertices as corners of both tetrahedra, in the same order
 
 
 def inner_faces(tets: IntArray) -> InnerFaces:
@@ -48,7 +48,7 @@ def split_vertices(
     is_touched[tets[cut_tets[:, :1], cut_corners[:, 0]]] = True
 
     flat = tets.ravel()
-    loose = np.flatnonzero(is_touched[flat])  # corners of tetrahedra whose vertex may be split
+    loose = np.flatnonzero(is_touched[flat])  # corners of tetrahedra whose vertex can be split
     row = np.full(len(flat), -1)
     row[loose] = np.arange(len(loose))
     links = row[

@@ -23,7 +23,7 @@ VERTEX = rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)"
 
 
 def read_stl(path: Path) -> list[Surface]:
-    """Read the surfaces of a .stl file, in its own axes and units. Normals are those of the triangles.
+    """Read the surfaces of a .stl file, in its own axes and units. Each vertex has its triangle's normal.
 
     Raises: MeshError if the file is cut short or has invalid numbers.
     """

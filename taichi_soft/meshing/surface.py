@@ -20,7 +20,7 @@ class Surface:
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
     visual: Any = None  # trimesh visual: texture coordinates, material, colours; None without any
-    notes: tuple[str, ...] = ()  # what the reader assumed, repaired or skipped, one sentence each
+    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or skipped
 
 
 def surface_of(
@@ -75,6 +75,6 @@ def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
 
 
 def unit(rows: NDArray[Any]) -> FloatArray:
-    """Normalise rows. A row of length 0 becomes (0, 0, 1)."""
+    """Return rows scaled to length 1. A row of length 0 becomes (0, 0, 1)."""
     lengths = np.linalg.norm(rows, axis=-1, keepdims=True)
     return np.where(lengths > 0, rows / np.where(lengths > 0, lengths, 1.0), [0.0, 0.0, 1.0])

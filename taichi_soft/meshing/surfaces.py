@@ -45,7 +45,7 @@ def read_surfaces(
     """Read all triangle meshes of a file or an object, each with its own vertices.
 
     Vertices have the order of the file. Some files (.obj, some .ply and .off) index texture coordinates,
-    normals or colours by the corner of a face. Where these differ, vertices are copied. Copies follow all
+    normals or colours by the corner of a face. If these differ, vertices are copied. Copies follow all
     other vertices, ordered by vertex and then by their first corners. Each mesh of an .obj file, one for each
     material, has only the vertices that it uses.
 
@@ -112,7 +112,7 @@ def _read(path: Path) -> list[Surface]:
     except MeshError as error:
         words = str(error).removeprefix(f"{path.name}: ")
         raise MeshError(f"{path.name}: {words}") from None
-    except Exception as error:  # readers raise many kinds on damaged files
+    except Exception as error:  # readers raise many kinds of exceptions on damaged files
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise MeshError(f"{path.name}: cannot be read ({reason})") from None
     if not found:

@@ -126,9 +126,9 @@ class TetMesh(BodyMesh):
             min_size: size below which a tetrahedron is improved [m]; None: 0.3 of the median size.
             tolerance: largest displacement of the surface [m]; None: a quarter of the mean edge, at most 1 %
                 of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
-            return_source: also return the tetrahedron of this mesh that each new one replaces, int32 (m,):
-                `values[source]` carries over values per tetrahedron. A border between materials can shift by
-                a few tetrahedra.
+            return_source: True to return also the tetrahedron of this mesh that each new one replaces, int32
+                (m,): `values[source]` transfers values per tetrahedron. A border between materials can shift
+                by a few tetrahedra.
         Returns: the improved mesh, or this mesh itself if nothing was improved.
         Raises: OptionError if min_size or tolerance is not positive.
         """

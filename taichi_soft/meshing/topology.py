@@ -1,4 +1,4 @@
-"""Edges and faces of tetrahedra: index arrays in, index arrays out."""
+"""Compute the edges and faces of tetrahedra from index arrays."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def surface_of(tets: IntArray) -> IntArray:
     """Triangles (f, 3) that belong to only one tetrahedron, wound outwards, in the order of `tets`.
 
     The tetrahedra must have positive volume.
-    Raises: MeshError if more than two of them share a face, or two lie on the same side of one.
+    Raises: MeshError if more than two of them share a face, or if two lie on the same side of their face.
     """
     faces = tets[:, LOCAL_FACES].reshape(-1, 3)
     order, starts, counts = groups(np.sort(faces, axis=1))

@@ -64,7 +64,7 @@ def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
 
     Args:
         mesh: Delaunay tetrahedra, such as those of `delaunay_mesh`.
-    Raises: MeshError if the mesh is not Delaunay; OptionError without scipy.
+    Raises: MeshError if the mesh is not Delaunay; OptionError if scipy is missing.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"a Voronoi graph needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
@@ -96,7 +96,7 @@ def _graph_of(original: TetMesh, mesh: TetMesh) -> VoronoiGraph:
 
 
 class _Neighbours:
-    """Pairs of vertices whose cells may touch, and the neighbours of each vertex."""
+    """Pairs of vertices whose cells can touch, and the neighbours of each vertex."""
 
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
@@ -145,7 +145,7 @@ class _Neighbours:
 
 
 def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
-    """Unclipped Voronoi face of each pair, right-handed about its direction; sides are labelled by vertex."""
+    """Unclipped Voronoi face of each pair, right-handed about its direction; labels are vertices."""
     ends = mesh.vertices[neighbours.pairs]
     axis = (ends[:, 1] - ends[:, 0]) / neighbours.length[:, None]
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]

@@ -38,7 +38,7 @@ class _Content:
     corners: list[tuple[int, int, int]] = field(default_factory=list)  # row of each, NONE if missing
     counts: list[int] = field(default_factory=list)  # corners of each face
     material: list[int] = field(default_factory=list)  # material of each face
-    materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # numbers by name
+    materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # material numbers by name
     libraries: list[bytes] = field(default_factory=list)
     objects: set[str] = field(default_factory=set)
     skipped: dict[str, int] = field(default_factory=dict)

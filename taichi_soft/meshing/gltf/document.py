@@ -93,8 +93,8 @@ class Document:
         Args:
             number: number of the accessor.
             types: allowed values of its `type`, such as "VEC3".
-        Raises: MeshError, before memory is allocated, for an accessor of another type or beyond the end of
-            its buffer.
+        Raises: MeshError, before memory is allocated, for an accessor of another type, or one that extends
+            beyond the end of its buffer.
         """
         entry, name = self.named("accessors", number), f"accessor {number}"
         kind, count = entry.get("type"), read_count(entry, "count", name)

@@ -74,7 +74,7 @@ class Primitive:
 
     @property
     def vertex_count(self) -> int:
-        """Number of positions."""
+        """Number of vertices."""
         if "POSITION" in self._compressed:
             return len(self._compressed["POSITION"])
         number = self._attributes["POSITION"]

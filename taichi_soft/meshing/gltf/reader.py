@@ -47,7 +47,7 @@ class _Part:
     vertices: FloatArray  # (n, 3) [m]
     triangles: NDArray[np.int64]  # (m, 3)
     normals: FloatArray | None  # (n, 3), of any length; None if the file has none
-    visual: Any  # trimesh's, or None
+    visual: Any  # trimesh visual, or None
 
 
 def read_gltf(path: Path) -> list[Surface]:
