@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 
 PASSES = 8
 HALVINGS = 5
-"""Largest number of halvings of a move that would spoil a tetrahedron, before the pass drops the move."""
+"""Largest number of halvings of a move that makes a tetrahedron invalid, before the pass drops the move."""
 
 SHARPEST, FLATTEST = 20.0, 145.0
 """Smallest and largest dihedral angle allowed [degrees]."""

@@ -235,7 +235,7 @@ def around(cubes: Bools) -> Bools:
 
 
 def balanced(splits: list[Bools]) -> list[Bools]:
-    """Halve more cubes, so that cubes that touch differ by one octave at most."""
+    """Return splits with more halved cubes, so that cubes that touch differ by at most one octave."""
     found = list(splits)
     for octave in range(len(found) - 1, 0, -1):
         found[octave - 1] = found[octave - 1] | halved(around(found[octave]))

@@ -126,7 +126,7 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
-    """Index in `chosen` of the nearest vertex along edges, (n,); for vertices without a path, their patch's.
+    """Index in `chosen` of the vertex nearest along edges, (n,); without a path, of the patch's vertex.
 
     Triangles between these nearest vertices surround their corners. Triangles between patches would fold over
     if the point of a patch lies at its rim.
@@ -150,7 +150,7 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
-    """Return representatives of patches of size `cell` [m] and then the other tips; each vertex's patch."""
+    """Return points (representatives of patches of size `cell` [m], then other tips), and all patches."""
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)
     representatives = _representatives(vertices, normals, tips, patch, len(patches))

@@ -18,7 +18,7 @@ MIN_FILL = 0.4
 vertices move inwards more easily."""
 
 TRACE = 0.02
-"""The same for limbs and sheets that are thinner than a cube and would otherwise be missed."""
+"""The same fraction at limbs and sheets that are thinner than a cube and would otherwise be missed."""
 
 LAYER = 2
 """Largest thickness of a flat layer, in tetrahedra from face to face."""

@@ -53,8 +53,8 @@ def mesher_mesh(
         triangles: (m, 3).
         cell_size: target length of the edges [m].
         time_limit: time after which the process is killed [s].
-    Raises: MissingExtraError without the method's package; MeshError, with the method's own message, if it
-        fails, crashes or takes too long.
+    Raises: MissingExtraError if the method's package is missing; MeshError, with the method's own message, if
+        it fails, crashes or takes too long.
     """
     require_extra(method, f"method {method!r} needs")
     points, corners = welded(vertices, triangles)

@@ -1,12 +1,12 @@
 """Find the part of space that a surface encloses, even if its triangles have defects.
 
-Rays run through the surface along the three axes. The winding number along a ray is the sum of the signed
-crossings behind. It is exact between any two crossings, so a sheet thinner than a voxel keeps its volume. If
-the surface is closed, the winding number is an integer and returns to 0 at the end of the ray.
+Rays run through the surface along the three axes. The winding number at a point of a ray is the sum of the
+signed crossings before it. It is exact between any two crossings, so a sheet thinner than a voxel keeps its
+volume. If the surface is closed, the winding number is an integer and returns to 0 at the end of the ray.
 
-A ray that does not return to 0 crossed a hole, a flipped face or an inner wall. There the rays along the
-other axes decide. If none of the three is closed, the mean over both directions of all three decides: the
-generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
+A ray that does not return to 0 crossed a hole, a flipped face or an inner wall. In its voxels, the rays along
+the other axes decide. If no ray of a voxel returns to 0, the mean over both directions of all three decides:
+the generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ PITCH = 0.25
 """Distance between sample points of the surface, in cells."""
 
 FINE_PITCH = 1 / 24
-"""The same at missed parts."""
+"""Distance between sample points at missed parts, in cells."""
 
 MISSED_DISTANCE = 1.25
 """Distance from the cage, in cells, beyond which a point counts as missed. Rounded corners are nearer."""
@@ -64,7 +64,7 @@ CHUNK = 1 << 20
 def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
     """Sample points on triangles (m, 3, 3), at least one in each and at most about `pitch` [m] apart.
 
-    Returns: (k, 3) [m], and the triangle of each, (k,).
+    Returns: points (k, 3) [m], and the triangle of each, (k,).
     """
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -113,8 +113,8 @@ class Thin:
     Infinity if there are none.
     """
 
-    kept: float  # of those that smaller cells keep
-    lost: float  # of those that the cage leaves out
+    kept: float  # thinnest that smaller cells keep
+    lost: float  # thinnest that the cage leaves out
     octaves: int  # number of halvings of cells
 
     def notes(self, cell_size: float) -> tuple[str, ...]:
@@ -142,13 +142,13 @@ class Thin:
 
 @dataclass(frozen=True, eq=False)
 class MissedParts:
-    """Parts that a cage should cover and does not."""
+    """Parts of a surface that a cage should cover but does not."""
 
     cubes: (
         Bools  # True for cubes with surface but without cage, and for cubes in which a part leaves the cage
     )
     bare: Bools  # True for those cubes that contain no vertex of the cage
-    thickness: FloatArray  # of the limb or sheet, of the shape of the lattice; infinity elsewhere [m]
+    thickness: FloatArray  # of the limb or sheet in each cube [m]; infinity elsewhere
     points: FloatArray  # (k, 3), on the surface in or next to these cubes [m]
 
     @property

@@ -17,7 +17,7 @@ MAX_VOXELS = 1 << 22
 """Number of voxels above which coarser voxels are used, down to `MIN_VOXELS_PER_CUBE`."""
 
 MAX_FINE_VOXELS = 1 << 21
-"""The same for the finer voxels that find missed limbs."""
+"""Number of voxels above which coarser voxels are used in the search for missed limbs."""
 
 MAX_OPEN_FRACTION = 0.5
 """Fraction of the rays into a surface that do not leave it again, above which it counts as an open sheet."""

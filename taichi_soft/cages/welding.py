@@ -18,7 +18,7 @@ def places_of(vertices: FloatArray, size: float) -> Ints:
 
     Args: size: longest side of the bounding box of the vertices in use [m].
     """
-    positions = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # -0.0 is 0.0
+    positions = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # turns -0.0 into 0.0
     return np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1)
 
 
