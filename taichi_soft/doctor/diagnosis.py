@@ -37,7 +37,7 @@ THIN = 0.5
 """Solid fraction of a tetrahedron below which it counts as thin."""
 
 MOST_THIN = 0.3
-"""Largest acceptable fraction of the solid in thin tetrahedra; every surface has some."""
+"""Largest acceptable fraction of the solid in thin tetrahedra. Every surface has some thin tetrahedra."""
 
 TRIALS = 30
 """Number of timed frames."""

@@ -24,8 +24,8 @@ class SurfaceFacts:
     triangles: int
     parts: int  # connected components by shared vertices
     size: float  # longest side of the bounding box [m]
-    open_edges: int  # edges of one triangle
-    crowded_edges: int  # edges of more than two triangles
+    open_edges: int  # edges that belong to only one triangle
+    crowded_edges: int  # edges that belong to more than two triangles
     turned_edges: int  # edges that both triangles traverse in the same direction
     flat_triangles: int  # triangles without area
     repeated_triangles: int
