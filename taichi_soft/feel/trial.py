@@ -78,8 +78,8 @@ class Trial:
     def ring_down(self, material: Material, mode: Floats, period: float) -> tuple[float, float]:
         """Let the body vibrate in a mode, without contact and gravity.
 
-        Each sample of a damped wave is a linear combination of the two before it, whose coefficients give
-        frequency and decay (Prony 1795). They are fitted by least squares over all samples.
+        Each sample of a damped wave is a linear combination of the two samples before it. The coefficients
+        give frequency and decay (Prony 1795), and are fitted by least squares over all samples.
         Args:
             mode: (n, 3), with a largest entry of 1.
             period: approximate period of the mode [s].
