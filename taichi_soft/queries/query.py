@@ -36,7 +36,7 @@ def next_above(limit: float) -> float:
 def as_body_indices(
     bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None]
 ) -> NDArray[np.int32]:
-    """Indices of the bodies to test, ascending; all bodies for None. Raises: OptionError.
+    """Return the indices of the bodies to test, ascending; None selects all bodies. Raises: OptionError.
 
     Args: handles: the body in each slot, None for an empty slot.
     """
