@@ -44,9 +44,9 @@ class WatchEntry:
 
 @dataclass
 class EventState:
-    """State of the events. None for kinds that are not recorded."""
+    """State on which later events depend. A field is None if events that need it are not recorded."""
 
-    status: NDArray[np.int32] | None  # of the body in each slot, after the last step
+    status: NDArray[np.int32] | None  # status of the body in each slot, after the last step
     contacts: NDArray[np.float64] | None  # active contacts, (k, CONTACT_WIDTH)
     watches: list[WatchEntry]
 

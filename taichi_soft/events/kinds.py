@@ -44,7 +44,7 @@ class ContactBegan(Event):
     `a` is always a soft body. `isinstance(event.b, Collider)` is True for a collider.
     """
 
-    a: SoftBody  # the body; of two bodies the one with the smaller index
+    a: SoftBody  # the body; of two bodies, the one with the smaller index
     b: Collider | SoftBody  # the collider, or the other body
     impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; an impact can continue in the next step
 
@@ -100,7 +100,7 @@ class Woke(Event):
 
 @dataclass(frozen=True, eq=False)
 class Froze(Event):
-    """A body became non-finite, and was reset to its state before the step."""
+    """The state of a body became non-finite, and was reset to the state before the step."""
 
     body: SoftBody  # the frozen body
 

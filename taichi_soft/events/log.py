@@ -37,7 +37,7 @@ class EventLog:
     """The events of one world. Nothing is recorded before the first call of `record` or `on`."""
 
     def __init__(self, observer: Observer) -> None:
-        """Args: observer: finds the events of each step."""
+        """Create a log that records nothing. Args: observer: finds the events of each step."""
         self._observer = observer
         self._kinds: frozenset[type[Event]] = frozenset()
         self._is_recording = False

@@ -47,7 +47,10 @@ class Observer:
         slots: Sequence[SoftBody | None],
         colliders: Colliders | None,
     ) -> None:
-        """Args: state: fields of the world. slots: body in each slot. colliders: None without contact."""
+        """Create an observer of a world.
+
+        Args: state: fields of the world. slots: body in each slot. colliders: None without contact.
+        """
         self._state = state
         self._slots = slots
         self._colliders = colliders
@@ -69,7 +72,7 @@ class Observer:
         return self._colliders is not None
 
     def begin(self, kinds: frozenset[type[Event]], before: frozenset[type[Event]]) -> None:
-        """Start observing `kinds`, after observing the kinds in `before`."""
+        """Observe `kinds` from now on, instead of the kinds in `before`."""
         if self.has_contacts and self._state.capacity.contact.soft:
             self._state.soft.records_touches[None] = int(bool(kinds & CONTACT_KINDS))
         if kinds & (CONTACT_KINDS | SLEEP_KINDS):

@@ -83,7 +83,7 @@ class StressWatches:
         ]
 
     def restore(self, entries: list[WatchEntry], lookup: HandleLookup) -> None:
-        """Continue from an earlier state. Later watches stay; tetrahedra above their thresholds are new."""
+        """Continue from an earlier state. Later watches stay, and tetrahedra above them count as new."""
         if not entries and not self._watches:
             return
         for (_, body), watch in self._watches.items():
