@@ -1,4 +1,4 @@
-"""Change of a body's level of detail: it continues with more or fewer tetrahedra.
+"""Change the level of detail of a body, which then continues with more or fewer tetrahedra.
 
 `Passage` maps the positions and velocities after and before the last step, by the same scheme as a skin.
 If the body is free, a shift of its position and a rigid motion added to its velocities then preserve centre

@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 
 class Passage:
-    """Map from the vertices of one level of detail to those of another.
+    """Map of deformations from one level of detail to another.
 
     The map is linear, exact for rigid motions, and of second order, as for a skin: see `bodies.skin`.
     """

@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 POSITION, VELOCITY, EARLIER_POSITION, EARLIER_VELOCITY = 0, 3, 6, 9
 INV_MASS, MASS, AIM, TARGET, PUSH, REACTION = 12, 15, 16, 17, 20, 23
-"""First columns of the quantities in a row of `read_motion`. Those before `INV_MASS` are interpolated."""
+"""First columns of the quantities in a row of `read_motion`. Columns before `INV_MASS` are interpolated."""
 
 
 @ti.func
@@ -88,10 +88,10 @@ def _pin(
     weights: ti.template(),
     nearest: ti.template(),
 ):
-    """Pin vertices in the state of the nearest vertices that are pinned in the old level.
+    """Pin vertices, with the state of the nearest pinned vertices of the old level.
 
     The pinned vertices follow the rigid motion that fits the old ones best, plus the deviation of the nearest
-    old one from it. So their arrangement does not drift over repeated changes of level.
+    old one from it. Their arrangement therefore does not drift over repeated changes of level.
     """
     for x in ti.static((POSITION, EARLIER_POSITION)):
         rotation, translation = fitting_motion(rest_before, before, x, weights)
