@@ -48,7 +48,7 @@ from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertice
 Floats = NDArray[np.float64]
 
 MIN_FRAGMENT = 0.02
-"""Fraction of the body's volume from which a piece that is torn off gets a slot of its own."""
+"""Smallest fraction of the body's volume at which a piece that is torn off gets its own slot."""
 
 
 def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
@@ -84,7 +84,7 @@ def require_cuttable(body: SoftBody) -> None:
 
 
 def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
-    """Return the triangle's corners or the plane's point thrice, (3, 3) [m]; the normal; True for a plane."""
+    """Return corners (3, 3) [m] (for a plane, its point three times), the normal, and True for a plane."""
     if (plane is None) == (triangle is None):
         raise OptionError("pass plane=(point, normal) or triangle=(3, 3), one of the two")
     if triangle is not None:
@@ -212,7 +212,7 @@ def _write_pieces(
         free = rows[:, 12] > 0.0
         masses = piece.description.masses
         rows[free, 12] = 1.0 / masses[free]
-        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # external forces and reactions follow the mass
+        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # external forces and reactions are scaled by mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         write_slot(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
@@ -296,7 +296,7 @@ def write_slot(
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:
-    """Arguments of `write_body` after `motion`. Args: as in `write_slot`."""
+    """Return the arguments of `write_body` that follow `motion`. Args: as in `write_slot`."""
     first = _float_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
     present = first if inverses is None else _float_blocks(np.swapaxes(inverses, 1, 2), 9)
     return (

@@ -30,7 +30,7 @@ it, a tear continues before another one begins."""
 
 
 class Tears(Slice):
-    """Bodies of a world that can tear; checked after every step."""
+    """Bodies of a world that can tear. They are checked after every step."""
 
     name = "tears"
 
