@@ -69,7 +69,7 @@ def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: flo
 def caps(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> NDArray[np.bool_]:
     """True for tetrahedra that the surface would flatten, (m,).
 
-    All their vertices are outer ones, and little of their volume is left once these lie on the surface.
+    All vertices of such a tetrahedron are outer ones. Once they lie on the surface, little volume is left.
     Arguments as for `fit`.
     """
     surface = surface_of(tets.astype(np.int32))

@@ -150,7 +150,7 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
-    """Return points (representatives of patches of size `cell` [m], then other tips), and all patches."""
+    """Return points (representatives of patches of size `cell` [m], then tips), and each vertex's patch."""
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)
     representatives = _representatives(vertices, normals, tips, patch, len(patches))

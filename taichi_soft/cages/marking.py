@@ -71,7 +71,7 @@ def mark(
 
 
 def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
-    """Add empty tetrahedra where parts touch only at edges or vertices.
+    """Add empty tetrahedra between parts that touch only at edges or vertices.
 
     All parts are then connected, unless they do not touch at all.
     """

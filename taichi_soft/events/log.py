@@ -91,7 +91,7 @@ class EventLog:
         return listener
 
     def watch(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
-        """Send events of `kind`, one of `STRESS_KINDS`, above a threshold [Pa]; None stops the watch."""
+        """Record events of `kind` when a body's stress exceeds a threshold [Pa]; None stops the watch."""
         self._observer.stress.set(kind, body, threshold)
         if threshold is not None:
             self._record(self._kinds | {kind})

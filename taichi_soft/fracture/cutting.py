@@ -1,8 +1,8 @@
 """Cut bodies along the faces of their tetrahedra (thesis chapter 7).
 
 Tetrahedra are connected only by common particles, so a cut duplicates particles and changes no tetrahedron.
-A copy starts with the position and velocity of its original, and its mass is that of the tetrahedra around
-it. Mass, momentum and elastic energy are therefore conserved.
+A copy starts with the position and velocity of its original. The tetrahedra around a particle determine its
+mass. Mass, momentum and elastic energy are therefore conserved.
 """
 
 from __future__ import annotations

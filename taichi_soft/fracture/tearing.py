@@ -1,4 +1,4 @@
-"""Bodies that tear where their stress exceeds a limit."""
+"""Tear bodies at faces whose stress exceeds a limit."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Attachments of a body whose level changes: frames hold the nearest vertices of the new mesh.
 
-`level_change` pins the vertices that are nearest to the pinned ones of the old mesh. Each of them belongs to
-the attachment that held the nearest pinned vertex before.
+`level_change` pins the vertices that are nearest to the pinned vertices of the old mesh. Each of them then
+belongs to the attachment that held its nearest pinned vertex before.
 """
 
 from __future__ import annotations

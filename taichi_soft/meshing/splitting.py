@@ -22,7 +22,7 @@ class InnerFaces(NamedTuple):
 
 def inner_faces(tets: IntArray) -> InnerFaces:
     """All faces that two tetrahedra share."""
-    # If the corners of each tetrahedron are in ascending order, those of its faces are too.
+    # If the corners of each tetrahedron are in ascending order, so are the corners of its faces.
     corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
     rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
     pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)

@@ -241,7 +241,7 @@ def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[
 
 
 def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """Return the surface with those of `notes` added that it does not have."""
+    """Return the surface with all `notes` added that it does not have yet."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 

@@ -90,8 +90,8 @@ def _pin(
 ):
     """Pin vertices, with the state of the nearest pinned vertices of the old level.
 
-    The pinned vertices follow the rigid motion that fits the old ones best, plus the deviation of the nearest
-    old one from it. Their arrangement therefore does not drift over repeated changes of level.
+    The pinned vertices follow the rigid motion that fits the old pinned vertices best, plus the deviation of
+    the nearest old vertex from it. Their arrangement therefore does not drift over repeated changes of level.
     """
     for x in ti.static((POSITION, EARLIER_POSITION)):
         rotation, translation = fitting_motion(rest_before, before, x, weights)

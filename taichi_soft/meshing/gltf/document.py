@@ -128,7 +128,7 @@ class Document:
         return data[start : start + length], read_count(entry, "byteStride", name, 0)
 
     def fetch(self, uri: Any) -> bytes:
-        """Return the content of a data: URI, or of a file named relative to this one.
+        """Return the content of a data: URI, or of a file whose path is relative to this file.
 
         Raises: MeshError for a missing file, a network address or an absolute path. A .glb must not name
             files outside its folder either, because the live page reads files from any visitor.
