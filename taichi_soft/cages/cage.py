@@ -24,17 +24,17 @@ from taichi_soft.meshing.locating import Locator
 Ints = NDArray[np.int64]
 
 SMALLEST_PART = 1e-3
-"""Volume relative to the solid's, below which a component is discarded."""
+"""Fraction of the solid's volume below which a component is discarded."""
 
 MIN_FILL = 0.05
-"""Smallest fill of a tetrahedron: one that is much lighter than its neighbours would be flung about."""
+"""Smallest fill of a tetrahedron: its neighbours would accelerate a much lighter one too strongly."""
 
 MAX_FILL = 1.5
-"""Largest fill of a tetrahedron: parts of the solid outside the cage add no further stiffness."""
+"""Largest fill of a tetrahedron. It limits the stiffness that parts of the solid outside the cage add."""
 
 MIN_LUMPED_FRACTION = 0.9
-"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around it. Their
-stiffness grows with their fill, so a light vertex vibrates fast and shortens the stable step."""
+"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around it. Stiffness
+grows with the fill, so a lighter vertex would vibrate fast and shorten the stable step."""
 
 MAX_PEELS = 4
 """Largest number of layers of flat tetrahedra that are removed."""
@@ -47,7 +47,7 @@ class Cage:
     mesh: CageMesh
     solid: Solid
     part: Ints  # (m,), component of the solid that each tetrahedron belongs to
-    octave: Ints  # (m,), number of halvings of the cells there
+    octave: Ints  # (m,), number of halvings of the cells at each tetrahedron
     thin: Thin | None = None  # limbs and sheets that are too thin for cells of the requested size
 
 
@@ -61,8 +61,8 @@ def cage_in(
 
     Args:
         enclosed_volume: volume of the solid by the divergence theorem [m^3].
-        kept: voxels that must be covered, of the shape of the solid's.
-    Raises: OptionError if the cage falls into pieces.
+        kept: True for voxels that must be covered, in the shape of `solid.fill`.
+    Raises: OptionError if the cage would fall into pieces.
     """
     points, volumes = solid.quadrature()
     if solid.is_simple:
@@ -103,7 +103,7 @@ def cage_in(
 
 
 def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> Ints:
-    """Remove tetrahedra that would lie flat in the surface, as long as the rest stays connected."""
+    """Remove tetrahedra that would lie flat in the surface, if the others stay connected."""
     for _ in range(MAX_PEELS):
         corners = lattice.corners_of(numbers)
         used, tets = np.unique(corners, return_inverse=True)
@@ -118,7 +118,7 @@ def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> In
 def _with_volumes(
     mesh: TetMesh, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints
 ) -> CageMesh:
-    """Add the fill of each tetrahedron and the volume of each vertex."""
+    """Return the mesh with the fill of each tetrahedron and the volume of each vertex."""
     tet, weights = Locator(mesh)(points, start)
     carried = np.bincount(tet, volumes, len(mesh.tets))
     fill = np.clip(carried / mesh.volumes, MIN_FILL, MAX_FILL)

@@ -9,13 +9,13 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
 DEFAULT_CELLS = 10
-"""Default number of cells along the longest side. It gives some thousand tetrahedra, which suits games."""
+"""Default number of cells along the longest side. It gives a few thousand tetrahedra, which suits games."""
 
 MAX_CELLS = 150_000
 """Largest number of cells in the bounding box of the surface."""
 
 BYTES_PER_CELL = 27 * 250
-"""Memory of the lattice's voxels in one cell while the cage is built."""
+"""Memory for the voxels of one cell while the cage is built [bytes]."""
 
 
 def cell_size_of(size: FloatArray, cells: int | None, cell_size: float | None) -> float:

@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 
 PASSES = 8
 HALVINGS = 5
-"""Largest number of halvings of a move that would spoil a tetrahedron, before the pass drops the move."""
+"""Largest number of halvings of a move that makes a tetrahedron invalid, before the pass drops the move."""
 
 SHARPEST, FLATTEST = 20.0, 145.0
 """Smallest and largest dihedral angle allowed [degrees]."""
@@ -23,7 +23,8 @@ MAX_STIFFNESS = 3.0
 masses as in the lattice, the stable step would stay above 0.58 of the lattice's."""
 
 FLAT = 0.25
-"""Volume left with the vertices on the surface, relative to before, below which a tetrahedron is removed."""
+"""A tetrahedron is removed if less than this fraction of its volume is left once its vertices lie on the
+surface."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
 """Search radii around a vertex's voxel, in voxels, in the order of the search. The nearest point found is
@@ -33,7 +34,7 @@ CHUNK = 1 << 20
 """Pairs of vertices and voxels that are processed at once."""
 
 SEARCH_RANGE = 0.75
-"""Distance from a vertex within which the surface is searched, in cubes."""
+"""Distance from a vertex within which the surface is searched, in edges of a cube."""
 
 
 def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: float) -> FloatArray:
@@ -68,7 +69,7 @@ def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: flo
 def caps(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> NDArray[np.bool_]:
     """True for tetrahedra that the surface would flatten, (m,).
 
-    All their vertices are outer ones, and little of their volume is left once these lie on the surface.
+    All vertices of such a tetrahedron are outer ones. Once they lie on the surface, little volume is left.
     Arguments as for `fit`.
     """
     surface = surface_of(tets.astype(np.int32))
@@ -138,7 +139,7 @@ class _NeighbourMean:
 
 
 class _Nearest:
-    """Search for the nearest point of the surface between inside and outside."""
+    """Finds the nearest point on the surface that separates inside and outside."""
 
     def __init__(self, solid: Solid, search_range: float) -> None:
         self._solid = solid
@@ -169,7 +170,7 @@ class _Nearest:
         return np.asarray(found)
 
     def _among(self, positions: FloatArray, offsets: Ints) -> tuple[FloatArray, FloatArray]:
-        """Nearest point in the voxels at `offsets`, and its distance; the position itself if none."""
+        """Nearest point in the voxels at `offsets`, and its distance; if none, the position and infinity."""
         last = np.array(self._solid.fill.shape) - 1
         voxels = ((positions - self._solid.origin) / self._solid.spacing).astype(np.int64)
         candidates = np.clip(voxels, 0, last)[:, None] + offsets + self._pad

@@ -1,11 +1,11 @@
-"""A body-centred lattice with cubes halved where the solid needs it.
+"""A body-centred lattice whose cubes are halved at thin parts of the solid.
 
 Cubes that share a face or an edge are equal, or one is twice as long as the other. As in the lattice of equal
 cubes, the vertices are corners and centres of cubes, and a tetrahedron has the centres of two equal
-neighbours and an edge of the face between them. Where the edge has a vertex in its middle, there are two
-tetrahedra. A face between a cube and four small ones consists of eight triangles, each joined to the centres
-on both sides. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45
-and 120 degrees.
+neighbours and an edge of the face between them. If the edge has a vertex in its middle, there are two
+tetrahedra instead. A face between a cube and four small ones consists of eight triangles, each joined to the
+centres on both sides. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are
+between 45 and 120 degrees.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ Bools = NDArray[np.bool_]
 Kind = TypeVar("Kind", bound=np.generic)
 
 SECTORS = ((0, 1), (0, 0), (1, 1), (1, 0))
-"""Sectors of a face between its centre and one of its edges: which of the two other axes leads there, and
-True for forwards. The order is that of `Lattice.tet_at`."""
+"""Sectors of a face, each between its centre and one of its edges: which of the two other axes points to the
+edge, and 1 for its positive direction. The order is the one in `Lattice.tet_at`."""
 
 
 class GradedLattice:
@@ -35,8 +35,8 @@ class GradedLattice:
 
         Args:
             coarse: lattice of equal cubes.
-            splits: for each octave, True for cubes of the one before that are halved, of the shape of all its
-                cubes, (nx, ny, nz), then (2 nx, 2 ny, 2 nz), ...; `balanced`.
+            splits: result of `balanced`. For each octave, True for the cubes of the previous octave that are
+                halved, first (nx, ny, nz), then (2 nx, 2 ny, 2 nz), and so on.
         """
         self.origin, self.edge = coarse.origin, coarse.edge
         self.octaves = len(splits)
@@ -100,7 +100,7 @@ class GradedLattice:
         return found
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), in the order of positive volume."""
+        """Lattice vertices of tetrahedra, (k, 4), ordered so that volumes are positive."""
         return np.asarray(self._all[numbers])
 
     def points_of(self, vertices: Ints) -> FloatArray:
@@ -153,7 +153,7 @@ class GradedLattice:
                     self._table[high[rows], axis, 0, sector, half] = added
 
     def _has_middle(self, level: int, start: Ints, along: int) -> Bools:
-        """True for edges, starting at their lowest corner, if one of the four cubes around them is halved."""
+        """True for each edge, given by its lowest corner, if one of the four cubes around it is halved."""
         split = self._splits[level]
         others = [k for k in range(3) if k != along]
         found = np.zeros(len(start), dtype=np.bool_)
@@ -211,7 +211,7 @@ def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
 
 
 def doubled(cubes: NDArray[Kind], octaves: int = 1) -> NDArray[Kind]:
-    """Copy the value of each cube to its eight halves, and on to the halves of these for more octaves."""
+    """Return the values for cubes halved `octaves` times: each part gets the value of its cube."""
     for axis in range(3):
         cubes = cubes.repeat(2**octaves, axis=axis)
     return cubes
@@ -224,7 +224,7 @@ def halved(cubes: Bools) -> Bools:
 
 
 def around(cubes: Bools) -> Bools:
-    """Add all cubes that touch `cubes`."""
+    """Return `cubes` together with all cubes that touch them."""
     for axis in range(3):
         moved = np.moveaxis(cubes.copy(), axis, 0)
         still = np.moveaxis(cubes, axis, 0)
@@ -235,7 +235,7 @@ def around(cubes: Bools) -> Bools:
 
 
 def balanced(splits: list[Bools]) -> list[Bools]:
-    """Halve more cubes, so that cubes that touch differ by one octave at most."""
+    """Return splits with more halved cubes, so that cubes that touch differ by at most one octave."""
     found = list(splits)
     for octave in range(len(found) - 1, 0, -1):
         found[octave - 1] = found[octave - 1] | halved(around(found[octave]))

@@ -1,9 +1,9 @@
-"""The hull of an artist's mesh: points on it with triangles between them, which represent it in contact.
+"""The hull of an artist's mesh: points on its surface, and triangles between them, used for contact.
 
-The surface is divided into patches: the vertices of one cell of a grid that face the same direction. Each
-patch has one point, its most prominent vertex. Tips and the two sides of a sheet are therefore kept, and all
-points lie on the surface. Objects that pass between the points penetrate by a small fraction of the points'
-distance.
+The surface is divided into patches. A patch consists of the vertices in one cell of a grid that face the same
+direction, and has one hull point, its most prominent vertex. Tips and the two sides of a sheet are therefore
+kept, and all points lie on the surface. Objects that pass between the points penetrate by a small fraction of
+the points' distance.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ MIN_POINTS, MAX_POINTS = 12, 20_000
 """Range of the number of points of a hull."""
 
 POINTS_PER_VERTEX = 2.0
-"""Default number of points over the outer vertices of the tetrahedra. Round shapes then penetrate by 2 % of
-their size."""
+"""Default number of points per outer vertex of the tetrahedra. Round shapes then penetrate by 2 % of their
+size."""
 
 VOXELS = 64
-"""Voxels along the longest side, by which the inside is found."""
+"""Voxels along the longest side of the grid that separates inside and outside."""
 
 STEPS = 1.0, 2.0, 3.0
-"""Distances before and behind a triangle, in voxels, over which the fill is averaged: where some triangles
-face the wrong way, single voxels can be wrong."""
+"""Distances in front of and behind a triangle, in voxels, at which the fill is averaged. Single voxels can be
+wrong near triangles of wrong orientation."""
 
 INNER, FLIP_MARGIN = 0.95, 0.25
-"""Mean fill above which both sides of a triangle count as inside; excess of the fill before a triangle over
-that behind it above which the triangle is flipped."""
+"""A triangle is dropped if the mean fill is at least INNER on both sides. It is flipped if the fill in front
+exceeds the fill behind by more than FLIP_MARGIN."""
 
 DIRECTIONS = 0.5
-"""Number of directions in which the farthest vertex becomes a point, relative to the number of points."""
+"""Number of directions whose farthest vertices become points, relative to the number of points."""
 
 HALVINGS = 14
 """Bisection steps of the search for the cell size."""
@@ -110,7 +110,7 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
     area = 0.5 * float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum())
     if not area > 0.0:
         raise MeshError("the surface has no area to make a hull of")
-    cell = np.sqrt(area / max_points)  # a flat surface would have about as many patches
+    cell = np.sqrt(area / max_points)  # a flat surface would then have about `max_points` patches
     vertices, triangles = _subdivided(vertices, triangles, 0.5 * cell)
     normals, tips = _normals(vertices, triangles), _tips(vertices, round(DIRECTIONS * max_points))
     low, high = 0.5 * cell, max(8.0 * cell, 1.1 * float(np.ptp(vertices, axis=0).max()))
@@ -126,10 +126,10 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
-    """Index of the chosen vertex nearest to each vertex along edges, (n,); without a path, that of its patch.
+    """Index in `chosen` of the vertex nearest along edges, (n,); without a path, of the patch's vertex.
 
     Triangles between these nearest vertices surround their corners. Triangles between patches would fold over
-    where a patch has its point at the rim.
+    if the point of a patch lies at its rim.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
@@ -150,7 +150,7 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
-    """Representatives of patches of a size [m], then the other tips, and the patch of each vertex."""
+    """Return points (representatives of patches of size `cell` [m], then tips), and each vertex's patch."""
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)
     representatives = _representatives(vertices, normals, tips, patch, len(patches))
@@ -159,7 +159,7 @@ def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) 
 
 
 def _outward(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
-    """Merge coincident vertices, turn triangles outwards, and drop those with the inside on both sides."""
+    """Merge coincident vertices, turn triangles outwards, and drop triangles with solid on both sides."""
     positions, numbers = np.unique(vertices, axis=0, return_inverse=True)
     corners = numbers.reshape(-1)[triangles]
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
@@ -215,7 +215,7 @@ def _normals(vertices: FloatArray, triangles: Ints) -> FloatArray:
 
 
 def _patches(vertices: FloatArray, normals: FloatArray, cell: float) -> Ints:
-    """Patch of each vertex: its cell, and which of six directions it faces."""
+    """Number of each vertex's patch, (n,), from its grid cell and the one of six directions that it faces."""
     cells = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
     axis = np.abs(normals).argmax(axis=1)
     direction = 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
@@ -224,7 +224,7 @@ def _patches(vertices: FloatArray, normals: FloatArray, cell: float) -> Ints:
 
 
 def _tips(vertices: FloatArray, count: int) -> Ints:
-    """Number of directions, of `count` even ones, in which each vertex is the farthest, (n,)."""
+    """Number of directions, out of `count` evenly spread ones, in which each vertex is the farthest, (n,)."""
     number = np.arange(count) + 0.5
     height, angle = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
     radius = np.sqrt(1.0 - height**2)
@@ -234,7 +234,7 @@ def _tips(vertices: FloatArray, count: int) -> Ints:
 
 
 def _representatives(vertices: FloatArray, normals: FloatArray, tips: Ints, patch: Ints, count: int) -> Ints:
-    """Vertex of each patch that is the farthest in most directions, else along the patch's mean normal."""
+    """Vertex of each patch that is farthest in the most directions; in a tie, along the mean normal."""
     means = np.stack([np.bincount(patch, normals[:, k], count) for k in range(3)], axis=1)
     height = np.einsum("nk,nk->n", vertices, means[patch])
     order = np.lexsort((np.arange(len(patch)), -height, -tips, patch))
@@ -243,7 +243,7 @@ def _representatives(vertices: FloatArray, normals: FloatArray, tips: Ints, patc
 
 
 def _distinct_triangles(corners: Ints) -> Ints:
-    """Remove degenerate triangles and duplicates."""
+    """Return the triangles without degenerate ones and duplicates."""
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     corners = corners[~is_flat]
     lead = corners.argmin(axis=1)

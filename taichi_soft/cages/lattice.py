@@ -1,8 +1,9 @@
 """The body-centred cubic lattice: equal tetrahedra without a preferred direction.
 
 Its vertices are corners and centres of cubes. Each tetrahedron has the centres of two neighbouring cubes and
-an edge of the face between them: dihedral angles of 60 and 90 degrees, twelve to a cube. (Labelle and
-Shewchuk, "Isosurface stuffing", 2007, who cut it at the surface; here its vertices are moved.)
+an edge of the face between them. Dihedral angles are 60 and 90 degrees, and there are twelve tetrahedra per
+cube. (Labelle and Shewchuk, "Isosurface stuffing", 2007. They cut the lattice at the surface; here its
+vertices are moved.)
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class Lattice:
         return np.asarray(face * 4 + side)
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), in the order of positive volume."""
+        """Lattice vertices of tetrahedra, (k, 4), ordered so that volumes are positive."""
         total = int(np.prod(self.cubes))
         side, rest = numbers % 4, numbers // 4
         axis, flat = rest // total, rest % total

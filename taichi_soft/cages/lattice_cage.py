@@ -44,7 +44,7 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float, refine
         vertices: vertices of the surface, (n, 3) [m].
         triangles: (m, 3).
         cell_size: edge of the lattice's cubes [m].
-        refine: largest number of halvings of the cubes where limbs and sheets would be missed.
+        refine: largest number of halvings of the cubes at limbs and sheets that would otherwise be missed.
     Raises: MeshError for a surface that encloses nothing or is mostly open.
     """
     corners = vertices[triangles]
@@ -64,7 +64,7 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float, refine
 
 
 class Refinement:
-    """Find the parts that a first cage misses, and refine the lattice there."""
+    """Finds the parts that a first cage misses, and refines the lattice there."""
 
     def __init__(
         self, lattice: Lattice, vertices: FloatArray, triangles: Ints, enclosed_volume: float
@@ -73,7 +73,7 @@ class Refinement:
         self._corners, self._enclosed_volume = vertices[triangles], enclosed_volume
 
     def refined(self, cage: Cage, refine: int) -> Cage:
-        """Return a cage with smaller cells at missed limbs that are not too thin for these."""
+        """Return a cage with smaller cells at missed limbs, unless these are too thin for smaller cells."""
         far, triangle = far_points(self._lattice, self._corners, cage.mesh)
         if len(far) == 0:
             return cage
@@ -94,7 +94,7 @@ class Refinement:
             graded = refined(self._lattice, octaves, candidate.points)
             try:
                 cage = cage_in(graded, solid, self._enclosed_volume, voxels)
-            except OptionError:  # in pieces: leave these limbs out and report them
+            except OptionError:  # the cage is in pieces: leave these limbs out and report them
                 break
             chosen = candidate
             missed = self._missed_parts(cage, fine, *far_points(self._lattice, self._corners, cage.mesh))

@@ -18,7 +18,7 @@ MIN_FILL = 0.4
 vertices move inwards more easily."""
 
 TRACE = 0.02
-"""The same where the solid would otherwise be missed: limbs and sheets thinner than a cube."""
+"""The same fraction at limbs and sheets that are thinner than a cube and would otherwise be missed."""
 
 LAYER = 2
 """Largest thickness of a flat layer, in tetrahedra from face to face."""
@@ -27,7 +27,7 @@ MAX_FRAGMENT = 2
 """Largest number of tetrahedra in a fragment that can be dropped."""
 
 ROUNDS = 3
-"""Rounds that add tetrahedra where others are connected only by an edge or a vertex."""
+"""Number of rounds that add tetrahedra next to those connected only by an edge or a vertex."""
 
 
 def mark(
@@ -55,7 +55,7 @@ def mark(
         missed = ~selected & (fill >= trace) & ~np.isin(corners, corners[selected]).any(axis=1)
         if not missed.any():
             break
-        # First the fullest of those that touch: tetrahedra that they cover are no longer missed.
+        # Select the fullest of adjacent ones first: the tetrahedra next to it are then no longer missed.
         selected |= missed & (fill >= 0.5 * _max_around(corners, np.where(missed, fill, 0.0)))
     if part_count(corners[selected]) > 1:
         selected |= fill >= trace
@@ -71,7 +71,7 @@ def mark(
 
 
 def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
-    """Add empty tetrahedra where parts touch only at edges or vertices.
+    """Add empty tetrahedra between parts that touch only at edges or vertices.
 
     All parts are then connected, unless they do not touch at all.
     """
@@ -86,7 +86,7 @@ def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
         if len(every) == 0:
             others = np.setdiff1d(lattice.tets, numbers)
             every = lattice.corners_of(others)
-        # Tetrahedra that touch most of the places where parts meet close the most gaps.
+        # The tetrahedra that touch the most vertices between parts close the most gaps.
         meets = np.isin(every, vertices[counts > 1]).sum(axis=1)
         meets[np.isin(others, numbers)] = 0
         if not meets.any():
@@ -114,7 +114,7 @@ def face_pairs(tets: Ints) -> Ints:
 
 
 def _fans(tets: Ints) -> Ints:
-    """Fan of each corner, (m, 4).
+    """Number of each corner's fan, (m, 4).
 
     Corners at one vertex belong to the same fan if faces at that vertex connect their tetrahedra.
     """
@@ -144,8 +144,8 @@ def split_hinges(tets: Ints) -> tuple[Ints, Ints]:
 def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Remove flat tetrahedra in thin layers, keeping the rest connected. Returns True for those kept, (m,).
 
-    Small fragments that would fall off are removed too. Where larger ones would, the tetrahedra around them
-    stay.
+    Small fragments that would fall off are removed too. If a larger one would fall off, the tetrahedra around
+    it stay.
     """
     removed = _in_a_layer(tets, flat)
     pairs = face_pairs(tets)
@@ -165,8 +165,8 @@ def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _in_a_layer(tets: Ints, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """True for the chosen tetrahedra that lie in a thin layer, (m,).
 
-    In a group of chosen tetrahedra that faces connect, every one must be at most `LAYER` steps from one that
-    is not chosen. A thin limb is not such a group.
+    A group of chosen tetrahedra that faces connect is a thin layer if each of them is at most `LAYER` steps
+    from a tetrahedron that is not chosen. A thin limb is not such a group.
     """
     pairs = face_pairs(tets)
     groups = components(len(tets), pairs[chosen[pairs].all(axis=1)])

@@ -1,4 +1,4 @@
-"""Masses of a cage's vertices with the mass and inertia of the solid."""
+"""Fit the masses of a cage's vertices to the mass and inertia of the solid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HALVINGS = 12
 """Largest number of halvings of a step that does not reduce the residual."""
 
 TOLERANCE = 1e-9
-"""Tolerance of the sums, relative to the mass."""
+"""Tolerance of the required sum and moments, relative to the mass."""
 
 
 def fitted(
@@ -25,7 +25,7 @@ def fitted(
     """Positive masses (n,) closest to `lumped` (n,) with the given sum and moments, if they exist.
 
     Masses lumped at vertices have too much inertia, because a vertex lies farther out than the volume that it
-    represents. The solution minimises the sum of squared changes, each over its lumped mass.
+    represents. The solution minimises the sum of squared changes, each divided by the lumped mass.
 
     Args:
         points: positions of the vertices, (n, 3) [m].
@@ -55,6 +55,6 @@ def fitted(
             if np.linalg.norm(new_residual) < np.linalg.norm(residual):
                 break
         else:
-            break  # there are no such masses: these are close
+            break  # no masses meet the equations: keep the current ones, which are close
         multipliers, masses, residual = multipliers + factor * step, tried, new_residual
     return kept(masses * (mass / masses.sum()))

@@ -1,6 +1,6 @@
 """Run external meshers, each in its own process.
 
-A mesher can crash or never end. It then raises an error and leaves nothing behind.
+If a mesher crashes or exceeds the time limit, an error is raised and its files are removed.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TIME_LIMIT = 120.0
 """Default time limit [s]."""
 
 GRACE = 3.0
-"""Time after the limit at which a process ends if nobody has ended it [s]."""
+"""Time after the limit at which a process ends itself if it was not killed [s]."""
 
 INSIDE = 0.5
 """Winding number above which a region is solid."""
@@ -53,8 +53,8 @@ def mesher_mesh(
         triangles: (m, 3).
         cell_size: target length of the edges [m].
         time_limit: time after which the process is killed [s].
-    Raises: MissingExtraError without the method's package; MeshError, with the method's own message, if it
-        fails, crashes or takes too long.
+    Raises: MissingExtraError if the method's package is missing; MeshError, with the method's own message, if
+        it fails, crashes or takes too long.
     """
     require_extra(method, f"method {method!r} needs")
     points, corners = welded(vertices, triangles)
@@ -142,7 +142,7 @@ def _ending(code: int) -> str:
 
 
 def _line(text: str) -> str:
-    """Last line of some output, cut to the length of a message."""
+    """Last non-empty line of `text`, cut to 200 characters."""
     lines = [line for line in text.splitlines() if line.strip()]
     return lines[-1].strip()[:200] if lines else ""
 

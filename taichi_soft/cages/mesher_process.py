@@ -1,6 +1,7 @@
 """Program of a mesher's process, from surface.npz to tetrahedra.npz in its working folder.
 
-The interpreter receives it as text. It imports nothing of this package, which would start Taichi.
+The interpreter receives this module as text. The module imports nothing from this package, which would start
+Taichi.
 Arguments: the method, the time after which the process ends in any case [s], and `sys.path`.
 """
 
@@ -13,16 +14,16 @@ from types import ModuleType
 from typing import Any
 
 RADIUS_TO_EDGE, MIN_ANGLE = 1.4, 10
-"""Goals of TetGen: circumradius over shortest edge, and dihedral angle [degrees]."""
+"""Targets of TetGen: largest circumradius over shortest edge, and smallest dihedral angle [degrees]."""
 
 ENVELOPE = 0.05
 """Largest distance of fTetWild's result from the surface, in cells. Finer detail only shortens the steps."""
 
 
 def by_tetgen(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
-    """Mesh by TetGen: vertices (n, 3), tetrahedra (m, 4), and the region of each, (m, 1).
+    """Run TetGen. Returns: vertices (n, 3), tetrahedra (m, 4), and the region of each tetrahedron, (m, 1).
 
-    Tetrahedra are at most as large as a regular one with edges of a cell.
+    Tetrahedra are at most as large as the regular one whose edges are `cell_size` long.
     """
     import tetgen
 
@@ -33,7 +34,7 @@ def by_tetgen(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any
 
 
 def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
-    """Mesh by fTetWild, with results as for `by_tetgen`. There is one region, as it finds the inside."""
+    """Run fTetWild. Returns: as for `by_tetgen`, with one region, because fTetWild finds the inside."""
     import numpy as np
     import pytetwild
 
@@ -47,7 +48,7 @@ def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, A
 def main() -> None:
     """Read a surface and write its tetrahedra."""
     method, seconds, *sys.path[:] = sys.argv[1:]
-    # A thread in C, which works even if the mesher holds the interpreter or the game has ended.
+    # This timer is a C thread, which works even if the mesher holds the interpreter or the game has ended.
     faulthandler.dump_traceback_later(float(seconds), exit=True)
     # Both packages import pyvista, but only to plot. It is optional here and slow to load.
     sys.modules["pyvista"] = ModuleType("pyvista")

@@ -25,8 +25,8 @@ class Tetrahedra(NamedTuple):
 
     mesh: TetMesh
     cell_size: float  # requested edge of a cell [m]
-    notes: tuple[str, ...] = ()  # on limbs and sheets that are too thin for cells of this size
-    is_refined: bool = False  # True if some of these have smaller cells
+    notes: tuple[str, ...] = ()  # sentences on limbs and sheets that are too thin for such cells
+    is_refined: bool = False  # True if some limbs or sheets have smaller cells
 
 
 def tetrahedra_of(
@@ -38,7 +38,7 @@ def tetrahedra_of(
     time_limit: float | None = None,
     refine: int | None = None,
 ) -> Tetrahedra:
-    """Tetrahedra for the solid that surfaces enclose.
+    """Make tetrahedra for the solid that surfaces enclose.
 
     Arguments and errors: `SoftBodyAsset.from_surface`.
     """

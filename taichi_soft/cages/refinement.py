@@ -18,17 +18,18 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 REFINE = 1
-"""Default of the largest number of halvings: each halves the stable step."""
+"""Default of the largest number of halvings. Each halving halves the stable step."""
 
 MIN_SHEET_FILL = 0.003
-"""Smallest solid fraction of the cubes around a limb that is kept: for sheets far thinner than a cube."""
+"""Smallest solid fraction of the cubes around a limb at which it is kept, even if it is far thinner than a
+cube."""
 
 TRACE = 1e-3
-"""Fill of a voxel that only the surface shows to be occupied."""
+"""Fill of a voxel that contains a point of the surface but no solid that rays found."""
 
 
 def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
-    """Fill every voxel that contains a point of the surface at least a little.
+    """Raise the fill of every voxel that contains a point of the surface to at least `TRACE`.
 
     Args: points: points of the surface, (k, 3) [m].
     Returns: the solid, and True for these voxels.
@@ -52,9 +53,9 @@ def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
 
 
 def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int) -> Ints:
-    """Number of halvings of each cube that keep the missed parts, of the shape of the lattice.
+    """Number of halvings of each cube that keep the missed parts, in the shape of the lattice.
 
-    It is 0 for cubes without missed parts, and where `refine` halvings are not enough.
+    It is 0 for cubes without missed parts, and for parts that `refine` halvings do not keep.
     """
     parts = parts_of(missed.cubes.astype(np.float64))
     count = int(parts.max(initial=-1)) + 1
@@ -74,10 +75,10 @@ def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int
 
 
 def refined(lattice: Lattice, octaves: Ints, points: FloatArray) -> Lattice | GradedLattice:
-    """Halve cubes around some points.
+    """Return the lattice with cubes halved around some points.
 
     Args:
-        octaves: number of halvings, of the shape of the lattice.
+        octaves: number of halvings of each cube, in the shape of the lattice.
         points: (k, 3) [m].
     """
     if not octaves.any():

@@ -1,12 +1,12 @@
 """Find the part of space that a surface encloses, even if its triangles have defects.
 
-Rays run through the surface along the three axes. The winding number along a ray is the sum of the signed
-crossings behind. It is exact between any two crossings, so a sheet thinner than a voxel keeps its volume. If
-the surface is closed, the winding number is an integer and returns to 0 at the end of the ray.
+Rays run through the surface along the three axes. The winding number at a point of a ray is the sum of the
+signed crossings before it. It is exact between any two crossings, so a sheet thinner than a voxel keeps its
+volume. If the surface is closed, the winding number is an integer and returns to 0 at the end of the ray.
 
-A ray that does not return to 0 crossed a hole, a flipped face or an inner wall. There the rays along the
-other axes decide. If none of the three is closed, the mean over both directions of all three decides: the
-generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
+A ray that does not return to 0 crossed a hole, a flipped face or an inner wall. In its voxels, the rays along
+the other axes decide. If no ray of a voxel returns to 0, the mean over both directions of all three decides:
+the generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class Solid:
     origin: FloatArray  # (3,), corner of the first voxel [m]
     spacing: float  # edge of a voxel [m]
     fill: FloatArray  # (nx, ny, nz), 0 to 1
-    center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the corner of each
+    center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the voxel's corner
     surface: FloatArray  # (nx, ny, nz, 3), mean of the crossings in a voxel [m], NaN without crossings
-    open_fraction: float  # of all rays that meet the surface, those that do not return to 0
-    is_simple: bool  # all rays return to 0 and no parts overlap, so that the triangles give the volume
+    open_fraction: float  # fraction of the rays through the surface that do not return to 0
+    is_simple: bool  # True if all rays return to 0 and no parts overlap: the triangles give the volume
 
     @property
     def volume(self) -> float:
@@ -128,7 +128,7 @@ class _Rays:
 
 
 def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> FloatArray:
-    """Signs (k,) of the crossings at which a ray enters or leaves the solid, and 0 of those within it.
+    """Signs (k,) of the crossings at which a ray enters or leaves the solid; 0 for crossings within it.
 
     Overlaps of several parts of the surface thus count once.
     """
@@ -211,7 +211,7 @@ def _crossings(coordinates: FloatArray, triangles: Ints, axis: int) -> tuple[Flo
 
 
 def _signed_areas(corners: FloatArray, numbers: Ints, line: FloatArray) -> FloatArray:
-    """Areas between a ray and the edge opposite each corner, (k, 3); all 0 if the ray misses the triangle.
+    """Twice the signed area between a ray and the edge opposite each corner, (k, 3); 0 if the ray misses.
 
     Each edge starts at its vertex of lower number, so that both its triangles get the same area.
     """

@@ -21,10 +21,10 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 MAX_ROD_RATIO = 18.0
-"""Largest edge of a cube over the thickness of a rod at which the rod can be kept."""
+"""Largest ratio of a cube's edge to a rod's thickness at which the rod can be kept."""
 
 SAFE_ROD_RATIO = 8.0
-"""Largest edge of a cube over the thickness of a rod at which every rod is kept without halving cubes."""
+"""Largest ratio of a cube's edge to a rod's thickness at which every rod is kept without halving cubes."""
 
 MAX_REFINE = 3
 """Largest number of halvings."""
@@ -33,10 +33,10 @@ PITCH = 0.25
 """Distance between sample points of the surface, in cells."""
 
 FINE_PITCH = 1 / 24
-"""The same where parts are missed."""
+"""Distance between sample points at missed parts, in cells."""
 
 MISSED_DISTANCE = 1.25
-"""Distance from the cage, in cells, beyond which a point is missed; rounded corners are nearer."""
+"""Distance from the cage, in cells, beyond which a point counts as missed. Rounded corners are nearer."""
 
 MAX_CUBES = 64
 """Largest number of cubes in which the surface is tested for enclosing anything."""
@@ -45,7 +45,7 @@ INSIDE = 0.5
 """Winding number above which a point is inside the solid."""
 
 OWN_DISTANCE = 1e-6
-"""Distance over size below which a triangle is the one that a point lies on, or a copy of it."""
+"""Distance from a point, relative to the size, below which a triangle is the point's own or a copy of it."""
 
 ROOT_DISTANCE = 0.2
 """Distance from the cage, in cells, beyond which a limb has left it."""
@@ -54,16 +54,17 @@ RAYS = 256
 """Number of rays that measure a thickness."""
 
 QUANTILE = 0.1
-"""Quantile of the lengths measured near a limb that is its thickness: next to it, the body is thicker."""
+"""Quantile of the lengths measured near a limb that is used as its thickness. It is low, because the body
+next to the limb is thicker."""
 
 CHUNK = 1 << 20
 """Pairs of rays and triangles that are processed at once."""
 
 
 def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
-    """Sample points on triangles (m, 3, 3), at least one in each and about `pitch` apart at most [m].
+    """Sample points on triangles (m, 3, 3), at least one in each and at most about `pitch` [m] apart.
 
-    Returns: (k, 3) [m], and the triangle of each, (k,).
+    Returns: points (k, 3) [m], and the triangle of each, (k,).
     """
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -112,12 +113,12 @@ class Thin:
     Infinity if there are none.
     """
 
-    kept: float  # by smaller cells
-    lost: float  # left out by the cage
+    kept: float  # thinnest that smaller cells keep
+    lost: float  # thinnest that the cage leaves out
     octaves: int  # number of halvings of cells
 
     def notes(self, cell_size: float) -> tuple[str, ...]:
-        """Describe the limbs and sheets.
+        """Return a sentence on the limbs and sheets that are kept, and one on those left out.
 
         Args: cell_size: requested size [m].
         """
@@ -141,13 +142,13 @@ class Thin:
 
 @dataclass(frozen=True, eq=False)
 class MissedParts:
-    """Parts that a cage should cover and does not."""
+    """Parts of a surface that a cage should cover but does not."""
 
     cubes: (
-        Bools  # of the lattice, those with surface but without cage, and those where a part leaves the cage
+        Bools  # True for cubes with surface but without cage, and for cubes in which a part leaves the cage
     )
-    bare: Bools  # cubes without a vertex of the cage
-    thickness: FloatArray  # of the limb or sheet, of the shape of the lattice; infinity elsewhere [m]
+    bare: Bools  # True for those cubes that contain no vertex of the cage
+    thickness: FloatArray  # of the limb or sheet in each cube [m]; infinity elsewhere
     points: FloatArray  # (k, 3), on the surface in or next to these cubes [m]
 
     @property
@@ -156,12 +157,12 @@ class MissedParts:
         return float(self.thickness.min())
 
     def among(self, lattice: Lattice, cubes: Bools) -> MissedParts:
-        """Select what lies in or next to some of the cubes."""
+        """Return the missed parts in or next to some of the cubes."""
         points = self.points[_are_in(lattice, self.points, around(cubes))]
         return MissedParts(cubes, self.bare & cubes, np.where(cubes, self.thickness, np.inf), points)
 
     def joined(self, other: MissedParts) -> MissedParts:
-        """Union with other missed parts."""
+        """Return the union with other missed parts."""
         return MissedParts(
             self.cubes | other.cubes,
             self.bare | other.bare,
@@ -179,7 +180,7 @@ def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[Fl
         mesh: the cage.
     """
     points, triangle = points_on(corners, PITCH * lattice.edge)
-    # Cubes first: they are enough for most surfaces.
+    # Test cubes first: this is enough for most surfaces.
     is_missed = _are_in(lattice, points, ~cubes_of(lattice, mesh.vertices))
     if is_missed.any():
         is_missed[is_missed] = (
@@ -189,9 +190,9 @@ def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[Fl
 
 
 def torn_points(solid: Solid, vertices: FloatArray, triangles: Ints) -> FloatArray:
-    """Points on the surface between components of a solid that triangles connect, (k, 3) [m].
+    """Points on the surface at gaps between components of a solid that triangles connect, (k, 3) [m].
 
-    A limb that is too thin is lost between voxels.
+    Such gaps appear if a limb is too thin for the voxels.
     Args:
         vertices: vertices of the surface, (n, 3) [m].
         triangles: (m, 3).
@@ -239,7 +240,7 @@ def solid_points(
 
 
 def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: FloatArray) -> MissedParts:
-    """Find the missed parts at some points far from a cage, and what connects them to it.
+    """Find the missed parts at points far from a cage, and the limbs that connect them to it.
 
     Args: far: result of `far_points`, at least one point; the other arguments as there.
     """
@@ -265,13 +266,13 @@ def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: Float
 
 
 def thickness(points: FloatArray, normals: FloatArray, corners: FloatArray) -> float:
-    """Thickness of what triangles enclose, measured along the normals through some points [m].
+    """Thickness of the solid that triangles enclose, measured along the normals at some points [m].
 
     Args:
         points: on the triangles, (k, 3) [m].
         normals: (k, 3), of any length.
         corners: corners of the triangles, (m, 3, 3) [m].
-    Returns: infinity if no line meets another triangle.
+    Returns: the thickness; infinity if no line meets another triangle.
     """
     sample = np.unique(np.linspace(0, len(points) - 1, min(RAYS, len(points))).astype(np.int64))
     lengths = np.linalg.norm(normals[sample], axis=1, keepdims=True)
@@ -285,7 +286,7 @@ def thickness(points: FloatArray, normals: FloatArray, corners: FloatArray) -> f
 def chords(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
     """Signed distance along lines through points on triangles to the next triangle, (k,) [m].
 
-    It is negative if the triangle lies behind, and infinity if there is none.
+    The distance is negative if the triangle lies behind, and infinite if there is none.
     Args:
         points: (k, 3) [m].
         directions: directions of the lines, (k, 3), of length 1.
@@ -305,7 +306,7 @@ def chords(points: FloatArray, directions: FloatArray, corners: FloatArray) -> F
 
 
 def _intersections(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
-    """Distance along each line to each triangle, (k, m) [m], NaN where they do not meet.
+    """Distance along each line to each triangle, (k, m) [m]; NaN if they do not meet.
 
     Möller and Trumbore, "Fast, minimum storage ray/triangle intersection" (1997).
     """

@@ -14,16 +14,16 @@ VOXELS_PER_CUBE = 8
 MIN_VOXELS_PER_CUBE, MAX_VOXELS_PER_CUBE = 3, 16
 
 MAX_VOXELS = 1 << 22
-"""Number of voxels above which they become coarser, down to `MIN_VOXELS_PER_CUBE`."""
+"""Number of voxels above which coarser voxels are used, down to `MIN_VOXELS_PER_CUBE`."""
 
 MAX_FINE_VOXELS = 1 << 21
-"""The same where limbs were missed."""
+"""Number of voxels above which coarser voxels are used in the search for missed limbs."""
 
 MAX_OPEN_FRACTION = 0.5
-"""Fraction of the rays into a surface that do not leave it again, above which it is a sheet."""
+"""Fraction of the rays into a surface that do not leave it again, above which it counts as an open sheet."""
 
 FLATTEST = 1e-6
-"""Volume over that of the bounding box below which only rounding is enclosed."""
+"""Enclosed volume, relative to the bounding box, below which it is only a rounding error."""
 
 
 def volume_within(corners: FloatArray) -> float:
@@ -35,7 +35,7 @@ def volume_within(corners: FloatArray) -> float:
 def voxel_edge(corners: FloatArray, cell_size: float) -> float:
     """Edge of voxels that resolve the solid [m].
 
-    The thickness of a sheet is twice its volume over its surface, and should have two voxels across.
+    The thickness of a sheet is twice its volume over its surface. Two voxels should fit into it.
     """
     area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * float(np.linalg.norm(area_vectors, axis=1).sum())
@@ -48,13 +48,13 @@ def voxel_edge(corners: FloatArray, cell_size: float) -> float:
 
 
 def fine_voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Edge of voxels for limbs that were missed between coarser ones [m]."""
+    """Edge of the voxels that find limbs between coarser voxels [m]."""
     edge = _affordable(cell_size / MAX_VOXELS_PER_CUBE, corners, cell_size, MAX_FINE_VOXELS)
     return min(edge, voxel_edge(corners, cell_size))
 
 
 def _affordable(edge: float, corners: FloatArray, cell_size: float, max_voxels: int) -> float:
-    """Enlarge an edge while there would be too many voxels [m]."""
+    """Return `edge` [m], enlarged until there are not too many voxels."""
     size = np.ptp(corners.reshape(-1, 3), axis=0)
     while edge < cell_size / MIN_VOXELS_PER_CUBE and np.prod(size / edge + 3.0) > max_voxels:
         edge *= 1.1

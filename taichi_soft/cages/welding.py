@@ -1,4 +1,4 @@
-"""Merge triangle corners at the same position: files have copies where textures or normals have seams."""
+"""Merge triangle corners at the same position: files contain copies at seams of textures or normals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 WELD = 1e-7
-"""Distance over the longest side below which vertices are merged; float32 files round by as much."""
+"""Distance, relative to the longest side, below which vertices are merged; float32 files round by as much."""
 
 
 def places_of(vertices: FloatArray, size: float) -> Ints:
@@ -18,7 +18,7 @@ def places_of(vertices: FloatArray, size: float) -> Ints:
 
     Args: size: longest side of the bounding box of the vertices in use [m].
     """
-    positions = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # -0.0 is 0.0
+    positions = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # turns -0.0 into 0.0
     return np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1)
 
 

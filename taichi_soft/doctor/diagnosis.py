@@ -1,4 +1,4 @@
-"""Diagnose a mesh file: findings, figures and advice."""
+"""Diagnose a mesh file: report findings, figures and advice."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ THIN = 0.5
 """Solid fraction of a tetrahedron below which it counts as thin."""
 
 MOST_THIN = 0.3
-"""Largest acceptable fraction of the solid in thin tetrahedra; every surface has some."""
+"""Largest acceptable fraction of the solid in thin tetrahedra. Every surface has some thin tetrahedra."""
 
 TRIALS = 30
 """Number of timed frames."""
@@ -53,7 +53,7 @@ class Grade(str, Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """Text and severity of one finding."""
+    """One result of a diagnosis: its severity, and a sentence."""
 
     grade: Grade
     text: str
@@ -61,12 +61,12 @@ class Finding:
 
 @dataclass
 class Diagnosis:
-    """All findings and figures of a mesh."""
+    """Result of `diagnose`: all findings and figures of a mesh."""
 
     name: str
     findings: list[Finding] = field(default_factory=list)
     surface: SurfaceFacts | None = None
-    figures: dict[str, float] = field(default_factory=dict)  # of the body, by name with unit
+    figures: dict[str, float] = field(default_factory=dict)  # measured values of the body, by name with unit
 
     @property
     def is_fit(self) -> bool:

@@ -28,11 +28,11 @@ PROBES = (1.0, 2.0, 4.0, 8.0)
 def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     """Write surfaces without degenerate and duplicate triangles, all facing outwards.
 
-    Vertices and holes are unchanged. The default axis of the format points up.
+    Vertices and holes are unchanged. In the file, the default axis of its format points up.
     Returns: the numbers of removed and of flipped triangles.
     Raises: MeshError for a path that trimesh cannot write to.
     """
-    import trimesh  # imported here because it is slow
+    import trimesh  # slow to import
 
     if path.suffix.lower() not in SURFACES:
         raise MeshError(f"{path.name}: unknown surface format {path.suffix!r}: use {', '.join(SURFACES)}")
@@ -64,7 +64,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
 
 
 def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDArray[np.bool_]:
-    """Mask of triangles with an area that are not duplicates, (m,)."""
+    """True for triangles that have an area and are not duplicates, (m,)."""
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     first = np.zeros(len(triangles), dtype=np.bool_)
     first[np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]] = True
@@ -72,7 +72,7 @@ def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDA
 
 
 def _faces_inward(corners: FloatArray, solid: Solid) -> NDArray[np.bool_]:
-    """Mask of triangles with more solid in front than behind, (m,)."""
+    """True for triangles with more solid in front than behind, (m,)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals *= solid.spacing / np.linalg.norm(normals, axis=1, keepdims=True)
     middles = corners.mean(axis=1)

@@ -11,7 +11,8 @@ from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surface import Surface, joined
 
 NO_AREA = 1e-12
-"""Twice the area over the square of the longest side, at and below which a triangle has no area."""
+"""A triangle counts as having no area if twice its area, divided by the square of the surface's longest side,
+is at most this."""
 
 
 @dataclass(frozen=True)
@@ -23,15 +24,15 @@ class SurfaceFacts:
     triangles: int
     parts: int  # connected components by shared vertices
     size: float  # longest side of the bounding box [m]
-    open_edges: int  # edges of one triangle
-    crowded_edges: int  # edges of more than two triangles
+    open_edges: int  # edges that belong to only one triangle
+    crowded_edges: int  # edges that belong to more than two triangles
     turned_edges: int  # edges that both triangles traverse in the same direction
     flat_triangles: int  # triangles without area
     repeated_triangles: int
 
 
 def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
-    """Collect the facts of several surfaces as one."""
+    """Return the facts of several surfaces together."""
     vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     welded = places_of(vertices, size)[triangles]

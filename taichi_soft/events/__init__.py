@@ -1,4 +1,4 @@
-"""Events of the steps since the last drain."""
+"""Record events during steps, and send them to listeners and callers."""
 
 from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (

@@ -1,4 +1,4 @@
-"""Contacts that are active, from the impulses of each step."""
+"""Find the contacts that begin and end, from the impulses of each step."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from taichi_soft.events.kinds import ContactBegan, ContactEnded
 
 CONTACT_PAUSE = 0.05
 """Time without an impulse [s] after which a contact ends. Single vertices of a body that rests, rolls or
-slides leave the ground and touch it again all the time; a hop of this duration is 3 mm high."""
+slides leave and touch the ground repeatedly; a hop of this duration is 3 mm high."""
 
 Key = tuple[int, int, int]
-"""Index of a body, kind of the other object, index of that collider or body: rows of `read_touches`."""
+"""Row of `read_touches`: index of a body, kind of the other object, index of that collider or body."""
 
 Vector = tuple[float, float, float]
 
@@ -41,7 +41,7 @@ class _Contact:
         self.touched, self.pause = time, 0.0
 
     def skip(self, dt: float, time: float, is_moving: bool) -> None:
-        """Skip a step without an impulse. Between resting objects the contact continues."""
+        """Count a step without an impulse as pause if either object moves; else the contact continues."""
         if is_moving:
             self.pause += dt
         else:
@@ -70,7 +70,7 @@ class Contacts:
         time: float,
         dt: float,
     ) -> tuple[list[ContactBegan], list[ContactEnded]]:
-        """Update the contacts after a step. Returns: those that began and those that ended, by key.
+        """Update the contacts after a step. Returns: those that began and those that ended, sorted by key.
 
         Args:
             touches: impulse that the first of each touching pair gave the second [N s].

@@ -1,6 +1,6 @@
-"""State on which the events of coming steps depend. A snapshot stores it separately from the world's state.
+"""State on which the events of later steps depend. A snapshot stores it separately from the world's state.
 
-It is not part of the world's state: two worlds in lockstep can record different events.
+The two are separate because two worlds in lockstep can record different events.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
 
 CONTACT_WIDTH = 11
-"""Columns of a contact: key (3), serial numbers of the two, began, touched, pause [s], impulse (3) [N s]."""
+"""Columns of a contact: key (3), both serial numbers, began, touched, pause [s], impulse (3) [N s]."""
 
 _KINDS = {kind.__name__: kind for kind in STRESS_KINDS}
 
@@ -37,22 +37,22 @@ class WatchEntry:
     """Stored watch of `Body.watch_stress` or `watch_tearing`."""
 
     kind: type[Event]
-    serial: int  # of the body
+    serial: int  # serial number of the body
     threshold: float  # [Pa]
     is_above: bytes  # one bit for each tetrahedron above the threshold, in kernel order
 
 
 @dataclass
 class EventState:
-    """State of the events. None for kinds that are not recorded."""
+    """State on which later events depend. A field is None if events that need it are not recorded."""
 
-    status: NDArray[np.int32] | None  # of the body in each slot, after the last step
+    status: NDArray[np.int32] | None  # status of the body in each slot, after the last step
     contacts: NDArray[np.float64] | None  # active contacts, (k, CONTACT_WIDTH)
     watches: list[WatchEntry]
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As data for JSON."""
+        """This state as plain data for JSON."""
         return {
             "status": None if self.status is None else self.status.tolist(),
             "contacts": as_plain(self.contacts),
@@ -61,7 +61,10 @@ class EventState:
 
     @classmethod
     def of(cls, plain: Any, slots: int) -> EventState:
-        """Read `plain` for a world with a number of slots. Raises: ValueError, or what Python raises."""
+        """Restore a state from `plain` data, for a world with `slots` slots.
+
+        Raises: ValueError for invalid values; for data of another form, KeyError or TypeError too.
+        """
         status, contacts = plain["status"], from_plain(plain["contacts"])
         if status is not None:
             status = np.array(status, dtype=np.int32)

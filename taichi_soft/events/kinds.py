@@ -44,7 +44,7 @@ class ContactBegan(Event):
     `a` is always a soft body. `isinstance(event.b, Collider)` is True for a collider.
     """
 
-    a: SoftBody  # the body; of two bodies the one with the smaller index
+    a: SoftBody  # the body; of two bodies, the one with the smaller index
     b: Collider | SoftBody  # the collider, or the other body
     impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; an impact can continue in the next step
 
@@ -56,14 +56,14 @@ class ContactEnded(Event):
     a: SoftBody  # as in `ContactBegan`
     b: Collider | SoftBody  # as in `ContactBegan`
     impulse: Floats  # (3,) that `a` gave `b` in total [N s]; none is counted while bodies sleep
-    duration: float  # [s] from start of the first step with an impulse to end of the last, or of sleep
+    duration: float  # [s] from the first step with an impulse to the end of the last, or of sleep
 
 
 @dataclass(frozen=True, eq=False)
 class StressExceeded(Event):
     """Tetrahedra exceeded the von Mises stress given to `Body.watch_stress`.
 
-    Only bodies with a call of `watch_stress` send these events.
+    They are sent only for bodies on which `watch_stress` was called.
     """
 
     body: SoftBody  # body of the tetrahedra
@@ -75,7 +75,7 @@ class StressExceeded(Event):
 class TearCandidates(Event):
     """Tetrahedra exceeded the tensile stress given to `Body.watch_tearing`: tears start there (Rankine).
 
-    Only bodies with a call of `watch_tearing` send these events. They do not tear the body: see `Torn`.
+    They are sent only for bodies on which `watch_tearing` was called. They do not tear the body: see `Torn`.
     """
 
     body: SoftBody  # body of the tetrahedra
@@ -100,7 +100,7 @@ class Woke(Event):
 
 @dataclass(frozen=True, eq=False)
 class Froze(Event):
-    """A body became non-finite, and was reset to its state before the step."""
+    """The state of a body became non-finite, and was reset to the state before the step."""
 
     body: SoftBody  # the frozen body
 

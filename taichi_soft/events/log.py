@@ -37,7 +37,7 @@ class EventLog:
     """The events of one world. Nothing is recorded before the first call of `record` or `on`."""
 
     def __init__(self, observer: Observer) -> None:
-        """Args: observer: finds the events of each step."""
+        """Create a log that records nothing. Args: observer: finds the events of each step."""
         self._observer = observer
         self._kinds: frozenset[type[Event]] = frozenset()
         self._is_recording = False
@@ -58,7 +58,7 @@ class EventLog:
         self._record(recorded)
 
     def _kinds_of(self, kind: Any) -> frozenset[type[Event]]:
-        """Kinds that a class stands for. Raises: see `World.record_events`."""
+        """Kinds of events that are `kind` or subclasses of it. Raises: see `World.record_events`."""
         is_class = isinstance(kind, type) and issubclass(kind, Event)
         kinds = frozenset(part for part in KINDS if is_class and issubclass(part, kind))
         if not kinds:
@@ -91,13 +91,13 @@ class EventLog:
         return listener
 
     def watch(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
-        """Watch a body's stress for one of `STRESS_KINDS`, from a threshold [Pa] on; None stops it."""
+        """Record events of `kind` when a body's stress exceeds a threshold [Pa]; None stops the watch."""
         self._observer.stress.set(kind, body, threshold)
         if threshold is not None:
             self._record(self._kinds | {kind})
 
     def warm_up(self) -> None:
-        """Evaluate the world as after a step without recording: see `World.warm_up`."""
+        """Run the kernels that find events, without recording events: see `World.warm_up`."""
         self._observer.warm_up()
 
     def renew_watches(self, body: SoftBody) -> None:
@@ -120,11 +120,11 @@ class EventLog:
             self._waiting.append(Released(step, time, body, handles))
 
     def save(self) -> EventState:
-        """State on which the events of coming steps depend."""
+        """Return the state on which the events of later steps depend."""
         return self._observer.save(self._kinds)
 
     def drop_since(self, step: int) -> None:
-        """Drop the queued events from that step on, because it was undone."""
+        """Drop the queued events of `step`, which was undone, and of later steps."""
         while self._waiting and self._waiting[-1].step >= step:
             self._waiting.pop()
         self._delivered = min(self._delivered, len(self._waiting))

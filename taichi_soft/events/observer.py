@@ -47,7 +47,10 @@ class Observer:
         slots: Sequence[SoftBody | None],
         colliders: Colliders | None,
     ) -> None:
-        """Args: state: all fields of the world. slots: the body in each. colliders: None without contact."""
+        """Create an observer of a world.
+
+        Args: state: fields of the world. slots: body in each slot. colliders: None without contact.
+        """
         self._state = state
         self._slots = slots
         self._colliders = colliders
@@ -69,7 +72,7 @@ class Observer:
         return self._colliders is not None
 
     def begin(self, kinds: frozenset[type[Event]], before: frozenset[type[Event]]) -> None:
-        """Start observing `kinds`, after observing the kinds in `before`."""
+        """Observe `kinds` from now on, instead of the kinds in `before`."""
         if self.has_contacts and self._state.capacity.contact.soft:
             self._state.soft.records_touches[None] = int(bool(kinds & CONTACT_KINDS))
         if kinds & (CONTACT_KINDS | SLEEP_KINDS):
@@ -123,7 +126,7 @@ class Observer:
             yield Froze(step, time, body)
 
     def save(self, kinds: frozenset[type[Event]]) -> EventState:
-        """State on which the events of the given kinds depend."""
+        """Return the state on which the events of the given kinds depend."""
         return EventState(
             self._status.copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
@@ -133,7 +136,7 @@ class Observer:
     def restore(
         self, kinds: frozenset[type[Event]], saved: EventState, step: int, lookup: HandleLookup
     ) -> None:
-        """Continue after a restored step, with its events where they were stored."""
+        """Continue after a restored step, from the state of those kinds that were stored with it."""
         self._frozen = []
         if kinds & CONTACT_KINDS and saved.contacts is not None:
             self._contacts.restore(saved.contacts, lookup)
@@ -141,7 +144,7 @@ class Observer:
             self._contacts = Contacts()
         if saved.status is not None:
             self._status[:] = saved.status
-            # A body spawned after the last step can occupy the slot of one that slept.
+            # A body spawned after the last step can occupy the slot of a body that slept.
             asleep = self._sleeping().items()
             self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
         elif kinds & (CONTACT_KINDS | SLEEP_KINDS):

@@ -1,4 +1,4 @@
-"""Watched bodies: find tetrahedra that exceed a stress in a step."""
+"""Find the tetrahedra of watched bodies that exceed a stress in a step."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class StressWatches:
         self._read = np.zeros((0, 5), dtype=np.float32)
 
     def set(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
-        """Watch a body for a kind of event from a stress [Pa] on; None stops it."""
+        """Watch a body for events of `kind` above a threshold [Pa]; None stops the watch."""
         self._watches.pop((kind, body), None)
         if threshold is not None:
             self._watches[kind, body] = _Watch(body, threshold, self._none_above(body))
@@ -68,7 +68,7 @@ class StressWatches:
         return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)
 
     def renew(self, body: SoftBody) -> None:
-        """Continue with a body that lost tetrahedra; those above the threshold count as new."""
+        """Update the watches of a body that lost tetrahedra. Tetrahedra above a threshold count as new."""
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:
                 self.set(kind, body, watch.threshold)
@@ -83,7 +83,7 @@ class StressWatches:
         ]
 
     def restore(self, entries: list[WatchEntry], lookup: HandleLookup) -> None:
-        """Continue as in an earlier state. Later watches stay, and all tetrahedra above them count as new."""
+        """Continue from an earlier state. Later watches stay, and tetrahedra above them count as new."""
         if not entries and not self._watches:
             return
         for (_, body), watch in self._watches.items():
@@ -115,7 +115,7 @@ class StressWatches:
         read_stress(self._state, self._program, self._blocks, self._limits, self._read)
 
     def warm_up(self) -> None:
-        """Evaluate a stress without recording."""
+        """Evaluate the stress of one block without recording it, so that the kernel is compiled."""
         read_stress(
             *(self._state, self._program, np.zeros(1, np.int32), np.zeros(1, np.float32)),
             np.empty((LANES, 5), np.float32),

@@ -33,20 +33,21 @@ MODE_TOLERANCE = 1e-5
 """Relative change of the squared frequency at which the search for the slowest mode ends."""
 
 TOLERANCE, GUARANTEED = 0.015, 0.05
-"""Relative error of a target at which the search ends, and that it guarantees. They differ because a game's
-floor and steps differ slightly from the simulated ones."""
+"""Relative error of each target at which the search ends, and the error that it guarantees. The second is
+larger, because the floor and the steps of a game differ slightly from those of the search."""
 
 MAX_TRIALS = 8
 """Largest number of simulations in a search."""
 
 SAG_RANGE = 1e-3, 0.3
-"""Range of sags. Below it, a body looks rigid and rounding matters; above it, bodies invert."""
+"""Allowed sags. Below this range, a body looks rigid and rounding matters; above it, bodies invert."""
 
 GRAVITY_SCALE_RANGE = 0.05, 20.0
-"""Range of gravity scales. Outside of it, motion does not look natural."""
+"""Allowed gravity scales. Outside this range, motion does not look natural."""
 
 PERIOD_RANGE = 1.0, 100.0
-"""Range of periods until a vibration settles: fewer do not look like a vibration, more never seem to end."""
+"""Allowed numbers of periods until a vibration settles. Fewer do not look like a vibration; more seem never
+to end."""
 
 MAX_LEAN = 0.2
 """Largest lean of a standing body [rad]. Beyond it, the body rolls or tips over."""
@@ -54,11 +55,11 @@ MAX_LEAN = 0.2
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Behaviour of a body."""
+    """Sag, frequency and settling time of a body."""
 
-    sag: float  # lowering of its highest point over its height, standing on a floor; nan if it tips over
+    sag: float  # lowering of its highest point on a floor, over its height; nan if it tips over
     wobble_hz: float  # frequency of its slowest vibration when nothing holds it [Hz]
-    settle_s: float  # time after which 5 % of that vibration remain [s]
+    settle_s: float  # time after which 5 % of that vibration's amplitude remains [s]
 
     def __str__(self) -> str:
         return f"sag {self.sag:.3g}, wobble_hz {self.wobble_hz:.3g}, settle_s {self.settle_s:.3g}"
@@ -70,8 +71,8 @@ class Feel:
 
     material: Material  # for `World.add_body`
     gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
-    predicted: Behaviour  # from its statics and its slowest mode
-    simulated: Behaviour  # as in a game: standing on a floor, and vibrating in the air
+    predicted: Behaviour  # calculated from statics and from the slowest mode
+    simulated: Behaviour  # measured in a simulation, on a floor and in the air
 
 
 def material_from_feel(
@@ -87,13 +88,13 @@ def material_from_feel(
     """Find the Young's modulus, gravity_scale and damping that give a body the requested behaviour.
 
     Sag and frequency both depend on Young's modulus. If both are requested, the frequency sets Young's
-    modulus and gravity is scaled for the sag. The result is simulated, and meets each target to 5 %. The
+    modulus and gravity is scaled for the sag. The result is simulated, and meets each target within 5 %. The
     search takes seconds, and starts Taichi with its defaults if `init` was not called.
     Args:
         mesh: the body at rest, standing upright with z up. For an artist's mesh pass the cage, `asset.mesh`.
         sag: lowering of its highest point over its height, when it stands on a floor.
         wobble_hz: frequency of its slowest vibration when nothing holds it [Hz].
-        settle_s: time after which 5 % of that vibration remain [s]; None for the default damping_ratio of
+        settle_s: time after which 5 % of its amplitude remains [s]; None for the default damping_ratio of
             `Material`.
         poisson: Poisson's ratio, as in `Material`.
         density: [kg/m^3].
@@ -131,13 +132,13 @@ class _Body:
             raise OptionError(f"{mesh!r} has no vibration mode: use a finer mesh")
         height = float(np.ptp(mesh.vertices[:, 2]))
         self.weight = density * GRAVITY_EARTH * height  # pressure under a column of the body's height [Pa]
-        self.speed = omega / sqrt(1e5)  # angular frequency of the slowest mode, over the root of `young`
-        self.estimate = self.asset.first_frequency / sqrt(1e5)  # the estimate that damping ratios refer to
-        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)  # of a frame, likewise
+        self.speed = omega / sqrt(1e5)  # angular frequency of the slowest mode / sqrt(young)
+        self.estimate = self.asset.first_frequency / sqrt(1e5)  # estimate that damping ratios refer to
+        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)  # per frame / sqrt(young)
         self.trial = Trial(self.asset)
 
     def material(self, young: float, rate: float) -> Material:
-        """Material whose slowest mode decays at a rate [1/s]."""
+        """Return the material whose slowest mode decays at `rate` [1/s]."""
         poisson, density = self.constants
         return Material(young, poisson, density, damping_ratio=rate / (self.estimate * sqrt(young)))
 
@@ -146,7 +147,7 @@ class _Body:
         return self.speed * sqrt(young)
 
     def static_sag(self, weight_ratio: float) -> float:
-        """Sag by statics, for a pressure `weight` of this ratio to Young's modulus."""
+        """Static sag of the body if the pressure `weight` over Young's modulus is `weight_ratio`."""
         young = self.weight / MAX_SAG
         material = self.material(young, DAMPING_RATIO * self.omega(young))
         standing = self.trial.stand(material, weight_ratio / MAX_SAG, 2 * pi / self.omega(young), 0.0)
@@ -154,7 +155,7 @@ class _Body:
         return standing.static_sag
 
     def weight_ratio_for(self, sag: float) -> float:
-        """Ratio of `weight` to Young's modulus for a sag, by the secant method on logarithms.
+        """Ratio of `weight` to Young's modulus that gives a sag, by the secant method on logarithms.
 
         Raises: OptionError if the body would be too soft.
         """
@@ -217,7 +218,7 @@ class _Search:
         return feel
 
     def _evaluate(self) -> Feel:
-        """Behaviour with the current constants, from statics and the slowest mode, and from a simulation."""
+        """Return the material with the current constants, and its predicted and simulated behaviour."""
         omega, trial = self.body.omega(self.young), self.body.trial
         period, settle = 2 * pi / omega, DECAY_FACTOR / self.rate
         material = self.body.material(self.young, self.rate)

@@ -1,4 +1,4 @@
-"""One body in a world of its own: measure its sag on a floor, and its free vibration."""
+"""Measure the sag of a body on a floor, and its free vibration, in a separate world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 AMPLITUDE = 1e-3
-"""Amplitude of a measured vibration over the body's size: small, and far above the rounding of positions."""
+"""Amplitude of a measured vibration over the body's size: small, but far above the rounding of positions."""
 
 SAMPLES = 12
 """Samples per period: few enough to separate the frequency from rounding, many enough to resolve the wave."""
@@ -28,20 +28,20 @@ SETTLED_CHANGE = 2e-3
 """Relative change of the sag over a period below which a damped body counts as standing."""
 
 MAX_PERIODS = 60
-"""Limit of the time until a damped body rests."""
+"""Longest time until a damped body counts as standing, in periods."""
 
 
 class Standing(NamedTuple):
     """Sag of a standing body: lowering of its highest point under its own weight, over its height."""
 
-    static_sag: float  # by statics
-    free_sag: float  # without the drag, as in a game
+    static_sag: float  # at rest, with drag
+    free_sag: float  # after the drag is removed, as in a game
     lean: float  # rotation from the pose of the mesh [rad]
     inverted: int  # number of inverted tetrahedra; all if the body froze
 
 
 class Trial:
-    """A world with one body, which gets each material in turn."""
+    """World with one body, to which each material is assigned in turn."""
 
     def __init__(self, asset: SoftBodyAsset) -> None:
         """Build the world. Raises: StateError, see `World.build`."""
@@ -59,7 +59,7 @@ class Trial:
         """Put the body on the floor in the pose of its mesh, with drag until it rests; then remove the drag.
 
         Args:
-            period: of its slowest vibration [s].
+            period: period of its slowest vibration [s].
             seconds: time without drag [s].
         """
         body = self._prepare(material, gravity_scale, 2 * np.pi / period)
@@ -78,8 +78,8 @@ class Trial:
     def ring_down(self, material: Material, mode: Floats, period: float) -> tuple[float, float]:
         """Let the body vibrate in a mode, without contact and gravity.
 
-        Each sample of a damped wave is a linear combination of the two before it, whose coefficients give
-        frequency and decay (Prony 1795). They are fitted by least squares over all samples.
+        Each sample of a damped wave is a linear combination of the two samples before it. The coefficients
+        give frequency and decay (Prony 1795), and are fitted by least squares over all samples.
         Args:
             mode: (n, 3), with a largest entry of 1.
             period: approximate period of the mode [s].

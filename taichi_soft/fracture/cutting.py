@@ -1,8 +1,8 @@
 """Cut bodies along the faces of their tetrahedra (thesis chapter 7).
 
-Tetrahedra are connected only by shared particles, so a cut duplicates particles and changes no tetrahedron.
-A copy starts with the position and velocity of its original, and mass follows the tetrahedra. So mass,
-momentum and elastic energy are conserved.
+Tetrahedra are connected only by common particles, so a cut duplicates particles and changes no tetrahedron.
+A copy starts with the position and velocity of its original. The tetrahedra around a particle determine its
+mass. Mass, momentum and elastic energy are therefore conserved.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertice
 Floats = NDArray[np.float64]
 
 MIN_FRAGMENT = 0.02
-"""Smallest part of the body's volume that gets its own slot when torn off: slots are for larger pieces."""
+"""Smallest fraction of the body's volume at which a piece that is torn off gets its own slot."""
 
 
 def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
@@ -84,7 +84,7 @@ def require_cuttable(body: SoftBody) -> None:
 
 
 def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
-    """Corners (3, 3) [m] of the triangle, or three points of the plane; its normal; True for a plane."""
+    """Return corners (3, 3) [m] (for a plane, its point three times), the normal, and True for a plane."""
     if (plane is None) == (triangle is None):
         raise OptionError("pass plane=(point, normal) or triangle=(3, 3), one of the two")
     if triangle is not None:
@@ -122,17 +122,18 @@ class _Piece:
 
     description: BodyDescription
     arrays: BodyArrays
-    vertices: NDArray[np.int64]  # (n,) vertex of the body before that each is, or is a copy of
-    tets: NDArray[np.int64]  # (m,) rows in the body before
+    vertices: NDArray[np.int64]  # (n,) original of each vertex in the body before the cut
+    tets: NDArray[np.int64]  # (m,) row of each tetrahedron in the body before the cut
 
 
 def divide(
     body: SoftBody, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_fragments: bool = False
 ) -> tuple[SoftBody, ...]:
-    """Open a body along faces. Returns: the pieces that were separated, the largest first.
+    """Separate a body along faces. Returns: the pieces that became new bodies, the largest first.
 
     Args:
-        keeps_fragments: True leaves small pieces in the body, and those for which no slot is free.
+        is_cut: (f,), True for each of `faces` that is cut.
+        keeps_fragments: True to leave small pieces, and pieces for which no slot is free, in the body.
     """
     context, mesh = context_of(body), body.mesh
     assert isinstance(mesh, TetMesh), "other meshes were refused before"
@@ -196,7 +197,7 @@ def require_room(context: Context, slot: int, arrays: BodyArrays) -> None:
 def _write_pieces(
     context: Context, body: SoftBody, pieces: list[_Piece], slots: list[int]
 ) -> tuple[SoftBody, ...]:
-    """Write the first piece into the body's slot and the others into free slots. Cannot fail."""
+    """Write the first piece into the body's slot, and the others, which are returned, into free slots."""
     built = context.built
     state = built.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
@@ -211,7 +212,7 @@ def _write_pieces(
         free = rows[:, 12] > 0.0
         masses = piece.description.masses
         rows[free, 12] = 1.0 / masses[free]
-        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # external forces and reactions follow the mass
+        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # external forces and reactions are scaled by mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         write_slot(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
@@ -246,12 +247,12 @@ def warm_up(context: Context, state: BodyFields, slot: int) -> None:
 def refill_slot(
     context: Context, state: BodyFields, slot: int, level: int = 0, part: BodyArrays | None = None
 ) -> None:
-    """Write an asset's body, a level or a part of it, at rest into a slot that held another body."""
+    """Write an asset's body at rest into a slot that held another body; at a `level`, or only a `part`."""
     asset = context.slots.assets[slot].levels[level]
     arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
-    _write_kind(state, slot, asset)  # the body before can have had another material
+    _write_kind(state, slot, asset)  # the previous body can have had another material
     context.layout.bodies[slot] = arrays
 
 
@@ -295,7 +296,7 @@ def write_slot(
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:
-    """Arguments of `write_body` after `motion`. Args: as in `write_slot`."""
+    """Return the arguments of `write_body` that follow `motion`. Args: as in `write_slot`."""
     first = _float_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
     present = first if inverses is None else _float_blocks(np.swapaxes(inverses, 1, 2), 9)
     return (

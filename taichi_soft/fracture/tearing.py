@@ -1,4 +1,4 @@
-"""Bodies that tear where their stress exceeds a limit."""
+"""Tear bodies at faces whose stress exceeds a limit."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from taichi_soft.meshing.splitting import InnerFaces
 Floats = NDArray[np.float64]
 
 _WORST_FRACTION = 0.9
-"""Fraction of the largest stress. Faces below it wait for the next step, after the tear has redistributed the
-load."""
+"""Fraction of the largest stress from which a face tears. The other faces wait for the next step, after the
+tear has redistributed the load."""
 
 _TIP_FACTOR = 2.0
-"""Factor on the stress at the end of a tear, where the tetrahedra are too coarse to resolve the peak. With it
-a tear continues before another one begins."""
+"""Factor on the stress at the end of a tear, because the tetrahedra are too coarse to resolve the peak. With
+it, a tear continues before another one begins."""
 
 
 class Tears(Slice):
-    """Bodies of a world that can tear; checked after every step."""
+    """Bodies of a world that can tear. They are checked after every step."""
 
     name = "tears"
 
@@ -51,12 +51,12 @@ class Tears(Slice):
         if any(asset.tearing for asset in slots.kinds):
             self._limits = np.zeros(len(slots.slots), dtype=np.float32)
             self._found = np.zeros(len(slots.slots), dtype=np.int32)
-            find_overloaded(state, program, self._limits, self._found)  # compiles
+            find_overloaded(state, program, self._limits, self._found)  # compiles the kernel
             for body in slots.occupants:
                 self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
-        """Check a body from now on if it can tear, and stop checking the body that had its slot before."""
+        """Start checking a body if it can tear, and stop checking the previous body of its slot."""
         if not self.is_active:
             return
         tearing = body.asset.tearing
@@ -71,7 +71,7 @@ class Tears(Slice):
         self._limits[body.index] = 0.0
 
     def entries(self) -> list[list[Any]]:
-        """Slots of the bodies that are exhausted."""
+        """Slots of the bodies that could tear but have no spare vertices left."""
         return [
             [body.index]
             for body in self.context.slots.occupants
@@ -79,7 +79,7 @@ class Tears(Slice):
         ]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """Empty: no entry has a serial number."""
+        """Return an empty list: entries contain no serial numbers."""
         return []
 
     def read(
@@ -156,7 +156,7 @@ def _select_faces(
     axis: Floats,
     most: int,
 ) -> list[int]:
-    """Faces that tear: those with the largest stress normal to them, without common vertices.
+    """Select the faces that tear: those with the largest normal stress, without common vertices.
 
     Args: pull: (f,) largest principal stress [Pa], zero for faces that must not tear.
     """

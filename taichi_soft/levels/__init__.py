@@ -1,1 +1,1 @@
-"""Change of a body's level of detail while it moves."""
+"""Change the level of detail of a body while it moves."""

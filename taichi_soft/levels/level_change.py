@@ -1,9 +1,9 @@
-"""Change of a body's level of detail: it continues with more or fewer tetrahedra.
+"""Change the level of detail of a body, which then continues with more or fewer tetrahedra.
 
-`Passage` maps positions and velocities, now and before the last step, as a skin is mapped. If the body is
-free, a correction of its position and a rigid motion added to its velocities then preserve centre of mass,
-momentum and angular momentum to round-off. Deformation finer than the new mesh is lost, with its energy. A
-body that is held stays held at the corresponding vertices of the new mesh.
+`Passage` maps the positions and velocities after and before the last step, by the same scheme as a skin.
+If the body is free, a shift of its position and a rigid motion added to its velocities then preserve centre
+of mass, momentum and angular momentum to round-off. Deformation finer than the new mesh is lost, with its
+energy. A body that is held stays held at the corresponding vertices of the new mesh.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def _finest_held(body: SoftBody) -> Ints | None:
         return present
     if record.held is not None and np.array_equal(_nearest_at(body, record.held, record.level), present):
         return record.held
-    # The pinned vertices have changed since: take the nearest ones of the finest level.
+    # The pinned vertices have changed since then: use the nearest ones of the finest level.
     return passage(body.asset, record.level, 0).nearest(present)
 
 

@@ -18,9 +18,9 @@ Ints = NDArray[np.int64]
 
 
 class Passage:
-    """Map from the vertices of one level of detail to those of another.
+    """Map of deformations from one level of detail to another.
 
-    The map is linear, exact for rigid motions and of second order like a skin: see `bodies.skin`.
+    The map is linear, exact for rigid motions, and of second order, as for a skin: see `bodies.skin`.
     """
 
     def __init__(self, source: SoftBodyAsset, target: SoftBodyAsset) -> None:
@@ -56,7 +56,7 @@ class Passage:
 def _weights(
     mesh: TetMesh, corners: NDArray[np.int32], coordinates: Floats, offsets: Floats
 ) -> tuple[Ints, Ints, Floats]:
-    """Source vertices (e,) and weights (e,) of each of k target vertices, which start at rows (k,).
+    """Return source vertices (e,), the first row of each of the k target vertices (k,), and weights (e,).
 
     Each corner of the source tetrahedron contributes its barycentric coordinate, and its gradient from
     `gradient_rows` times the offset.
@@ -86,7 +86,7 @@ _cached: weakref.WeakKeyDictionary[SoftBodyAsset, dict[tuple[int, int], Passage]
 
 
 def passage(asset: SoftBodyAsset, source: int, target: int) -> Passage:
-    """Map from one level of detail of an asset to another, cached after the first call."""
+    """Return the map from one level of detail of an asset to another, cached after the first call."""
     passages = _cached.setdefault(asset, {})
     if (source, target) not in passages:
         passages[source, target] = Passage(asset.levels[source], asset.levels[target])

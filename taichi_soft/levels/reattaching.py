@@ -1,7 +1,7 @@
 """Attachments of a body whose level changes: frames hold the nearest vertices of the new mesh.
 
-`level_change` pins the vertices that are nearest to the pinned ones of the old mesh. Each of them belongs to
-the attachment that held the nearest pinned vertex before.
+`level_change` pins the vertices that are nearest to the pinned vertices of the old mesh. Each of them then
+belongs to the attachment that held its nearest pinned vertex before.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Reattachments = list[tuple[Any, NDArray[np.int32]]]
 
 
 def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments:
-    """Find the vertices that each attachment of a body will hold at another level; can be none.
+    """Find the vertices that each attachment of a body will hold at another level; there can be none.
 
     Args: held: vertices of that level that will be pinned.
     """
@@ -42,7 +42,8 @@ def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments
 def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats) -> None:
     """Write each vertex's target in its frame, and its reaction of the last step, to rows of `read_motion`.
 
-    The vertices of an attachment share its load evenly: the force is kept, the torque only approximately.
+    An attachment's load is divided evenly among its vertices. This keeps the force, and the torque
+    approximately.
     """
     for attachment, particles in reattachments:
         frame = attachment.frame

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def with_install_hint(call: str, *packages: str) -> str:
-    """Append to `call` how to install those of its packages that are missing."""
+    """Return `call`, followed by how to install those of `packages` that are missing."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if not missing:
         return call
@@ -17,7 +17,7 @@ def with_install_hint(call: str, *packages: str) -> str:
 
 
 def scene_hint(source: Any) -> str:
-    """Suggest how to make one mesh of a trimesh.Scene; empty for any other source."""
+    """Return a hint on how to join a trimesh.Scene into one mesh; an empty string for any other source."""
     if not (hasattr(source, "geometry") and hasattr(source, "graph")):
         return ""
     method = "to_geometry()" if hasattr(source, "to_geometry") else "dump(concatenate=True)"
@@ -25,5 +25,5 @@ def scene_hint(source: Any) -> str:
 
 
 def fill_hint(surface: str) -> str:
-    """Suggest how to make a body from the surface that the expression `surface` returns."""
+    """Return a hint on how to make a body from a surface; `surface` is the code that evaluates to it."""
     return f"SoftBodyAsset.from_surface({surface}, material) makes a body from it"

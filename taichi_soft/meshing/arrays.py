@@ -1,4 +1,4 @@
-"""Array arguments: checked, read-only copies of what a caller passes."""
+"""Check the arrays that a caller passes, and copy them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from taichi_soft.core.errors import MeshError, OptionError
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int32]
 
-# Products of three lengths must stay finite in float64 (largest 1.8e308), with room to spare.
+# Products of three lengths must stay finite in float64 (largest 1.8e308), with a margin.
 LARGEST_COORDINATE = 1e30
 
 MAX_TETS = 10_000_000
-"""Largest number of tetrahedra of a built-in shape: more take minutes and tens of gigabytes."""
+"""Largest number of tetrahedra in a built-in shape: more would take minutes and tens of gigabytes."""
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -34,9 +34,10 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], element: str) -> FloatArray:
-    """Return a float64 copy of `values`, checked to be finite and of a shape (None: any length).
+    """Return `values` as a finite float64 copy of the given shape, in which None allows any length.
 
-    Raises: MeshError with the shape, the dtype or the first bad row (called `element`).
+    Raises: MeshError for an empty array, a wrong shape or dtype, or a number that is not finite. The message
+        calls a row `element`.
     """
     array = _as_array(values, name)
     expected = "(" + ", ".join("n" if length is None else str(length) for length in shape) + ")"
@@ -77,8 +78,8 @@ def as_indices(
 ) -> IntArray:
     """Return vertex indices as an int32 copy of shape (m, width), each from 0 to vertex_count - 1.
 
-    Raises: MeshError for a wrong shape or dtype, or if a row (called `element`) has an index out of range, or
-        the same vertex twice unless it `may_repeat`.
+    Raises: MeshError for an empty array, a wrong shape or dtype, an index out of range, or (unless
+        `may_repeat`) a row that names a vertex twice. The message calls a row `element`.
     """
     array = _as_array(values, name)
     if array.size == 0:
@@ -112,5 +113,5 @@ def require_tet_count(tets: int) -> None:
 
 
 def name_vertices(indices: NDArray[Any]) -> str:
-    """Vertex indices of one element as messages print them: `4, 9, 2, 31`."""
+    """Format the vertex indices of one element for a message: `4, 9, 2, 31`."""
     return ", ".join(str(int(index)) for index in indices)

@@ -1,4 +1,4 @@
-"""Base of all meshes of bodies: particles and the edges between them."""
+"""Base class of all meshes of bodies: particles and the edges between them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class BodyMesh(ABC):
     surface: IntArray
 
     def __init__(self, vertices: FloatArray, edges: IntArray, tets: IntArray) -> None:
-        # __dict__ bypasses __setattr__ below; cached_property stores its value in the same way.
+        # __dict__ bypasses __setattr__ below, as cached_property does too.
         self.__dict__.update(vertices=read_only(vertices), edges=read_only(edges), tets=read_only(tets))
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
@@ -50,7 +50,7 @@ class BodyMesh(ABC):
 
     @abstractmethod
     def _with_vertices(self: Self, vertices: FloatArray) -> Self:
-        """Return the same mesh with other positions."""
+        """Return a copy of this mesh with other positions."""
 
     @cached_property
     def edge_lengths(self) -> FloatArray:

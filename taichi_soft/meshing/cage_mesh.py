@@ -19,7 +19,7 @@ class CageMesh(TetMesh):
 
     Args:
         vertices, tets: as for `TetMesh`.
-        fill: volume of the solid that each tetrahedron carries, relative to the tetrahedron's own, (m,),
+        fill: volume of the solid that each tetrahedron carries, divided by the tetrahedron's volume, (m,),
             above 0. Stiffness and damping are multiplied by it.
         vertex_volumes: volume of the solid that each vertex carries, (n,), above 0 [m^3].
     Raises: MeshError as for `TetMesh`, and for arrays of the wrong length or with values of 0 or less.
@@ -38,7 +38,7 @@ class CageMesh(TetMesh):
         self.__dict__.update(fill=read_only(fill), vertex_volumes=read_only(vertex_volumes))
 
     def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        # Copies of a vertex divide its volume in proportion to the volumes of the tetrahedra around each.
+        # The copies of a vertex divide its volume in proportion to the solid volume around each copy.
         before = lumped(original.tets, original.fill * original.volumes, len(original.vertices))
         after = lumped(self.tets, original.fill[rows] * self.volumes, len(vertices))
         self._set_volumes(original.fill[rows], original.vertex_volumes[vertices] * after / before[vertices])
@@ -56,7 +56,7 @@ class CageMesh(TetMesh):
 
 
 def lumped(tets: NDArray[Any], volumes: FloatArray, count: int) -> FloatArray:
-    """Assign a quarter of each tetrahedron's volume to each of its vertices, (n,) [m^3]."""
+    """Return the volume of each vertex, (n,) [m^3]: a quarter of each tetrahedron around it."""
     return np.bincount(tets.ravel(), np.repeat(volumes / 4.0, 4), count).astype(np.float64)
 
 

@@ -1,7 +1,7 @@
-"""Cavities of a tetrahedral mesh and their replacements: flips, collapses and moves of one vertex.
+"""Cavities (sets of tetrahedra) and the tetrahedra that replace them in flips, collapses and vertex moves.
 
-A virtual vertex OUTSIDE closes the mesh, with one tetrahedron on each triangle of the surface. Surface
-vertices then have complete stars, and changes of the surface need no special case.
+The mesh is closed by a virtual vertex OUTSIDE: an additional tetrahedron joins it to each surface triangle.
+Surface vertices then have complete stars, so changes of the surface need no special case.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 OUTSIDE = 0
-LARGEST_RING = 7  # most tetrahedra around an edge that a flip removes: the ring has 42 triangulations
+LARGEST_RING = 7  # largest number of tetrahedra around an edge that a flip removes: 42 triangulations
 # The other two corners for corners i and j, ordered so that (i, j, k, l) is an even permutation.
 _OPPOSITE = np.zeros((4, 4, 2), dtype=np.int64)
 for _face in range(4):
@@ -33,10 +33,10 @@ class Cavities(NamedTuple):
     """Sets of tetrahedra and their replacements with the same boundary; rows sorted by cavity."""
 
     removed: Ints  # (r,) rows of the mesh
-    removed_of: Ints  # (r,) cavity of each
-    added: Ints  # (a, 4) vertices
-    added_of: Ints  # (a,)
-    parent: Ints  # (a,) row that each replaces, -1 if it is not a single one
+    removed_of: Ints  # (r,) cavity of each removed row
+    added: Ints  # (a, 4) vertices of the new tetrahedra
+    added_of: Ints  # (a,) cavity of each new tetrahedron
+    parent: Ints  # (a,) row that each new tetrahedron replaces, -1 if it replaces several
 
     @property
     def total(self) -> int:
@@ -44,13 +44,13 @@ class Cavities(NamedTuple):
         return int(self.removed_of[-1]) + 1 if len(self.removed_of) else 0
 
     def in_rows(self, rows: Ints) -> Cavities:
-        """Cavities of part of a mesh, renumbered so that row i becomes `rows[i]`."""
+        """Return these cavities of a part of a mesh with the rows of the whole mesh: i becomes `rows[i]`."""
         return self._replace(
             removed=rows[self.removed], parent=np.where(self.parent < 0, -1, rows[self.parent])
         )
 
     def kept(self, keep: Bools) -> Cavities:
-        """Cavities for which `keep` (number of cavities,) is True, renumbered."""
+        """Return the cavities for which `keep`, (number of cavities,), is True, renumbered from 0."""
         new_index = np.cumsum(keep) - 1
         is_removed, is_added = keep[self.removed_of], keep[self.added_of]
         return Cavities(
@@ -78,7 +78,7 @@ class ClosedMesh:
         self._simplex_keys = np.unique(np.concatenate([tet_keys, self._face_keys.ravel(), edge_keys.ravel()]))
 
     def star(self, vertices: Ints) -> tuple[Ints, Ints]:
-        """Rows around each vertex, vertex by vertex, and the entry of `vertices` that each belongs to."""
+        """Return the rows around each vertex, vertex by vertex, and the index in `vertices` of each row."""
         counts = self._counts[vertices]
         of = np.repeat(np.arange(len(vertices)), counts)
         return self._by_vertex[ranges(self._starts[vertices], counts)], of
@@ -100,12 +100,12 @@ class ClosedMesh:
 
 
 def ranges(starts: Ints, counts: Ints) -> Ints:
-    """Concatenate the ranges start, start + 1, ... that have the given counts."""
+    """Concatenate the ranges start, start + 1, ..., start + count - 1."""
     return np.repeat(starts - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
 
 
 def sizes(x: FloatArray, tets: Ints) -> FloatArray:
-    """Edge of the regular tetrahedron with the same sum of squared shape gradients, (k,) [m].
+    """Size of each tetrahedron: edge of the regular one with equal sum of squared shape gradients, (k,) [m].
 
     Negative for an inverted tetrahedron, infinite outside the surface.
     """
@@ -120,7 +120,7 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
-    """Gradient of each tetrahedron's size at one of its corners (k,), by finite differences, (k, 3)."""
+    """Numerical gradient (k, 3) of each tetrahedron's size with respect to its corner `vertices` (k,)."""
     rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
     own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
     step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)
@@ -141,7 +141,7 @@ def volumes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def is_flat(x: FloatArray, tets: Ints) -> Bools:
-    """True for tetrahedra (k, 4) that `TetMesh` refuses as flat, or almost."""
+    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat, or that are almost as flat."""
     ends = x[tets[:, LOCAL_EDGES]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
     flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
@@ -149,7 +149,7 @@ def is_flat(x: FloatArray, tets: Ints) -> Bools:
 
 
 def collapses(mesh: ClosedMesh, removed: Ints, target: Ints) -> Cavities:
-    """Collapse each vertex of `removed` (k,) into `target`: a neighbour, or a new vertex for a move."""
+    """Collapse each vertex of `removed` (k,) into its `target`: a neighbour, or a new vertex (a move)."""
     rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
     stay = ~(tets == target[of, None]).any(axis=1)
@@ -158,7 +158,7 @@ def collapses(mesh: ClosedMesh, removed: Ints, target: Ints) -> Cavities:
 
 
 def meets_link_condition(mesh: ClosedMesh, removed: Ints, target: Ints) -> Bools:
-    """True where a collapse keeps the topology: whatever touches both vertices must touch their edge."""
+    """True if a collapse keeps the topology: each simplex linked to both vertices is linked to their edge."""
     rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
     far = ~(tets == target[of, None]).any(axis=1)
@@ -174,7 +174,7 @@ def meets_link_condition(mesh: ClosedMesh, removed: Ints, target: Ints) -> Bools
 
 
 def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
-    """Replace two tetrahedra on a face of `rows` by three around the edge between their apexes (2-3 flip)."""
+    """Return the 2-3 flips at the faces of `rows`: three tetrahedra around a new edge replace two."""
     row, corner = np.repeat(rows, 4), np.tile(np.arange(4), len(rows))
     neighbour = mesh.neighbours()[row, corner]
     apex = mesh.tets[row, corner]
@@ -189,7 +189,10 @@ def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
 
 
 def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities]:
-    """Replace the tetrahedra around each edge (k, 2) by the best triangulation of their ring."""
+    """Replace the tetrahedra around each edge (k, 2) by the best triangulation of their ring.
+
+    Returns: the cavities for each number of tetrahedra around an edge, up to `LARGEST_RING`.
+    """
     rows, of = mesh.star(edges[:, 0])
     shares_edge = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
     rows, of = rows[shares_edge], of[shares_edge]
@@ -222,7 +225,7 @@ def _ring_fills(x: FloatArray, mesh: ClosedMesh, edges: Ints, rows: Ints) -> Cav
         [np.stack([k, ends[..., 1], i, j], axis=2), np.stack([ends[..., 0], k, i, j], axis=2)], axis=2
     )  # (count, triples, 2, 4)
     worst = sizes(x, tips.reshape(-1, 4)).reshape(*corners.shape[:2], 2).min(axis=2)
-    # New simplices inside must not exist elsewhere: a chord, or the triangle of a ring of three.
+    # A new inner simplex (a chord, or the triangle of a ring of three) must not exist elsewhere in the mesh.
     if n == 3:
         worst[mesh.has(corners[:, 0]), 0] = -np.inf
     else:
@@ -239,7 +242,9 @@ def _ring_fills(x: FloatArray, mesh: ClosedMesh, edges: Ints, rows: Ints) -> Cav
 
 @cache
 def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
-    """Triples (t, 3) of a ring of n, its triangulations by triples (w, n - 2), its chords (c, 2)."""
+    """Triples (t, 3) of a ring of n vertices, its triangulations as indices of triples (w, n - 2), and its
+    chords (c, 2).
+    """
 
     def fill(i: int, j: int) -> list[list[tuple[int, int, int]]]:
         return [

@@ -13,15 +13,15 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 NONE = -1
-"""Row of a corner without the attribute."""
+"""Value in `Attribute.at` for a corner without the attribute."""
 
 BEFORE_FIRST = 1 << 40
-"""Row of an index that counts back past the first row; no table has it."""
+"""Value for an index that counts back past the first row; it is larger than any table."""
 
 
 @dataclass(frozen=True, eq=False)
 class Attribute:
-    """One attribute of corners, as rows of a table."""
+    """One attribute of the corners: a table of values, and the row of each corner."""
 
     rows: FloatArray  # (r, d)
     at: Ints  # (m, 3), row of each corner, or NONE
@@ -29,13 +29,13 @@ class Attribute:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Vertices with one row of each attribute.
+    """Result of `split`: vertices that have one value of each attribute.
 
     The vertices of the file come first, in their order. Copies follow, ordered by vertex, then by their first
     corners.
     """
 
-    vertex: Ints  # (n,), vertex of the file that each is or copies
+    vertex: Ints  # (n,), vertex of the file that each vertex is or copies
     triangles: Ints  # (m, 3)
     attributes: tuple[FloatArray, ...]  # (n, d) each, NaN for vertices without the attribute
 
@@ -46,7 +46,7 @@ def split(vertex_count: int, triangles: Ints, attributes: tuple[Attribute, ...],
     Args:
         vertex_count: number of vertices of the file.
         triangles: (m, 3), vertices of the file.
-        keep: True keeps vertices without triangles, so that the numbers are those of the file.
+        keep: True to keep vertices without triangles, so that vertices keep their numbers in the file.
     """
     corners = triangles.reshape(-1).astype(np.int64)
     labels, key = [_labels(each) for each in attributes], corners
@@ -93,11 +93,11 @@ def require_vertices(corners: Ints, counts: Ints, vertex_count: int) -> None:
 
 
 def _labels(attribute: Attribute) -> Ints:
-    """Number of each corner's value, the same for equal values, (3 m,)."""
+    """Number the values of an attribute. Returns each corner's number, (3 m,), equal for equal values."""
     at = attribute.at.reshape(-1)
     if len(attribute.rows) == 0:
         return np.zeros(len(at), dtype=np.int64)
-    rows = np.ascontiguousarray(attribute.rows + 0.0)  # -0.0 is 0.0
+    rows = np.ascontiguousarray(attribute.rows + 0.0)  # turns -0.0 into 0.0
     values = np.unique(rows.view(f"V{rows.itemsize * rows.shape[1]}").reshape(-1), return_inverse=True)[1]
     return np.where(at == NONE, 0, values.reshape(-1)[at] + 1)
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 DEFAULT_CREASE = 60.0
-"""Default of the largest angle between neighbouring triangles that are shaded smoothly [degrees]: above that
-of an icosahedron (42), below that of a box (90)."""
+"""Default angle up to which neighbouring triangles are shaded smoothly [degrees]: larger than between faces
+of an icosahedron (42), smaller than between faces of a box (90)."""
 
 _COSINE_TOLERANCE = 1e-9
-"""Makes coplanar triangles smooth at a crease of 0 degrees, and triangles that bend by exactly the crease."""
+"""Tolerance of the cosine: rounding must not split triangles that bend by exactly the crease angle."""
 
 
 def split_at_creases(
@@ -58,10 +58,10 @@ def _neighbours(
     start: NDArray[np.int64],
     end: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """For each side of each triangle: the opposite side of its neighbour, and the cosine of the bend.
+    """Return, for each side of each triangle, the same side in its neighbour, and the cosine of the bend.
 
-    Sides are numbered by the corner at which they begin. Among several neighbours, the one that bends least
-    counts. The cosine is -2 if there is no neighbour. A triangle without area counts as flat.
+    Sides are numbered by the corner at which they begin. If a side has several neighbours, the one that bends
+    least is used. The cosine is -2 if there is no neighbour. A triangle without area counts as coplanar.
     """
     a, b, c = (positions[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)

@@ -14,12 +14,12 @@ from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 TOLERANCE = 1e-6
-"""Largest depth of a vertex inside a sphere, as its power over the square of the longest edge. It allows for
-rounding: the eight corners of a cube lie on one sphere."""
+"""Largest depth of a vertex inside a sphere: its power, divided by the squared longest edge. It allows for
+rounding if more than four vertices lie on a sphere, such as the eight corners of a cube."""
 
 
 def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
-    """Import scipy.spatial. Raises: MissingExtraError with the purpose."""
+    """Return the module scipy.spatial. Raises: MissingExtraError, which names `purpose`, if it is missing."""
     require_extra("voronoi", f"{purpose} need")
     from scipy import spatial
 
@@ -55,7 +55,7 @@ def delaunay_mesh(mesh: TetMesh) -> TetMesh:
     """Reconnect the vertices of a mesh so that all circumspheres are empty; the body keeps its shape.
 
     Args:
-        mesh: tetrahedra; their surface stays as it is.
+        mesh: tetrahedra. Their surface stays the same.
     Raises: MeshError if the surface of the body cannot be kept: it then needs more vertices.
     """
     if not isinstance(mesh, TetMesh):
@@ -83,7 +83,7 @@ def delaunay_mesh(mesh: TetMesh) -> TetMesh:
 
 
 def _is_inside(mesh: TetMesh, points: FloatArray) -> FloatArray:
-    """True for points (p, 3) that lie in a tetrahedron."""
+    """True for points (p, 3) that lie in a tetrahedron of the mesh."""
     corners = mesh.vertices[mesh.tets]
     inverses = edge_inverses(corners)
     is_inside = np.zeros(len(points), dtype=bool)

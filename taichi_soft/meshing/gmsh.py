@@ -1,4 +1,4 @@
-"""Gmsh files (.msh) of any version, reduced to the sections that a mesh consists of."""
+"""Reduce Gmsh files (.msh) of any version to the sections that define the mesh."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from taichi_soft.core.errors import MeshError
 
 NEEDED = ("MeshFormat", "Nodes", "Elements")
-"""Sections that meshio receives: it fails on others, such as names and data, even in valid files."""
+"""Sections that are passed to meshio. It fails on others, such as names and data, even in valid files."""
 
 OPENING = re.compile(rb"\s*\$(\w+)[ \t]*(?:\r\n?|\n)")
 
@@ -25,7 +25,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
             "Nodes": _section(path, found, "NOD"),
             "Elements": _modern_elements(path, _section(path, found, "ELM")),
         }
-    # Binary files may lack the line break before `$End...`; a second one is harmless.
+    # Binary files can lack the line break before `$End...`; a second one is harmless.
     return b"".join(
         b"$%b\n%b\n$End%b\n" % (name.encode(), _section(path, found, name), name.encode()) for name in NEEDED
     )
@@ -40,7 +40,7 @@ def _section(path: Path, sections: dict[str, bytes], name: str) -> bytes:
 
 
 def _sections(path: Path, content: bytes) -> dict[str, bytes]:
-    """Bytes of every section by name, parsed in sequence: binary data may contain anything."""
+    """Return the bytes of each section by name, parsed in order, because binary data can contain anything."""
     sections: dict[str, bytes] = {}
     position = 0
     while opening := OPENING.match(content, position):

@@ -1,7 +1,7 @@
 """Remove the few tetrahedra that force small time steps, by flips, collapses and vertex moves.
 
 Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity. It
-applies those with the largest gain that share no vertex, so the smallest size of the mesh never decreases.
+applies the changes with the largest gain that share no vertex: the smallest size of the mesh never decreases.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ SMALL = 0.3
 """Fraction of the median size below which tetrahedra are improved: they need three times the substeps."""
 
 _ROUNDS = 100
-_GENTLE_ROUNDS = 3  # first rounds, without collapses: flips and moves keep the vertices
-_MAX_IDLE_ROUNDS = 6  # rounds without a change before stopping: each draws other moves
+_GENTLE_ROUNDS = 3  # number of first rounds without collapses: flips and moves keep all vertices
+_MAX_IDLE_ROUNDS = 6  # rounds without a change before the search stops; each draws new moves
 _MIN_GAIN = 1.02  # factor by which the smallest size of a cavity must grow, so that the rounds end
 _VOLUME_TOLERANCE = 0.01  # total change of volume at the surface, relative to the body's volume
-_MIN_NORMAL_COSINE = 0.77  # between a new triangle of the surface and those that it replaces
-_DRIFT_PENALTY = 0.9  # discount of a gain that uses up the surface tolerance
-_FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex may slide
-_GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, in steps that would reach the target size
+_MIN_NORMAL_COSINE = 0.77  # limit between the normals of a new surface triangle and the old ones
+_DRIFT_PENALTY = 0.9  # relative reduction of a gain that uses the full surface tolerance
+_FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex can slide
+_GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, relative to the step to the target size
 _RANDOM_STEPS = (
     0.1,
     0.1,
@@ -39,7 +39,7 @@ _RANDOM_STEPS = (
 
 
 class Improved(NamedTuple):
-    """Vertices (n, 3) [m], tetrahedra (m, 4), and the original tetrahedron that each replaces (m,)."""
+    """Improved mesh: vertices (n, 3) [m], tetrahedra (m, 4), and the original tetrahedron of each, (m,)."""
 
     vertices: FloatArray
     tets: IntArray
@@ -49,12 +49,12 @@ class Improved(NamedTuple):
 def improve(
     vertices: FloatArray, tets: IntArray, surface: IntArray, *, size: float | None, tolerance: float
 ) -> Improved | None:
-    """Improve a mesh until its tetrahedra have at least a given size, where possible.
+    """Improve a mesh until its tetrahedra have at least a given size, if possible.
 
     Args:
         size: smallest size, as `cavities.sizes` defines it [m]; None: `SMALL` times the median.
         tolerance: largest displacement of the surface [m].
-    Returns: None if nothing can be improved.
+    Returns: the improved mesh, or None if nothing can be improved.
     """
     work = _Work(vertices, tets, surface, size, tolerance)
     changed, idle_rounds = False, 0
@@ -68,7 +68,7 @@ def improve(
 
 
 class _Work:
-    """The mesh while it changes. A vertex that moves becomes a new one; `result` drops unused vertices."""
+    """Mesh that is being improved. Moving a vertex creates a new one; `result` drops unused vertices."""
 
     def __init__(
         self, vertices: FloatArray, tets: IntArray, surface: IntArray, size: float | None, tolerance: float
@@ -81,8 +81,8 @@ class _Work:
         self.source = np.r_[np.arange(len(tets)), np.full(len(surface), -1)]
         self.sizes = cavity.sizes(self.x, self.tets)
         self.target_size = SMALL * float(np.median(self.sizes[: len(tets)])) if size is None else size
-        self.origin = np.arange(len(self.x))  # original vertex of each
-        self.drift = np.zeros(len(self.tets))  # bound of each surface triangle's displacement [m]
+        self.origin = np.arange(len(self.x))  # original vertex of each vertex
+        self.drift = np.zeros(len(self.tets))  # upper bound of each surface triangle's displacement [m]
         self.keys = self._draw_keys(len(self.x))
         self.budget = _VOLUME_TOLERANCE * float(cavity.volumes(self.x, self.tets).sum())
 
@@ -90,7 +90,7 @@ class _Work:
         return self.random.integers(2**64, size=count, dtype=np.uint64)
 
     def round(self, gentle: bool) -> bool:
-        """Apply one round of independent changes, without collapses if `gentle`. Returns True if any."""
+        """Apply one round of changes, without collapses if `gentle`. Returns True if the mesh changed."""
         is_bad = self.sizes < self.target_size
         if not is_bad.any():
             return False
@@ -125,14 +125,14 @@ class _Work:
         return np.asarray(is_touched[self.tets].any(axis=1))
 
     def _gain(self, cavities: Cavities) -> FloatArray:
-        """Growth of the smallest size in each cavity, up to the target, (k,) [m]; 0 if too little."""
+        """Increase of the smallest size in each cavity, up to the target, (k,) [m]; 0 if it is too small."""
         before, after = np.full(cavities.total, np.inf), np.full(cavities.total, self.target_size)
         np.minimum.at(before, cavities.removed_of, self.sizes[cavities.removed])
         np.minimum.at(after, cavities.added_of, cavity.sizes(self.x, cavities.added))
         return np.where(after > _MIN_GAIN * before, after - before, 0.0)
 
     def _moves(self, mesh: ClosedMesh, size: FloatArray, bad: Ints) -> Cavities:
-        """Best of a few trial positions for each corner of the bad tetrahedra."""
+        """Return cavities that move each corner of bad tetrahedra to the best of a few trial positions."""
         order = bad[np.argsort(size[bad], kind="stable")]
         vertices, first = np.unique(mesh.tets[order].ravel(), return_index=True)
         worst = order[first // 4]
@@ -166,7 +166,7 @@ class _Work:
         return trial
 
     def _slide_projections(self, mesh: ClosedMesh, vertices: Ints) -> FloatArray:
-        """Projections (k, 3, 3) onto allowed moves: any inside, else along the surface or its crease."""
+        """Projections (k, 3, 3) onto allowed moves: any inside the mesh, else along the surface or crease."""
         rows, of = mesh.star(vertices)
         faces, of = patches.outer_faces(mesh.tets[rows], of)
         normal = patches.area_vectors(self.x[faces])
@@ -178,7 +178,7 @@ class _Work:
         return np.asarray(free @ np.swapaxes(free, 1, 2))
 
     def _fits(self, cavities: Cavities) -> tuple[FloatArray, Bools]:
-        """Bound of the surface's displacement at each cavity [m], and whether the change is allowed."""
+        """Upper bound of the surface's displacement at each cavity [m], and True if the change is allowed."""
         count = cavities.total
         old, old_of = patches.outer_faces(self.tets[cavities.removed], cavities.removed_of)
         new, new_of = patches.outer_faces(cavities.added, cavities.added_of)
@@ -197,7 +197,7 @@ class _Work:
         return drift, fits & (drift <= self.tolerance)
 
     def _select_independent(self, cavities: Cavities, order: Ints) -> Bools:
-        """True for the cavities to apply: the first of `order` first, no two of which share a vertex."""
+        """Select cavities without common vertices, in `order` of priority. Returns True for selected ones."""
         count = cavities.total
         rank = np.empty(count, dtype=np.int64)
         rank[order] = np.arange(count)
@@ -234,7 +234,7 @@ class _Work:
         self.sizes = np.r_[self.sizes[keep], cavity.sizes(self.x, cavities.added)]
 
     def _sources(self, cavities: Cavities, added: Ints) -> Ints:
-        """Source of each added tetrahedron: that of the removed one in which its centre lies deepest."""
+        """Source of each added tetrahedron: source of the removed one in which its centre lies deepest."""
         real = self.source[cavities.removed] >= 0
         removed = cavities.removed[real]
         i, j = patches.pairs(cavities.added_of[added], cavities.removed_of[real], cavities.total)
@@ -245,7 +245,7 @@ class _Work:
         return np.asarray(self.source[removed[j[order[np.searchsorted(i, np.arange(len(added)))]]]])
 
     def result(self) -> Improved:
-        """Return the improved mesh, its vertices and tetrahedra in the original order."""
+        """Return the improved mesh, with vertices and tetrahedra in the original order."""
         real = np.flatnonzero(self.source >= 0)
         real = real[np.argsort(self.source[real], kind="stable")]
         used = np.unique(self.tets[real])

@@ -21,20 +21,20 @@ from taichi_soft.meshing import gmsh, medit
 from taichi_soft.meshing.advice import fill_hint
 from taichi_soft.meshing.tet_mesh import TetMesh
 
-# meshio's module for each suffix, and options that keep every digit in files that older programs can read
-# (meshio's text form of .vtu keeps twelve digits).
+# meshio's module for each suffix, and options for writing. They keep every digit, and older programs can read
+# the files. (.vtu is binary because meshio's text form keeps only twelve digits.)
 FORMATS: dict[str, tuple[str, dict[str, object]]] = {
     ".msh": ("gmsh", {"fmt_version": "4.1", "binary": False}),
     ".vtk": ("vtk", {"fmt_version": "4.2", "binary": False}),
     ".vtu": ("vtu", {"binary": True}),
     ".mesh": ("medit", {}),
 }
-# Reductions of files to the sections that meshio reads: given others, it fails unless it knows them all.
+# Functions that reduce a file to the sections that meshio needs, because it fails on unknown ones.
 SECTIONS: dict[str, Callable[[Path, bytes], bytes]] = {
     "gmsh": gmsh.mesh_sections,
     "medit": medit.mesh_sections,
 }
-# meshio's names of tetrahedra of every order begin with these. Their four corners come first.
+# meshio's names of tetrahedra of any order begin with one of these. Their four corners come first.
 TETRAHEDRA = ("tetra", "VTK_LAGRANGE_TETRAHEDRON")
 
 
@@ -53,7 +53,7 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
         content = SECTIONS[name](path, content)
     else:
         declared = _declared_cells(path, name, content)
-    # The format's own reader, because meshio.read() exits the process on a bad file.
+    # Use the format's own reader: meshio.read() exits the process on a bad file.
     with tempfile.TemporaryDirectory() as folder, _quiet(f"{path.name}: cannot be read as {name}") as printed:
         source = path
         if name in SECTIONS:
@@ -88,7 +88,7 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
 
 
 def _declared_cells(path: Path, name: str, content: bytes) -> int:
-    """Number of cells that a VTK file declares. meshio skips some, and accepts some truncated files.
+    """Number of cells that a VTK file declares, to detect skipped cells and truncated files.
 
     Raises: MeshError if a file is truncated, or has several pieces, of which meshio reads only the last.
     """
@@ -113,7 +113,7 @@ def _declared_cells(path: Path, name: str, content: bytes) -> int:
 
 
 def _count_separate(block: Any, tets: NDArray[Any]) -> int:
-    """Number of cells that are not points, edges or faces of the body, which programs write too."""
+    """Number of cells in `block` without the points, edges and faces of `tets`, which programs write too."""
     if block.dim == 0:
         return 0
     if block.dim == 3:
@@ -129,7 +129,7 @@ def _counted(cells: Iterable[tuple[str, int]], unknown: int) -> str:
 
 
 def _suggest_fix(path: Path, points: NDArray[Any], blocks: list[Any], unknown: int) -> str:
-    """Suggest what to do with a file that has no tetrahedra."""
+    """Return a hint on what to do with a file that has no tetrahedra."""
     if any(block.dim == 3 for block in blocks) or unknown > 0:
         return ": divide them into tetrahedra in the program that made them"
     if not any(block.dim == 2 for block in blocks):
@@ -178,7 +178,7 @@ def _quiet(failure: str) -> Iterator[io.StringIO]:
 
 def _reason(error: BaseException) -> str:
     text = " ".join(str(error).split())[:200]
-    if isinstance(error, KeyError):  # its text is only the key
+    if isinstance(error, KeyError):  # its text is only the missing key
         return f"meshio does not know {text}: if that is a kind of cell, save only the tetrahedra"
     if not text:
         return (

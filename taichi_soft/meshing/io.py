@@ -30,7 +30,7 @@ from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
 SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-"""Formats of triangles only, which `SoftBodyAsset.from_surface` reads."""
+"""Formats that contain only triangles; `SoftBodyAsset.from_surface` reads them."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
@@ -44,9 +44,9 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
     Args:
         path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu, .mesh. Coordinates are metres.
         fix_orientation: reverse tetrahedra of negative volume. True by default, unlike in `TetMesh`, because
-            programs differ in orientation; overlapping neighbours are refused in either case.
+            programs differ in orientation. Overlapping neighbours are rejected in either case.
     Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
-        cut short, without tetrahedra (for a surface, with how to fill it) or not a valid mesh (see
+        cut short, without tetrahedra (the message says how to fill a surface) or not a valid mesh (see
         `TetMesh`), or if meshio is needed and missing; OptionError if `path` does not name a file.
     """
     source = as_path(path)
@@ -111,7 +111,7 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
         raise MeshError(message if message.startswith(target.stem) else f"{target.name}: {message}") from None
     finally:
         for temporary in temporaries.values():
-            with contextlib.suppress(OSError):  # such as for a name too long to exist
+            with contextlib.suppress(OSError):  # for example if the name is too long
                 temporary.unlink(missing_ok=True)
 
 
@@ -121,7 +121,7 @@ def _require_format(path: Path, hint: str = "") -> None:
 
 
 def reject_placeholder(source: Path) -> None:
-    """Check that a file is not a Git LFS pointer or a web page in its place. Raises: MeshError."""
+    """Check that a file is not a Git LFS pointer or a saved web page. Raises: MeshError if it is."""
     pair = source.suffix.lower() in (".node", ".ele")
     for path in (source.with_suffix(".node"), source.with_suffix(".ele")) if pair else (source,):
         with path.open("rb") as file:
@@ -152,7 +152,7 @@ def _read_npz(path: Path) -> tuple[Any, Any]:
             arrays = (contents["vertices"], contents["tets"]) if has_both else None
     except OSError:
         raise
-    # Damaged contents, objects that are not arrays and Python objects each raise another exception.
+    # Damaged contents, objects that are not arrays and Python objects each raise a different exception.
     except Exception as error:
         reason = " ".join(str(error).split())[:200]
         raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
@@ -174,7 +174,7 @@ def _write_npz(mesh: TetMesh, path: Path) -> None:
 
 
 def _without_unused(vertices: Any, tets: Any) -> tuple[Any, Any]:
-    """Drop vertices that no tetrahedron uses. `TetMesh` reports arrays that are not indices."""
+    """Drop vertices that no tetrahedron uses. Invalid indices are kept, because `TetMesh` reports them."""
     if tets.dtype.kind not in "iu" or tets.size == 0 or tets.min() < 0 or tets.max() >= len(vertices):
         return vertices, tets
     used, inverse = np.unique(tets, return_inverse=True)

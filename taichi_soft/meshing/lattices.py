@@ -14,7 +14,7 @@ from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0), (0, 2))}
-"""Springs of a cloth by kind, as the steps over its grid that they span."""
+"""Kinds of springs in a cloth: the steps over its grid (columns, rows) that they span."""
 
 
 def rope(length: float, segments: int, mass: float) -> ParticleMesh:
@@ -76,12 +76,12 @@ def cloth(
 
 
 def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float) -> FloatArray:
-    """Return a value, such as the stiffness, for each spring of a `cloth` by its kind, (k,).
+    """Return a value for each spring of a `cloth`, such as its stiffness, according to its kind, (k,).
 
     Args:
         mesh: made by `cloth`.
         cells: the same as for `cloth`.
-        values: tensile=, shear= and bend=, for each kind that the cloth has; 0 for none.
+        values: one value of 0 or more for each kind of spring in the cloth: tensile=, shear=, bend=.
     Raises: OptionError for an unknown or missing kind; MeshError for a mesh with other cells.
     Example:
         sheet = cloth((1.0, 1.0), (10, 10), mass=0.3)
@@ -131,7 +131,9 @@ def _kinds(mesh: ParticleMesh, nx: int, ny: int) -> NDArray[np.int64]:
 
 
 def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> ParticleMesh:
-    """Make particles and springs of a solid's edges; each vertex gets a quarter of its tetrahedra's masses.
+    """Make particles and springs from a solid's vertices and edges.
+
+    Each particle gets a quarter of the mass of each tetrahedron around it.
 
     Args:
         density: [kg/m^3], one number or one per tetrahedron.

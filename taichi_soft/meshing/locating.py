@@ -13,10 +13,10 @@ from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 Ints = NDArray[np.int64]
 
 MAX_STEPS = 64
-"""Steps of a walk towards a point before the surface is searched."""
+"""Largest number of steps of a walk towards a point; after that, the surface is searched."""
 
 INSIDE = -1e-9
-"""Barycentric coordinate above which a point belongs to a tetrahedron."""
+"""Smallest barycentric coordinate of a point that counts as inside a tetrahedron."""
 
 CHUNK = 1 << 20
 """Pairs of points and elements that are processed at once."""
@@ -26,10 +26,10 @@ BATCH = 1 << 13
 
 
 class Locator:
-    """Point location in one mesh at rest."""
+    """Finds the tetrahedra that contain given points, in one mesh at rest."""
 
     def __init__(self, mesh: TetMesh) -> None:
-        """Build the neighbours and bins of the mesh."""
+        """Find the neighbours of the tetrahedra, and sort tetrahedra and surface triangles into bins."""
         self._corners = mesh.vertices[mesh.tets]
         self._inverses = edge_inverses(self._corners)
         self._neighbours = _neighbours(mesh.tets)
@@ -41,8 +41,8 @@ class Locator:
         """Locate points (k, 3).
 
         Args: start: tetrahedron from which to walk, (k,), -1 if none is known.
-        Returns: the tetrahedron of each point, (k,), and the barycentric coordinates of its point nearest to
-            it, (k, 4), none below 0.
+        Returns: the tetrahedron that contains each point or is nearest to it, (k,); and the barycentric
+            coordinates of the nearest point in that tetrahedron, (k, 4), 0 or more.
         """
         tet = np.full(len(points), -1) if start is None else start.copy()
         unknown = tet < 0
@@ -55,9 +55,9 @@ class Locator:
         return tet, weights / weights.sum(axis=1, keepdims=True)
 
     def _find_outside(self, points: FloatArray, rows: Ints, tet: Ints, weights: FloatArray) -> None:
-        """For points outside, replace the result of the walk by the nearest point of the mesh."""
+        """Replace the results of walks to points outside the mesh by the nearest points of the mesh."""
         triangle, nearest = self._on_surface(points[rows])
-        # A walk may end at a notch. The point can then be inside, behind the nearest triangle.
+        # A walk can end at a notch although the point is inside. Walk again, from the nearest triangle.
         retried_tet, retried_weights = self._walk(points[rows], self._tet[triangle])
         is_in = retried_weights.min(axis=1) >= INSIDE
         tet[rows] = np.where(is_in, retried_tet, self._tet[triangle])
@@ -68,7 +68,10 @@ class Locator:
         return shares_by(self._inverses[tet], points - self._corners[tet, 0])
 
     def _walk(self, points: FloatArray, start: Ints) -> tuple[Ints, FloatArray]:
-        """Walk through the face that a point is farthest beyond, to its tetrahedron or the mesh's end."""
+        """Walk towards each point, through the face that it lies farthest beyond, as far as the mesh extends.
+
+        Returns: the last tetrahedron of each walk, and the barycentric coordinates of the point in it.
+        """
         tet = start.copy()
         weights = self._weights(points, tet)
         active = np.arange(len(points))
@@ -103,7 +106,7 @@ class Locator:
         return triangle, nearest
 
     def _nearest_of(self, points: FloatArray, point: Ints, triangle: Ints) -> tuple[Ints, Ints, FloatArray]:
-        """For each point that occurs in the pairs: point, nearest triangle, and nearest point on it."""
+        """Return, for each point that occurs in the pairs, its index, nearest triangle, and nearest point."""
         distance = np.linalg.norm(points[point] - self._on_triangles.centroids[triangle], axis=1)
         bound = np.full(len(points), np.inf)
         np.minimum.at(bound, point, distance)  # upper bound: the centroid is on the triangle
@@ -120,7 +123,7 @@ class _Bins:
     """Elements sorted into bins by their centroids."""
 
     def __init__(self, corners: FloatArray) -> None:
-        """Args: corners: corners of each element, (m, c, 3)."""
+        """Sort elements into bins. Args: corners: corners of each element, (m, c, 3)."""
         self.centroids = corners.mean(axis=1)
         self.radius = float(np.linalg.norm(corners - self.centroids[:, None], axis=2).max())
         self.search_range = self.radius  # `candidates` finds all elements within this distance
@@ -133,7 +136,7 @@ class _Bins:
         self._begins = np.cumsum(self._counts) - self._counts
 
     def candidates(self, points: FloatArray) -> tuple[Ints, Ints]:
-        """All pairs of a point and an element in its bin or an adjacent one."""
+        """Indices of all pairs of a point and an element in the point's bin or an adjacent one, (k,) each."""
         places = np.floor(points / self._pitch) - self._low
         is_in = ((places >= 1) & (places < self._shape - 1)).all(axis=1)
         inner, own_bin = np.flatnonzero(is_in), self._bins(points[is_in])
@@ -169,7 +172,7 @@ def _neighbours(tets: NDArray[np.integer]) -> Ints:
 
 
 def nearest_points(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Nearest points on triangles (k, 3, 3) to points (k, 3), (k, 3)."""
+    """Point of each triangle (k, 3, 3) that is nearest to the point (k, 3) in the same row, (k, 3)."""
     a = triangles[:, 0]
     edges = np.stack([triangles[:, 1] - a, triangles[:, 2] - a], axis=1)
     gram = np.einsum("kix,kjx->kij", edges, edges)

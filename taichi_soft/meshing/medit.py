@@ -1,4 +1,4 @@
-"""Medit text files (.mesh), reduced to vertices and cells."""
+"""Reduce Medit text files (.mesh) to vertices and cells."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ KEYWORD = re.compile(rb"(?<![\w.+-])([A-Za-z]\w*)")
 
 
 def mesh_sections(path: Path, content: bytes) -> bytes:
-    """Return a Medit file of the same vertices and cells, laid out for meshio, without sections of marks.
+    """Return a Medit file with only the vertices and cells, in the layout that meshio reads.
 
-    Raises: MeshError if the content is not such a file, or a section does not match its count.
+    Raises: MeshError if the content is not a Medit text file, or a section does not match its count.
     """
     _, *words = KEYWORD.split(re.sub(rb"#[^\n]*", b"", content))
     if not words or words[0] != b"MeshVersionFormatted":
@@ -41,7 +41,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
         raise MeshError(f"{path.name}: has dimension {got}: a body needs 3")
     lines = [b"MeshVersionFormatted 2", b"Dimension 3"]
     for word, body in found:
-        columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last one is a mark
+        columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last column is a mark
         if columns == 1:
             continue
         count = int(body[0]) if body and body[0].isdigit() else -1

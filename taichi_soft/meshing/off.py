@@ -46,7 +46,7 @@ def read_off(path: Path) -> list[Surface]:
 
 
 def _faces(lines: list[list[bytes]], count: int) -> list[list[bytes]]:
-    """Words of each face: one line, or, if faces span several lines, as many words as its count says."""
+    """Return the words of each face: one line or, if faces span several lines, as many as its count says."""
     if all(int(line[0]) < len(line) for line in lines[:count]):
         return lines[:count]
     words, faces, start = [word for line in lines for word in line], list[list[bytes]](), 0
@@ -101,7 +101,10 @@ def _columns(
 
 
 def _face_colors(rows: list[list[bytes]]) -> tuple[FloatArray, NDArray[np.int64]] | None:
-    """Colours from 0 to 1, and the row of each face, or None. Ignores single numbers, which index a table."""
+    """Return the colours, from 0 to 1, and each face's row in them; None without colours.
+
+    Single numbers, which index a colour table, are ignored.
+    """
     has_color = np.array([len(row) >= 3 for row in rows])
     if not has_color.any():
         return None

@@ -1,4 +1,4 @@
-"""Orders that keep neighbours in space close in memory."""
+"""Orders of vertices, tetrahedra and edges that keep neighbours in space close in memory."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
         tets: (m, 4) vertex indices in the old numbering.
         vertex_order: (n,) permutation, such as `spatial_order` returns: entry i is the old index of the i-th
             vertex.
-    Returns: int32 (m,), a permutation of the rows of `tets`, by their lowest new vertex, then the next.
+    Returns: int32 (m,), a permutation that sorts the rows of `tets` by lowest new vertex, then the next.
         The rows themselves keep the old numbers: `renumbered(vertex_order)[tets[order]]` is the new array.
     Raises: MeshError if a tetrahedron names a vertex that does not exist.
     """
@@ -60,12 +60,12 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
 def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     """Choose which end owns each edge, so that most vertices own a multiple of `group` edges.
 
-    Greedy: every vertex first takes as many full groups as its edges allow. Then the vertex with most unowned
-    edges takes them all, repeatedly. Finally, partly full groups move to vertices with free places. Groups
-    are much fuller than if the lower number owned every edge.
+    The method is greedy. Every vertex first takes as many full groups as its edges allow. Then the vertex
+    with the most unowned edges takes them all, repeatedly. Finally, edges of partly full groups move to
+    vertices with free places. Groups are much fuller than if the end with the lower number owned every edge.
     Args:
         edges: (k, 2) vertex indices.
-    Returns: int32 (k,).
+    Returns: vertex that owns each edge, int32 (k,).
     """
     ends = np.asarray(edges).tolist()
     incident: list[list[int]] = [[] for _ in range(vertex_count)]
@@ -100,7 +100,7 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
 def _move_partial_groups(
     ends: list[list[int]], incident: list[list[int]], owner: list[int], group: int
 ) -> None:
-    """Move the edges of the least full groups into free places at their other ends."""
+    """Give the edges of partly full groups, least full first, to their other ends if these have room."""
     counts = np.bincount(owner, minlength=len(incident)).tolist()
     for _ in range(4):
         before = list(owner)
@@ -125,7 +125,7 @@ def _move_partial_groups(
 
 
 def renumbered(order: ArrayLike) -> IntArray:
-    """Inverse permutation: new index of each old one, int32 (n,)."""
+    """Return the inverse permutation: the new index of each old index, int32 (n,)."""
     old_index = np.asarray(order)
     new_index: IntArray = np.empty(len(old_index), dtype=np.int32)
     new_index[old_index] = np.arange(len(old_index), dtype=np.int32)

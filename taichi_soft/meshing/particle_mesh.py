@@ -27,8 +27,8 @@ class ParticleMesh(BodyMesh):
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        edges: (k, 2) integer vertex indices, in any order and direction. They keep their order, in which a
-            `SpringMaterial` takes values per edge, and are stored with i < j.
+        edges: (k, 2) integer vertex indices, in any order and direction. They are stored in this order, with
+            i < j. Values per edge in a `SpringMaterial` have the same order.
         masses: (n,) mass of each particle [kg], all positive; or one number for all.
         surface: (f, 3) triangles to draw, none by default. Triangles are one-sided, so a sheet needs each of
             its triangles twice.

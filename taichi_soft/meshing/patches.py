@@ -11,32 +11,32 @@ from taichi_soft.meshing.topology import LOCAL_FACES
 # Barycentric sample points of a triangle at which distances are measured, a quarter of a side apart.
 _SAMPLES = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4.0
 _SAMPLING_FACTOR = 4 / 3
-"""Ratio of the largest distance to the largest one at a sample. The distance is largest at a corner or where
-two sides cross, and falls from there at most linearly to the end of a side. The nearest sample is at most an
-eighth of the side away and has at least three quarters of it."""
+"""Bound of the largest distance over the largest distance at a sample. The distance is largest at a corner or
+where two sides cross, and falls from there at most linearly towards the end of a side. The nearest sample is
+at most an eighth of the side away, so its distance is at least three quarters of the largest."""
 _TINY = 1e-300  # [m^2], avoids division by zero for degenerate triangles
 
 
 def outer_faces(tets: Ints, of: Ints) -> tuple[Ints, Ints]:
-    """Surface triangles (f, 3) of tetrahedra, wound outwards, and the entry of `of` for each."""
+    """Surface triangles (f, 3) of tetrahedra, wound outwards, and the entry of `of` for each triangle."""
     row, corner = np.nonzero(tets == OUTSIDE)
     return tets[row[:, None], LOCAL_FACES[corner][:, ::-1]], of[row]
 
 
 def pairs(first_of: Ints, second_of: Ints, count: int) -> tuple[Ints, Ints]:
-    """All pairs of entries that belong to the same of `count` groups; `second_of` must be sorted."""
+    """Indices of all pairs of a first and a second entry of the same group; `second_of` must be sorted."""
     starts = np.searchsorted(second_of, first_of)
     counts = np.bincount(second_of, minlength=count)[first_of]
     return np.repeat(np.arange(len(first_of)), counts), ranges(starts, counts)
 
 
 def area_vectors(p: FloatArray) -> FloatArray:
-    """Vectors (k, 3) along the normals of triangles (k, 3, 3), twice their areas long [m^2]."""
+    """Normal vectors (k, 3) of triangles (k, 3, 3), with twice the areas as lengths [m^2]."""
     return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def largest_turn(old: FloatArray, old_of: Ints, new: FloatArray, new_of: Ints, count: int) -> FloatArray:
-    """Cosine of the largest rotation of a new triangle against the most similar old one, (count,)."""
+    """Cosine of the largest angle between a new triangle and the most similar old one, (count,)."""
     normals = [area_vectors(side) for side in (new, old)]
     first, second = (n / np.maximum(np.linalg.norm(n, axis=1), _TINY)[:, None] for n in normals)
     i, j = pairs(new_of, old_of, count)

@@ -49,13 +49,13 @@ class _Element:
 
 @dataclass(frozen=True, eq=False)
 class _List:
-    """A list in each row: the numbers of all lists in sequence, and the length of each list."""
+    """A property with a list in each row: the numbers of all lists in sequence, and each list's length."""
 
     values: FloatArray
     counts: Ints
 
 
-Columns = dict[str, Any]  # by name: (n,) or a _List
+Columns = dict[str, Any]  # arrays (n,) or lists, by name
 
 
 def read_ply(path: Path) -> list[Surface]:
@@ -122,7 +122,7 @@ def _surface(
 
 
 def _strip_triangles(strips: _List) -> _List:
-    """Triangles of strips. Each vertex makes one with the two before it, and every second one is reversed.
+    """Triangles of strips: each vertex and the two before it, with every second triangle reversed.
 
     -1 ends a strip.
     """
@@ -151,7 +151,7 @@ def _table(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> FloatArray
 
 
 def _colors(columns: Columns) -> FloatArray | None:
-    """Colours from 0 to 1: integers are divided by the largest value of their type."""
+    """Colours from 0 to 1, (n, 3), or None: 16-bit integers are divided by 65535, other integers by 255."""
     for names in COLORS:
         if all(isinstance(columns.get(name), np.ndarray) for name in names):
             kind = columns[names[0]].dtype
@@ -215,7 +215,7 @@ def _property(words: list[bytes]) -> _Property:
 
 
 class _Text:
-    """Numbers of a text file, element by element."""
+    """Reads the numbers of a text file, element by element."""
 
     def __init__(self, body: bytes) -> None:
         self._values = numbers([[word] for word in body.split()], 1, "number")[:, 0]
@@ -248,7 +248,7 @@ class _Text:
 
 
 class _Binary:
-    """Numbers of a binary file, element by element."""
+    """Reads the numbers of a binary file, element by element."""
 
     def __init__(self, body: bytes, order: str) -> None:
         self._body, self._order, self._at = body, order, 0

@@ -35,7 +35,7 @@ class Polygons:
         return np.where(index + 1 < self.count[:, None], index + 1, 0)
 
     def area_vectors(self) -> FloatArray:
-        """Area vectors (N, 3), right-handed about the order of corners."""
+        """Area vectors (N, 3), right-handed with respect to the order of the corners."""
         is_corner = np.arange(self.corners.shape[1]) < self.count[:, None]
         first = self.corners[:, :1]
         offsets = np.where(is_corner[..., None], self.corners - first, 0.0)

@@ -15,7 +15,7 @@ def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: fl
     """Extrude a flat triangulation along z, from -height/2 to height/2.
 
     Args:
-        points: (n, 2) points in the plane [m]; their bounding box is moved to the origin.
+        points: (n, 2) points in the plane [m]. The bounding box of the result is centred at the origin.
         triangles: (t, 3) vertex indices, in either orientation.
         layers: number of layers of prisms.
         height: total height [m].
@@ -95,10 +95,10 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 def _prism_tets(triangles: NDArray[np.integer], stride: int, layers: int, levels: int) -> NDArray[np.int64]:
-    """Three tetrahedra for every prism between a level and the next (the first level may follow the last).
+    """Return three tetrahedra for each prism between one level and the next; the first can follow the last.
 
-    Vertex i of the triangulation is vertex i + level * stride. In each side face of a prism the diagonal
-    starts at the lower of the two vertex numbers below. Neighbours choose the same one, so their faces match.
+    Vertex i of the triangulation is vertex i + level * stride. The diagonal of a prism's side face starts at
+    the lower-numbered of its two bottom vertices. Neighbours use the same diagonal, so their faces match.
     """
     a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
     level = np.arange(layers)[:, None] * stride

@@ -26,7 +26,7 @@ class EdgeRings:
         mesh: the mesh.
         edge: (r,) row of `mesh.edges`, ascending.
         tet: (r,) tetrahedron that contains the edge.
-        sides: (r, 2) its other two vertices, counterclockwise seen against the edge's direction i -> j.
+        sides: (r, 2) other two vertices of `tet`, counterclockwise if the edge i -> j points at the viewer.
     """
 
     mesh: TetMesh
@@ -50,10 +50,10 @@ class EdgeRings:
 
     @cached_property
     def area_vectors(self) -> FloatArray:
-        """Barycentric subface of each edge in each of its tetrahedra, along the edge, (r, 3) [m^2].
+        """Area vector of each edge's barycentric subface in each of its tetrahedra, (r, 3) [m^2].
 
-        Thesis 4.4.1: the quadrilateral between the centres of the edge, of its two faces and of the
-        tetrahedron, which is a twelfth of (a - m) x (b - m) with m the centre of the edge.
+        The subface (thesis 4.4.1) is the quadrilateral between the centres of the edge, its two faces and the
+        tetrahedron. Its area vector is (a - m) x (b - m) / 12, with the edge's centre m and `sides` a, b.
         """
         x = self.mesh.vertices
         center = x[self.mesh.edges[self.edge]].mean(axis=1)
@@ -71,7 +71,7 @@ class EdgeRings:
         return self.sum(self.areas)
 
     def sum(self, rows: FloatArray) -> FloatArray:
-        """Sum values per row, (r,) or (r, c), over each edge."""
+        """Sum values per row, (r,) or (r, c), over the tetrahedra around each edge."""
         start = np.searchsorted(self.edge, np.arange(len(self.mesh.edges)))
         return np.asarray(np.add.reduceat(rows, start, axis=0))
 
@@ -97,6 +97,6 @@ class EdgeRings:
         angle = np.arctan2(
             np.einsum("ka,ka->k", np.cross(axis, first), arm), np.einsum("ka,ka->k", first, arm)
         )
-        # Rounded, because round-off may turn the first vertex of an edge to just below a full turn.
+        # Rounded, because round-off can put the first vertex of an edge just below a full turn.
         order = np.lexsort((np.round(angle, 9) % (2 * np.pi), edge))
         return edge[order], vertex[order]

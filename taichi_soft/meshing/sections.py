@@ -29,5 +29,5 @@ def section_areas(heights: FloatArray, volumes: FloatArray) -> FloatArray:
 
 
 def _divide(numerator: FloatArray, denominator: FloatArray) -> NDArray[np.float64]:
-    """numerator / denominator, 0 where the denominator is 0."""
+    """Return numerator / denominator, or 0 if the denominator is 0."""
     return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > 0)

@@ -13,9 +13,9 @@ from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 UNIT: NDArray[np.int64] = np.eye(4, dtype=np.int64)
-# The octahedron in the middle of a divided tetrahedron: its corners are the sums of two of the four
-# directions. Opposite corners use disjoint pairs; each of the three diagonals divides it into four tetrahedra
-# around itself.
+# The octahedron in the middle of a divided tetrahedron. Each corner is the sum of two of the four directions;
+# opposite corners use disjoint pairs. Each of the three diagonals divides it into four tetrahedra that
+# surround the diagonal.
 PAIRS = list(combinations(range(4), 2))
 OCTAHEDRON: NDArray[np.int64] = np.array([UNIT[i] + UNIT[j] for i, j in PAIRS])
 DIAGONALS = ((0, 5, (1, 2, 4, 3)), (1, 4, (0, 2, 5, 3)), (2, 3, (0, 1, 5, 4)))
@@ -24,8 +24,8 @@ DIAGONALS = ((0, 5, (1, 2, 4, 3)), (1, 4, (0, 2, 5, 3)), (2, 3, (0, 1, 5, 4)))
 def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
     """Make a ball centred at the origin.
 
-    Twenty tetrahedra run from the centre to the faces of an icosahedron. Each is divided into resolution**3,
-    and the layers between are projected onto spheres.
+    Twenty tetrahedra run from the centre to the faces of an icosahedron. Each is divided into resolution**3
+    smaller ones, and the layers of their vertices are projected onto spheres.
 
     Args:
         radius: radius of the sphere through the outer vertices [m]. The volume is smaller than the ball's, by
@@ -44,7 +44,7 @@ def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
     positions = np.concatenate([_shells(corners[face], lattice) for face in faces])
     offsets = (np.arange(len(faces)) * len(lattice))[:, None, None]
 
-    # The sectors share the points between them: merge equal points, with a tolerance far below any edge.
+    # Neighbouring sectors have common points: merge equal points, with a tolerance far below any edge.
     rounded = np.round(positions * (1000 * resolution)).astype(np.int64)
     _, kept, merged = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     merged = merged.reshape(-1)
@@ -83,7 +83,7 @@ def _cut_tetrahedron(pieces: int) -> tuple[NDArray[np.int64], NDArray[np.int64],
     index_at[tuple(grid.T)] = np.arange(len(grid))
 
     def place(shape: NDArray[np.int64]) -> NDArray[np.int64]:
-        """One copy of `shape` wherever it fits: its corners are points of a smaller lattice plus its rows."""
+        """Return copies of `shape` wherever it fits: its rows, added to each point of a smaller lattice."""
         size = pieces - int(shape[0].sum())
         low = np.indices((max(size, 0) + 1,) * 3).reshape(3, -1).T
         low = low[low.sum(axis=1) <= size]
@@ -96,12 +96,12 @@ def _cut_tetrahedron(pieces: int) -> tuple[NDArray[np.int64], NDArray[np.int64],
 
 
 def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
-    """Place lattice points between the centre (weight 3) and a face (3, 3) of the unit sphere."""
+    """Positions of lattice points between the centre (column 3 of `lattice`) and a face (3, 3), (k, 3)."""
     step = lattice[:, :3].sum(axis=1)
     angle = np.arccos(face[0] @ face[1])
-    # Sines of fractions of the angle, as along a great circle: even spacing, the same from both sides.
+    # Sines of fractions of the angle give even spacing along a great circle, the same from both sides.
     weights = np.sin(lattice[:, :3] / np.maximum(step, 1)[:, None] * angle)
-    direction = (weights[:, :, None] * face).sum(axis=1)  # in a fixed order on every machine
+    direction = (weights[:, :, None] * face).sum(axis=1)  # summed in a fixed order on every machine
     length = np.linalg.norm(direction, axis=1)
     radius = step / lattice.sum(axis=1)
     points: FloatArray = direction * (radius / np.where(length > 0, length, 1.0))[:, None]

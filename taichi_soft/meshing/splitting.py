@@ -16,13 +16,13 @@ _FACES = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
 class InnerFaces(NamedTuple):
     """Faces between two tetrahedra."""
 
-    tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each, the lower number first
-    corners: NDArray[np.int64]  # (f, 2, 3) its vertices as corners of each of the two, in the same order
+    tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each face, the lower number first
+    corners: NDArray[np.int64]  # (f, 2, 3) its vertices as corners of both tetrahedra, in the same order
 
 
 def inner_faces(tets: IntArray) -> InnerFaces:
     """All faces that two tetrahedra share."""
-    # If the corners of each tetrahedron are in ascending order, those of its faces are too.
+    # If the corners of each tetrahedron are in ascending order, so are the corners of its faces.
     corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
     rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
     pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)
@@ -38,8 +38,8 @@ def split_vertices(
     with the lowest tetrahedron keeps the vertex; every other group gets a copy of it.
     Args:
         is_cut: (f,), True for each of `faces` that is cut.
-    Returns: the tetrahedra with their new vertices, and the vertex that each vertex is a copy of, (n,). Old
-        vertices keep their numbers and are copies of themselves.
+    Returns: the tetrahedra with their new vertices, and the original of each vertex, (n,). Old vertices keep
+        their numbers and are their own originals.
     """
     if not is_cut.any():
         return tets, np.arange(vertex_count)
@@ -48,7 +48,7 @@ def split_vertices(
     is_touched[tets[cut_tets[:, :1], cut_corners[:, 0]]] = True
 
     flat = tets.ravel()
-    loose = np.flatnonzero(is_touched[flat])  # corners of tetrahedra whose vertex may be split
+    loose = np.flatnonzero(is_touched[flat])  # corners of tetrahedra whose vertex can be split
     row = np.full(len(flat), -1)
     row[loose] = np.arange(len(loose))
     links = row[
@@ -80,7 +80,7 @@ def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
 
 
 def connected(count: int, first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.int64]:
-    """Lowest number connected to each of `count` numbers by the links (first, second)."""
+    """Lowest number that the links (first, second) connect to each of the numbers 0 to `count` - 1."""
     label = np.arange(count)
     while True:
         ends = label[first], label[second]

@@ -23,7 +23,7 @@ VERTEX = rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)"
 
 
 def read_stl(path: Path) -> list[Surface]:
-    """Read the surfaces of a .stl file, in its own axes and units. Normals are those of the triangles.
+    """Read the surfaces of a .stl file, in its own axes and units. Each vertex has its triangle's normal.
 
     Raises: MeshError if the file is cut short or has invalid numbers.
     """
@@ -58,8 +58,8 @@ def _binary(data: bytes, name: str) -> list[Surface]:
 def _colors(header: bytes, words: np.ndarray) -> FloatArray | None:  # type: ignore[type-arg]
     """Colours of triangles, (m, 3) from 0 to 1, or None.
 
-    A colour has 15 bits. VisCAM marks colours by bit 15. Materialise Magics clears bit 15 for them, and names
-    a default colour in the header.
+    A colour has 15 bits. VisCAM sets bit 15 of a triangle that has a colour. Materialise Magics clears bit 15
+    instead, and stores a default colour in the header.
     """
     default_at = header.find(b"COLOR=")
     colors = np.stack([words >> 10 & 31, words >> 5 & 31, words & 31], axis=1) / 31.0

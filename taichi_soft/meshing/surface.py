@@ -19,8 +19,8 @@ class Surface:
     vertices: FloatArray  # (n, 3) [m]
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
-    visual: Any = None  # trimesh's: texture coordinates, material, colours; None without any
-    notes: tuple[str, ...] = ()  # what the reader assumed, repaired or skipped, one sentence each
+    visual: Any = None  # trimesh visual: texture coordinates, material, colours; None without any
+    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or skipped
 
 
 def surface_of(
@@ -32,10 +32,10 @@ def surface_of(
     visual: Any = None,
     notes: tuple[str, ...] = (),
 ) -> Surface:
-    """Make a surface from checked copies.
+    """Make a surface from copies of the arrays, after checking them.
 
     Args:
-        normals: (n, 3), of any length. Where None, NaN or 0, the triangles around the vertex decide.
+        normals: (n, 3), of any length. Normals that are None, NaN or 0 are computed from the triangles.
     Raises: MeshError for invalid vertices or triangles.
     """
     points = as_points(vertices)
@@ -54,7 +54,7 @@ def surface_of(
 
 
 def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Concatenate surfaces: vertices (n, 3) [m] and triangles (m, 3)."""
+    """Concatenate surfaces. Returns: vertices (n, 3) [m] and triangles (m, 3)."""
     starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
     triangles = [
         each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)
@@ -63,7 +63,7 @@ def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]
 
 
 def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
-    """Means of the normals of the triangles around each vertex, weighted by their angles there, (n, 3)."""
+    """Unit normals of vertices, (n, 3): means of the triangles' normals, weighted by their angles there."""
     corners = points[triangles]
     to_next, to_previous = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     across = np.cross(to_next, to_previous)  # along the normal, at each corner
@@ -75,6 +75,6 @@ def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
 
 
 def unit(rows: NDArray[Any]) -> FloatArray:
-    """Normalise rows. A row of length 0 becomes (0, 0, 1)."""
+    """Return rows scaled to length 1. A row of length 0 becomes (0, 0, 1)."""
     lengths = np.linalg.norm(rows, axis=-1, keepdims=True)
     return np.where(lengths > 0, rows / np.where(lengths > 0, lengths, 1.0), [0.0, 0.0, 1.0])

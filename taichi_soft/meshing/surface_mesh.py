@@ -26,7 +26,7 @@ def surface_mesh(mesh: TetMesh, positions: ArrayLike | None = None) -> trimesh.T
             shape.
     Returns: a `trimesh.Trimesh` with its own arrays, triangles counterclockwise seen from outside. z is up,
         in files too.
-    Raises: MeshError if `mesh` is not a TetMesh, or for another number of positions.
+    Raises: MeshError if `mesh` is not a TetMesh, or if the number of positions does not match.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"surface_mesh got a {type(mesh).__name__}: only a TetMesh has a surface")

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 Up = Literal["y", "z"]
 
 UP: dict[str, Up] = {".glb": "y", ".gltf": "y", ".obj": "y", ".ply": "z", ".stl": "z", ".off": "z"}
-"""Axis that points up in files of each format. glTF defines it. For the others it is what common exporters
-write: Blender's defaults, and OpenSCAD and FreeCAD for .off files."""
+"""Axis that points up in files of each format. glTF defines it. For other formats it is the default of common
+exporters: Blender, and OpenSCAD and FreeCAD for .off files."""
 
 DEFINED = (".glb", ".gltf")
-"""Formats that define the axis."""
+"""Formats that define which axis points up."""
 
 MAX_SPACING = 1e-4
 """Largest spacing of float32 numbers at a surface's distance from the origin, relative to its size."""
@@ -45,17 +45,17 @@ def read_surfaces(
     """Read all triangle meshes of a file or an object, each with its own vertices.
 
     Vertices have the order of the file. Some files (.obj, some .ply and .off) index texture coordinates,
-    normals or colours by the corner of a face. Where these differ, vertices are copied. Copies follow all
+    normals or colours by the corner of a face. If these differ, vertices are copied. Copies follow all
     other vertices, ordered by vertex and then by their first corners. Each mesh of an .obj file, one for each
     material, has only the vertices that it uses.
 
     Args:
         source: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh, a trimesh.Scene,
             (vertices (n, 3) [m], triangles (m, 3)), or several of these in a tuple.
-        up: axis that points up in `source`; None: that of `UP` for a file, "z" for anything else. The result
+        up: axis that points up in `source`; None: from `UP` for a file, "z" for anything else. The result
             has z up.
-        center: move the centre of its bounding box to the origin.
-        scale: factor from its unit to metres: 0.001 for millimetres.
+        center: True to move the centre of the bounding box to the origin.
+        scale: factor from the unit of `source` to metres, such as 0.001 for millimetres.
     Raises: MeshError, with the file's name, if a source has no triangles or cannot be read; OptionError for
         an unknown axis, a scale that is not positive, or a path that does not name a file.
     """
@@ -67,7 +67,7 @@ def read_surfaces(
 
 
 def assumed_up(source: Any) -> str:
-    """Say which axis is assumed to be up if a file's format does not define it; empty for other sources."""
+    """Return a sentence on the axis that is assumed to point up in a file; empty if nothing is assumed."""
     suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""
@@ -112,7 +112,7 @@ def _read(path: Path) -> list[Surface]:
     except MeshError as error:
         words = str(error).removeprefix(f"{path.name}: ")
         raise MeshError(f"{path.name}: {words}") from None
-    except Exception as error:  # readers raise many kinds on damaged files
+    except Exception as error:  # readers raise many kinds of exceptions on damaged files
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise MeshError(f"{path.name}: cannot be read ({reason})") from None
     if not found:
@@ -169,7 +169,7 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 @contextlib.contextmanager
 def _silent(log: logging.Logger) -> Iterator[None]:
-    """Silence a logger: without scipy, trimesh logs a traceback and computes normals in another way."""
+    """Silence a logger: without scipy, trimesh logs a traceback before it computes normals differently."""
     was, log.disabled = log.disabled, True
     try:
         yield
@@ -180,7 +180,7 @@ def _silent(log: logging.Logger) -> Iterator[None]:
 def _with_valid_normals(surface: Surface) -> Surface:
     """Recompute normals that point away from all triangles around their vertex.
 
-    If most normals point away and the volume is negative, the triangles face inwards. Their normals are kept.
+    If most normals point away and the volume is negative, the triangles face inwards: the normals are kept.
     """
     corners = surface.vertices[surface.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -215,7 +215,7 @@ def _with_z_up(surface: Surface, up: Up) -> Surface:
 
 
 def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[Surface, ...]:
-    """Move surfaces to the origin and scale them, in float64; note where float32 is too coarse."""
+    """Scale surfaces, and move them to the origin if `center`; else add a note if float32 is too coarse."""
     if not surfaces:
         return surfaces
     low, high = _box(surfaces)
@@ -241,7 +241,7 @@ def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[
 
 
 def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """Append those notes that the surface does not have."""
+    """Return the surface with all `notes` added that it does not have yet."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 

@@ -74,12 +74,12 @@ class TetMesh(BodyMesh):
         )
 
     def part(self, vertices: NDArray[Any], tets: IntArray, rows: NDArray[Any]) -> TetMesh:
-        """Return some of the tetrahedra with their own vertices, as after a cut, without validating them.
+        """Return a mesh of some of the tetrahedra, for example after a cut. It is not validated.
 
         Args:
-            vertices: vertex of this mesh that each new one copies, (n,).
+            vertices: vertex of this mesh that each new vertex copies, (n,).
             tets: new vertices of each tetrahedron, (m, 4); every vertex is used.
-            rows: tetrahedron of this mesh that each new one is, (m,).
+            rows: tetrahedron of this mesh that each new tetrahedron copies, (m,).
         """
         mesh = type(self).__new__(type(self))
         mesh._initialise(self.vertices[vertices], tets, self.volumes[rows])
@@ -87,7 +87,7 @@ class TetMesh(BodyMesh):
         return mesh
 
     def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        """Copy what a `part` has of the original besides its geometry. Arguments as for `part`."""
+        """Copy the data of `original` that is not geometry to this part of it. Arguments as for `part`."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copying and unpickling rebuild the mesh, so that its arrays are read-only again.
@@ -123,13 +123,13 @@ class TetMesh(BodyMesh):
         of the mesh. The smallest size never decreases, components and holes stay, and the result is the same
         on every run. Small tetrahedra remain where the surface allows no change.
         Args:
-            min_size: size below which a tetrahedron is improved [m]; None: 0.3 of the median.
+            min_size: size below which a tetrahedron is improved [m]; None: 0.3 of the median size.
             tolerance: largest displacement of the surface [m]; None: a quarter of the mean edge, at most 1 %
                 of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
-            return_source: also return the tetrahedron of this mesh that each new one replaces, int32 (m,):
-                `values[source]` carries over values per tetrahedron. A border between materials can shift by
-                a few tetrahedra.
-        Returns: this mesh itself if there was nothing to improve.
+            return_source: True to return also the tetrahedron of this mesh that each new one replaces, int32
+                (m,): `values[source]` transfers values per tetrahedron. A border between materials can shift
+                by a few tetrahedra.
+        Returns: the improved mesh, or this mesh itself if nothing was improved.
         Raises: OptionError if min_size or tolerance is not positive.
         """
         if tolerance is None:
@@ -190,7 +190,7 @@ def _checked_volumes(points: FloatArray, tets: IntArray, allow_negative: bool) -
     volumes: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     ends = corners[:, LOCAL_EDGES]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    # Negated so that 0 > 0, after everything has underflowed, counts as flat too.
+    # Negated, so that 0 > 0, if both sides underflow, also counts as flat.
     flat = ~(np.abs(volumes) > FLATTEST * longest**3)
     if flat.any():
         row = int(np.argmax(flat))

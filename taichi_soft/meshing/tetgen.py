@@ -57,7 +57,7 @@ def _write_lines(path: Path, header: str, rows: Iterable[str]) -> None:
 
 
 def _read_table(path: Path, element: str) -> tuple[list[int], FloatArray]:
-    """Numbers of the header line, and the rows below it."""
+    """Return the integers of the header line, and the rows below it as an array."""
     try:
         text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""Text files from various systems and programs."""
+"""Decode and parse text files of various systems and programs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from taichi_soft.meshing.arrays import FloatArray
 
 
 def as_ascii(data: bytes) -> bytes:
-    """Return text with ASCII keywords and numbers, and with line feeds as line ends. UTF-16 becomes UTF-8.
+    """Convert a text file so that keywords and numbers are ASCII (UTF-16 becomes UTF-8) and lines end in LF.
 
-    Names in other files keep their encoding: see `decoded`.
+    Names in files of other encodings stay unchanged: see `decoded`.
     """
     return _as_bytes(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
@@ -31,7 +31,7 @@ def _as_bytes(data: bytes) -> bytes:
 
 
 def decoded(name: bytes) -> str:
-    """Decode a name from UTF-8, or else from Latin-1."""
+    """Decode a name as UTF-8 or, if that fails, as Latin-1."""
     try:
         return name.decode()
     except UnicodeDecodeError:
@@ -45,8 +45,8 @@ def numbers(
 
     Args:
         element: name of a row, for errors.
-        allow_missing: return NaN for a row with fewer numbers or with an invalid one.
-    Raises: MeshError for such a row otherwise.
+        allow_missing: True to return NaN for a row that has too few numbers or an invalid one.
+    Raises: MeshError for such a row, unless `allow_missing`.
     """
     try:
         return np.fromiter(
@@ -80,6 +80,6 @@ def is_number(word: bytes) -> bool:
 
 
 def without_comments(lines: Iterable[bytes]) -> list[list[bytes]]:
-    """Words of each line up to #, without empty lines."""
+    """Split lines into words, without comments from # on and without empty lines."""
     split = (re.sub(rb"#.*", b"", line).split() for line in lines)
     return [words for words in split if words]

@@ -1,4 +1,4 @@
-"""Edges and faces of tetrahedra: index arrays in, index arrays out."""
+"""Compute the edges and faces of tetrahedra from index arrays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 
 
 
 def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
-    """Edges (k, 2), rows i < j in ascending order, and the rows of each tetrahedron's edges (m, 6)."""
+    """Return edges (k, 2), i < j, in ascending order; and the rows of each tetrahedron's edges, (m, 6)."""
     pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
     stride = int(tets.max()) + 1
     keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
@@ -29,7 +29,7 @@ def surface_of(tets: IntArray) -> IntArray:
     """Triangles (f, 3) that belong to only one tetrahedron, wound outwards, in the order of `tets`.
 
     The tetrahedra must have positive volume.
-    Raises: MeshError if more than two of them share a face, or two lie on the same side of one.
+    Raises: MeshError if more than two of them share a face, or if two lie on the same side of their face.
     """
     faces = tets[:, LOCAL_FACES].reshape(-1, 3)
     order, starts, counts = groups(np.sort(faces, axis=1))

@@ -10,17 +10,17 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 FOLDED = 1e-9
-"""Fraction of a polygon's area below which a triangle that faces the other way counts as flat."""
+"""Fraction of a polygon's area below which a triangle of opposite orientation counts as flat."""
 
 
 def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:
-    """Triangulate polygons: by fans where these lie within the polygon, by ear clipping elsewhere.
+    """Triangulate polygons: by a fan if it lies within the polygon, otherwise by ear clipping.
 
     Args:
         corners: corners of all polygons in sequence, (k, 3).
-        counts: number of corners of each polygon, (f,). One with fewer than three makes no triangle.
-    Returns: rows of `corners` (m, 3), in the order and orientation of the polygons, and the polygon of each
-        triangle (m,).
+        counts: number of corners of each polygon, (f,). Polygons with fewer than three make no triangle.
+    Returns: triangles as rows of `corners`, (m, 3), in the order and orientation of the polygons; and the
+        polygon of each triangle, (m,).
     """
     starts, sizes = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     ends = np.cumsum(sizes)

@@ -17,7 +17,7 @@ from taichi_soft.meshing.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Look:
-    """A material: its red, green, blue and opacity from 0 to 1, and its texture as a Pillow image."""
+    """Material of a file: red, green, blue and opacity from 0 to 1, and the texture as a Pillow image."""
 
     name: str
     color: tuple[float, float, float, float] | None = None
@@ -27,11 +27,11 @@ class Look:
 def visual_of(
     *, uv: FloatArray | None = None, colors: FloatArray | None = None, look: Look | None = None
 ) -> Any:
-    """Return trimesh's visual of vertices: by a texture, else colours, else a material; None without any.
+    """Return a trimesh visual from a texture, else from colours, else from a material; None without any.
 
     Args:
-        uv: (n, 2), from the lower left corner; NaN for vertices without.
-        colors: colours of vertices, (n, 3) or (n, 4), from 0 to 1, or up to 255.
+        uv: texture coordinates from the lower left corner, (n, 2); NaN for vertices without any.
+        colors: colours of vertices, (n, 3) or (n, 4), from 0 to 1 or from 0 to 255.
     """
     from trimesh.visual import ColorVisuals, TextureVisuals  # slow to import, and games do not need it
     from trimesh.visual.material import PBRMaterial
@@ -78,7 +78,7 @@ def read_image(name: str, content: bytes) -> Any:
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(content))
             image.load()
-    except Exception as error:  # Pillow's readers raise many kinds
+    except Exception as error:  # Pillow's readers raise exceptions of many kinds
         raise MeshError(f"the texture {name} is not read: {type(error).__name__}: {error}") from None
     return image
 
@@ -86,8 +86,9 @@ def read_image(name: str, content: bytes) -> Any:
 def find_referenced_file(path: Path, name: str, folder: Path | None = None) -> Path | None:
     """Find the file that another file names; None if there is none.
 
-    The search uses its path from `folder` and from the folder of `path`, then its name in that folder,
-    ignoring case. It stays within the parent of that folder, because visitors of a server send such files.
+    The search tries `name` relative to `folder`, then relative to the folder of `path`, then a file in that
+    folder with the same last part, ignoring case. Files outside the folder's parent are ignored, because
+    visitors of a server can send such names.
     """
     parts = [part for part in name.strip().strip('"').replace("\\", "/").split("/") if part not in ("", ".")]
     if not parts:

@@ -18,8 +18,8 @@ from taichi_soft.meshing.topology import LOCAL_FACES
 Ints = NDArray[np.int64]
 
 PERTURBATION = 1e-9
-"""Random shift of the faces, relative to an edge: in regular meshes faces would coincide with the sides of
-tetrahedra, and belong to both or to neither."""
+"""Random shift of the Voronoi faces, relative to an edge. Without it, faces in regular meshes would coincide
+with the sides of tetrahedra, and belong to both neighbours or to neither."""
 
 SMALLEST_FACE = 1e-7
 """Area relative to the squared edge below which a face is an artefact of `PERTURBATION`."""
@@ -35,8 +35,8 @@ class VoronoiGraph:
             the first is repeated at the end.
         corner_tet: (c,) a tetrahedron that contains the corner at rest.
         corner_weights: (c, 4) barycentric coordinates of the corner in that tetrahedron.
-        cell_tet, cell_vertex, cell_volume: (s,) volume of the part of a tetrahedron nearest to a vertex
-            [m^3].
+        cell_tet, cell_vertex, cell_volume: (s,) tetrahedron, vertex, and the volume of the tetrahedron's part
+            that is nearest to the vertex [m^3].
     """
 
     mesh: TetMesh
@@ -64,7 +64,7 @@ def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
 
     Args:
         mesh: Delaunay tetrahedra, such as those of `delaunay_mesh`.
-    Raises: MeshError if the mesh is not Delaunay; OptionError without scipy.
+    Raises: MeshError if the mesh is not Delaunay; OptionError if scipy is missing.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"a Voronoi graph needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
@@ -96,7 +96,7 @@ def _graph_of(original: TetMesh, mesh: TetMesh) -> VoronoiGraph:
 
 
 class _Neighbours:
-    """Pairs of vertices whose cells may touch, and the neighbours of each vertex."""
+    """Pairs of vertices whose cells can touch, and the neighbours of each vertex."""
 
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
@@ -145,7 +145,7 @@ class _Neighbours:
 
 
 def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
-    """Unclipped Voronoi face of each pair, right-handed about its direction; sides are labelled by vertex."""
+    """Unclipped Voronoi face of each pair, right-handed about its direction; labels are vertices."""
     ends = mesh.vertices[neighbours.pairs]
     axis = (ends[:, 1] - ends[:, 0]) / neighbours.length[:, None]
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
@@ -194,7 +194,7 @@ def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
 def _outlines(
     mesh: TetMesh, pieces: Polygons, edge: Ints, tet: Ints, areas: FloatArray
 ) -> tuple[Ints, Ints, FloatArray]:
-    """Outline of each edge's face: its pieces joined, without the sides between them."""
+    """Join the pieces of each edge's face. Returns its `corner_edge`, `corner_tet`, `corner_weights`."""
     outer = _is_surface(mesh)
     order = np.argsort(edge, kind="stable")
     bounds = np.searchsorted(edge[order], np.arange(len(mesh.edges) + 1))
@@ -226,7 +226,7 @@ Side = tuple[FloatArray, FloatArray, int, int]
 
 
 def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> list[Side]:
-    """Join collinear segments end to end where they touch; each has a first and a last tetrahedron."""
+    """Join collinear segments that touch end to end. Each result has a first and a last tetrahedron."""
     direction = max((b - a for a, b, _ in parts), key=lambda d: float((d * d).sum()))
     parts = sorted(parts, key=lambda part: float((part[0] * direction).sum()))
     joined: list[Side] = []
@@ -278,10 +278,10 @@ def _is_surface(mesh: TetMesh) -> NDArray[np.bool_]:
 def _cells(
     mesh: TetMesh, neighbours: _Neighbours, face: Ints, tet: Ints, size: FloatArray
 ) -> tuple[Ints, Ints, FloatArray]:
-    """Volume of the part of each tetrahedron that is nearest to each vertex.
+    """Return `cell_tet`, `cell_vertex` and `cell_volume` of the graph.
 
-    It is the sum of the pyramids from the vertex to each piece of the part's boundary, which consists of
-    Voronoi faces and of the tetrahedron's own faces.
+    A volume is the sum of the pyramids from the vertex to each piece of the boundary of its part, which
+    consists of Voronoi faces and of the tetrahedron's own faces.
     """
     n = len(mesh.vertices)
     ends = neighbours.pairs[face]

@@ -25,26 +25,26 @@ from taichi_soft.meshing.wavefront_materials import read_materials
 Ints = NDArray[np.int64]
 
 SKIPPED = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
-"""Statements without triangles."""
+"""Statements that define no triangles, with their names for notes."""
 
 
 @dataclass
 class _Content:
-    """Statements of a file."""
+    """Parsed statements of a file."""
 
     vertices: list[list[bytes]] = field(default_factory=list)
     texcoords: list[list[bytes]] = field(default_factory=list)
     normals: list[list[bytes]] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows of these, NONE if missing
+    corners: list[tuple[int, int, int]] = field(default_factory=list)  # row of each, NONE if missing
     counts: list[int] = field(default_factory=list)  # corners of each face
-    material: list[int] = field(default_factory=list)  # of each face
-    materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # numbers by name
+    material: list[int] = field(default_factory=list)  # material of each face
+    materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # material numbers by name
     libraries: list[bytes] = field(default_factory=list)
     objects: set[str] = field(default_factory=set)
     skipped: dict[str, int] = field(default_factory=dict)
 
     def name_of(self, material: str, is_single: bool) -> str:
-        """Name of the surface of a material; that of the object if the file has one of each."""
+        """Name of the surface of a material. A single surface gets the name of the single object, or ""."""
         if not is_single:
             return material
         return next(iter(self.objects)) if len(self.objects) == 1 else ""
@@ -95,10 +95,10 @@ def read_obj(path: Path) -> list[Surface]:
 
 
 def _remove_missing(rows: Ints, texcoords: int, normals: int) -> list[str]:
-    """Remove missing texture coordinates and normals from corners (k, 3), and report how many.
+    """Replace missing texture coordinates and normals of corners (k, 3) by NONE. Returns notes with counts.
 
     Args:
-        texcoords, normals: number of them in the file.
+        texcoords, normals: number of texture coordinates and of normals in the file.
     """
     notes = []
     for column, length, kind in ((1, texcoords, "texture coordinates"), (2, normals, "normals")):
@@ -176,7 +176,7 @@ def _add_face(content: _Content, words: list[bytes], material: int) -> None:
 
 
 def _row(index: bytes, length: int) -> int:
-    """Row of an index that counts from 1, or backwards from the last of `length` rows so far."""
+    """Convert an index, which counts from 1 or backwards from -1, to a row; `length` rows exist so far."""
     number = int(index)
     if number == 0:
         raise ValueError
@@ -186,7 +186,7 @@ def _row(index: bytes, length: int) -> int:
 
 
 def _points(rows: list[list[bytes]]) -> tuple[FloatArray, FloatArray | None]:
-    """Vertices (n, 3), and their colours (n, 3) if all have one."""
+    """Return vertices (n, 3), and their colours (n, 3), or None unless all have one."""
     points = numbers(rows, 3, "vertex")
     if rows and all(len(row) >= 6 for row in rows):
         return points, numbers([row[3:6] for row in rows], 3, "colour of vertex")

@@ -9,11 +9,11 @@ from taichi_soft.meshing.text import as_ascii, decoded, is_number
 from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image
 
 MAX_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
-"""Most arguments of an option of a texture; other options have one."""
+"""Largest number of arguments of a texture's option; options that are not listed have one."""
 
 
 def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[dict[str, Look], list[str]]:
-    """Read materials by name. Returns them and sentences on what is missing.
+    """Read the materials that a .obj file uses. Returns: materials by name; sentences on missing ones.
 
     Args:
         path: path of the .obj file.
@@ -90,7 +90,7 @@ def _color(values: dict[bytes, list[bytes]]) -> tuple[float, float, float, float
 
 
 def _file(line: bytes) -> bytes:
-    """File name after the options of a texture; it can contain spaces."""
+    """Return the file name after the options of a texture; it can contain spaces."""
     rest = line.split(None, 1)[1].strip()
     while rest.startswith(b"-") and b" " in rest:
         option, rest = rest.split(None, 1)

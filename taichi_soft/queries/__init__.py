@@ -1,4 +1,4 @@
-"""Queries on bodies in their state after the last step. Queries change nothing."""
+"""Queries on the state of bodies after the last step. Queries do not change the state."""
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
 from taichi_soft.queries.closest import ClosestPoint, find_closest_point

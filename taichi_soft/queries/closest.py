@@ -38,7 +38,7 @@ def find_closest_point(
     max_distance: float,
     bodies: Iterable[SoftBody] | None,
 ) -> ClosestPoint | None:
-    """Find the closest point of all surfaces. Raises: OptionError, see `World.closest_point`."""
+    """Find the closest point of all surfaces, or None. Raises: OptionError, see `World.closest_point`."""
     query = np.empty(4, dtype=np.float32)
     query[:3] = as_vector(point, "point", "m")
     limit = as_max_distance(max_distance)

@@ -1,7 +1,7 @@
-"""Kernels for queries between steps: rays, closest points, overlaps. They change nothing.
+"""Kernels for queries between steps: rays, closest points, overlaps. They do not change the motion.
 
-Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. So the first
-face of the first body wins a tie, for any number of threads.
+Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. In a tie, the
+first face of the first body is therefore returned, for any number of threads.
 """
 
 from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_result
@@ -88,7 +88,8 @@ def find_closest(
     Args:
         bodies: bodies to test, ascending.
         query: (4,): point [m] and square of the largest distance [m^2].
-        found: (1, 13), see `write_result`, then 1 if the point is inside; unchanged if nothing is in range.
+        found: (1, 13): columns of `write_result`, then 1 if the point is inside, else 0. Unchanged if nothing
+            is in range.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -150,7 +151,8 @@ def find_overlaps(
 
     Args:
         bodies: indices of the bodies to test.
-        shape: (5, 3): centre [m]; axes of the box in rows; its size, or the sphere's radius three times [m].
+        shape: (5, 3): row 0 is the centre [m], rows 1 to 3 are the axes of the box, and row 4 is its size [m]
+            or, in each column, the sphere's radius [m].
         first_vertex: start in `inside` of each body that overlaps; unchanged for others.
         inside: 1 for each vertex, in the caller's order, that lies in the shape; unchanged for others.
     """

@@ -15,11 +15,11 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 _UNLIMITED = 3e38
-"""Stands for no limit [m or m^2], because the kernels do not handle infinity."""
+"""Limit used instead of infinity, which the kernels do not handle [m or m^2]."""
 
 
 def as_max_distance(max_distance: float) -> float:
-    """Check a largest distance [m]: above 0, or infinity. Raises: OptionError."""
+    """Return `max_distance` [m] if it is above 0 or infinite. Raises: OptionError otherwise."""
     if isinstance(max_distance, (float, np.floating)) and max_distance == math.inf:
         return math.inf
     limit = as_number(max_distance, "max_distance", 0.0, math.inf, "a number above 0 m, or infinity")
@@ -29,14 +29,14 @@ def as_max_distance(max_distance: float) -> float:
 
 
 def next_above(limit: float) -> float:
-    """Next float32 above a limit: kernels accept smaller distances only, and the limit itself must count."""
+    """Next float32 above a limit: kernels accept only smaller distances, and the limit itself must count."""
     return float(np.nextafter(np.float32(min(limit, _UNLIMITED)), np.float32(np.inf)))
 
 
 def as_body_indices(
     bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None]
 ) -> NDArray[np.int32]:
-    """Indices of the bodies to test, ascending; all bodies for None. Raises: OptionError.
+    """Return the indices of the bodies to test, ascending; None selects all bodies. Raises: OptionError.
 
     Args: handles: the body in each slot, None for an empty slot.
     """

@@ -25,11 +25,11 @@ class RayHit:
 
     body: SoftBody  # the body that was hit
     triangle: int  # row of body.surface
-    vertices: NDArray[np.int32]  # (3,) of that triangle
+    vertices: NDArray[np.int32]  # (3,) corners of that triangle
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
     distance: float  # [m] from the ray's origin
     point: Floats  # (3,) [m]
-    normal: Floats  # (3,) of the triangle, unit length, outward
+    normal: Floats  # (3,) outward unit normal of the triangle
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class RayHits:
     """First intersections of n rays with the surfaces.
 
     A ray that hits nothing has body and triangle -1, distance infinity and NaN in the other arrays. `body`
-    contains slots, and a slot can be reused after a despawn. Look up the bodies before the next change.
+    contains slots, and a slot can be reused after a despawn. Look up the bodies before the next despawn.
     """
 
     body: NDArray[np.int32]  # (n,) body.index
@@ -57,7 +57,7 @@ def cast_ray(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHit | None:
-    """Find the first hit of one ray. Raises: OptionError, see `World.raycast`."""
+    """Find the first hit of one ray, or None. Raises: OptionError, see `World.raycast`."""
     rays = np.empty((1, 8), dtype=np.float32)
     rays[0, :3] = as_vector(origin, "origin", "m")
     rays[0, 3:6] = _unit_directions(as_array(direction, "direction", (3,))[None], "direction")

@@ -1,4 +1,4 @@
-"""Bound on the stress of every tetrahedron, cheap enough to find overloaded bodies in every step."""
+"""Find overloaded bodies in every step, by a cheap upper bound on the stress of each tetrahedron."""
 
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.core.constants import LANES

@@ -62,13 +62,13 @@ def write_body(
     """Write a body into its slot. Indices count from the slot's first rows.
 
     Args:
-        model_of: body whose lag, drives and residual it takes: itself, or the body it was cut from.
+        model_of: body whose fields `state.inherited` it takes over: itself, or the body it was cut from.
         motion: as in `read_motion`, one row for each vertex in the caller's order.
         rest: positions of the particles at rest [m], in kernel order.
         particles: particle of each vertex.
-        tet_vertices, tet_edges: in blocks.
-        rest_inverses: in blocks; current and original inverse rest shapes.
-        edges, edge_damping: with the spare rows.
+        tet_vertices, tet_edges: vertices and edges of the tetrahedra, in blocks.
+        rest_inverses: current and original inverse rest shapes, in blocks.
+        edges, edge_damping: edges and their damping, with the spare rows.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

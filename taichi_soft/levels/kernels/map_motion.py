@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 POSITION, VELOCITY, EARLIER_POSITION, EARLIER_VELOCITY = 0, 3, 6, 9
 INV_MASS, MASS, AIM, TARGET, PUSH, REACTION = 12, 15, 16, 17, 20, 23
-"""First columns of the quantities in a row of `read_motion`. Those before `INV_MASS` are interpolated."""
+"""First columns of the quantities in a row of `read_motion`. Columns before `INV_MASS` are interpolated."""
 
 
 @ti.func
@@ -38,8 +38,9 @@ def _momenta(rows: ti.template(), x, v, center):
 
 @ti.func
 def _rigid(rows: ti.template(), x, momentum, angular_momentum):
-    """Rigid motion with a momentum and an angular momentum about the centre of mass, or with a force and a
-    torque.
+    """Rigid motion that has a momentum and an angular momentum about the centre of mass.
+
+    Given a force and a torque instead, the returned rates are accelerations.
 
     Returns: centre of mass [m], its velocity [m/s], and the angular velocity [rad/s].
     """
@@ -50,7 +51,7 @@ def _rigid(rows: ti.template(), x, momentum, angular_momentum):
         mass += rows[i, MASS]
         inertia -= (rows[i, MASS] * arm).outer_product(arm)
     size = inertia[0, 0] + inertia[1, 1] + inertia[2, 2]
-    size += 1e-9 * size  # keeps the inertia regular where all particles lie on one line
+    size += 1e-9 * size  # keeps the inertia regular if all particles lie on one line
     for k in ti.static(range(3)):
         inertia[k, k] -= size
     a = ti.Vector([inertia[0, k] for k in ti.static(range(3))])
@@ -87,10 +88,10 @@ def _pin(
     weights: ti.template(),
     nearest: ti.template(),
 ):
-    """Pin vertices in the state of the nearest vertices that are pinned in the old level.
+    """Pin vertices, with the state of the nearest pinned vertices of the old level.
 
-    The pinned vertices follow the rigid motion that fits the old ones best, plus the deviation of the nearest
-    old one from it. So their arrangement does not drift over repeated changes of level.
+    The pinned vertices follow the rigid motion that fits the old pinned vertices best, plus the deviation of
+    the nearest old vertex from it. Their arrangement therefore does not drift over repeated changes of level.
     """
     for x in ti.static((POSITION, EARLIER_POSITION)):
         rotation, translation = fitting_motion(rest_before, before, x, weights)
@@ -114,7 +115,7 @@ def _pin(
 
 @ti.func
 def _map_pushes(before: ti.template(), after: ti.template()):
-    """Distribute the force and the torque of all pushes like those of a rigid motion."""
+    """Distribute the total external force and its torque as a rigid acceleration of all particles."""
     center = _center(before, POSITION)
     force, torque = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
     for i in range(before.shape[0]):
@@ -144,11 +145,11 @@ def map_motion(
 
     Args:
         sources, begins, shares: see `Passage.rows`.
-        masses: of the new level, (m,) [kg].
+        masses: masses of the new level's vertices, (m,) [kg].
         rest_before, rest_after: positions at rest, (n, 3) and (m, 3) [m].
-        weights: of the pinned vertices of the old level, with the sum 1; 0 for others, (n,).
+        weights: weights of the old level's pinned vertices, whose sum is 1; 0 for other vertices, (n,).
         nearest: pinned vertex of the old level for each vertex that will be pinned; -1 for others, (m,).
-        after: gets the rows; the columns of touches and reactions become 0.
+        after: the kernel writes the rows here; the columns of touches and reactions become 0.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -32,14 +32,15 @@ COMPONENTS: dict[Any, np.dtype[Any]] = {
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 MAX_IMPLICIT_ROWS = 2_000_000
-"""Largest number of rows of an accessor without a buffer view: no byte of the file backs its zeros."""
+"""Largest number of rows of an accessor without a buffer view: its zeros are not in the file, so even a small
+file could request any number."""
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 REPLACEMENT_CHARACTER = "\ufffd".encode()
-"""Written by text editors and tools for bytes that are not characters."""
+"""Character that text tools write in place of bytes that they cannot decode."""
 
 
 class Document:
@@ -65,19 +66,19 @@ class Document:
             raise MeshError(f"is glTF of version {version[:10]}: {upgrade_command(path)}")
 
     def entry(self, name: str, parent: Entry | None = None) -> Entry:
-        """Return the object with a given name, or an empty one."""
+        """Return the object `name` of `parent` (None: the root), or an empty one."""
         found = (self.json if parent is None else parent).get(name, {})
         return found if isinstance(found, dict) else {}
 
     def entries(self, kind: str) -> list[Any]:
-        """Return the list of a kind, such as "nodes"."""
+        """Return the list `kind` of the root, such as "nodes", or an empty one."""
         found = self.json.get(kind, [])
         if not isinstance(found, list):
             raise MeshError(f"cannot be read: its {kind!r} are not a list")
         return found
 
     def named(self, kind: str, number: Any) -> Entry:
-        """Return one entry of a kind. Raises: MeshError if its number does not exist."""
+        """Return entry `number` of the list `kind`. Raises: MeshError if it does not exist."""
         found = self.entries(kind)
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
             raise MeshError(f"cannot be read: it refers to {kind}[{number!r}] but has {len(found)} of these")
@@ -87,13 +88,13 @@ class Document:
         return entry
 
     def rows(self, number: Any, *types: str) -> NDArray[Any]:
-        """Read an accessor as stored, shape (count, columns).
+        """Return the numbers of an accessor as stored, (count, columns).
 
         Args:
             number: number of the accessor.
             types: allowed values of its `type`, such as "VEC3".
-        Raises: MeshError, before memory is allocated, for an accessor of another type or beyond the end of
-            its buffer.
+        Raises: MeshError, before memory is allocated, for an accessor of another type, or one that extends
+            beyond the end of its buffer.
         """
         entry, name = self.named("accessors", number), f"accessor {number}"
         kind, count = entry.get("type"), read_count(entry, "count", name)
@@ -111,7 +112,7 @@ class Document:
         return self._with_sparse(rows, entry["sparse"], name) if "sparse" in entry else rows
 
     def values(self, number: Any, *types: str) -> FloatArray:
-        """Read an accessor as real numbers, with normalised integers decoded, shape (count, columns)."""
+        """Return an accessor as real numbers, (count, columns). Normalised integers are decoded."""
         rows = self.rows(number, *types)
         return decoded(rows, self.named("accessors", number))
 
@@ -127,7 +128,7 @@ class Document:
         return data[start : start + length], read_count(entry, "byteStride", name, 0)
 
     def fetch(self, uri: Any) -> bytes:
-        """Return the content of a data: URI, or of a file named relative to this one.
+        """Return the content of a data: URI, or of a file whose path is relative to this file.
 
         Raises: MeshError for a missing file, a network address or an absolute path. A .glb must not name
             files outside its folder either, because the live page reads files from any visitor.
@@ -174,7 +175,7 @@ class Document:
         raise MeshError(f"cannot be read: buffer {number} has no data")
 
     def _stored(self, entry: Entry, shape: tuple[int, int], dtype: np.dtype[Any], name: str) -> NDArray[Any]:
-        """Rows of a buffer view, without a copy."""
+        """Return the rows of an accessor as a view of its buffer, without a copy."""
         data, stride = self.view(entry["bufferView"])
         size, start = shape[1] * dtype.itemsize, read_count(entry, "byteOffset", name, 0)
         stride = stride or size
@@ -189,7 +190,7 @@ class Document:
         return np.asarray(np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize)))
 
     def _with_sparse(self, rows: NDArray[Any], sparse: Entry, name: str) -> NDArray[Any]:
-        """Return a copy with the rows of a sparse accessor replaced."""
+        """Return a copy of `rows` in which those that a sparse accessor stores are replaced."""
         count, name = read_count(sparse, "count", name), f"the sparse part of {name}"
         indices, values = sparse["indices"], sparse["values"]
         replaced = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(
@@ -203,7 +204,7 @@ class Document:
 
 
 def decoded(rows: NDArray[Any], accessor: Entry) -> FloatArray:
-    """Convert stored numbers to reals. A normalised accessor's become -1 to 1 or 0 to 1 (section 3.11)."""
+    """Convert stored numbers to reals. Normalised integers become -1 to 1 or 0 to 1 (section 3.11)."""
     reals = rows.astype(np.float64)
     if accessor.get("normalized") and rows.dtype.kind in "iu":
         reals = np.maximum(reals / np.iinfo(rows.dtype).max, -1.0)
@@ -211,7 +212,7 @@ def decoded(rows: NDArray[Any], accessor: Entry) -> FloatArray:
 
 
 def component_type(entry: Entry, name: str) -> np.dtype[Any]:
-    """Return the type of an accessor's numbers. Raises: MeshError for an unknown one."""
+    """Return the NumPy type of an accessor's numbers. Raises: MeshError for an unknown type."""
     component = entry.get("componentType")
     if component not in COMPONENTS:
         raise MeshError(f"cannot be read: {name} has the unknown component type {component!r}")
@@ -219,7 +220,7 @@ def component_type(entry: Entry, name: str) -> np.dtype[Any]:
 
 
 def read_count(entry: Entry, key: str, name: str, default: int | None = None) -> int:
-    """Return a count or an offset. Raises: MeshError unless it is a whole number of at least 0."""
+    """Return the count or offset `key` of an entry. Raises: MeshError unless it is a whole number from 0."""
     value = entry.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise MeshError(f"cannot be read: {key} of {name} is {value!r}, not a whole number of at least 0")
@@ -227,7 +228,7 @@ def read_count(entry: Entry, key: str, name: str, default: int | None = None) ->
 
 
 def copy_command(path: Path) -> str:
-    """Suggest a command that writes a file without compression."""
+    """Return a hint with a command that copies a file without compression."""
     return (
         f"run `npx @gltf-transform/cli copy {path.name} {path.stem}-plain.glb` (needs Node.js), or export it "
         "without compression"
@@ -235,7 +236,7 @@ def copy_command(path: Path) -> str:
 
 
 def upgrade_command(path: Path) -> str:
-    """Suggest a command that converts an older file to glTF 2.0."""
+    """Return a hint with a command that converts an older file to glTF 2.0."""
     return (
         f"only version 2.0 is read. Convert it with `npx gltf-pipeline -i {path.name} -o {path.stem}-2.glb` "
         "(needs Node.js)"
@@ -243,7 +244,7 @@ def upgrade_command(path: Path) -> str:
 
 
 def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
-    """Return the JSON and the binary chunk of a .glb file."""
+    """Return the JSON chunk of a .glb file, and its binary chunk or None."""
     if len(data) < 20:
         raise MeshError(f"cannot be read: it is cut short, at {len(data)} bytes")
     if REPLACEMENT_CHARACTER in data[:20]:

@@ -26,16 +26,16 @@ TEXTURES = (
 )
 
 SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
-"""Extensions with an image of a texture in another format."""
+"""Extensions that store a texture's image in another format."""
 
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM = "KHR_texture_transform"
 READ = (GLOSS, TRANSFORM, *SOURCES)
-ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # in a format that pillow cannot always read
+ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # pillow cannot always read these formats
 
 
 class Looks:
-    """Visuals of the primitives of a file.
+    """Reads the appearance of a file's primitives as trimesh visuals.
 
     Attributes:
         notes: sentences on images and materials that were not read.
@@ -48,7 +48,7 @@ class Looks:
         self._images: dict[int, Any] = {}
 
     def of(self, primitive: Primitive) -> Any:
-        """Return trimesh's TextureVisuals or ColorVisuals, or None without material and colours."""
+        """Return a primitive's TextureVisuals or ColorVisuals; None without material, texture and colours."""
         number = primitive.entry.get("material")
         uv = self._texture_coordinates(primitive)
         colors = _colors(primitive)
@@ -64,7 +64,7 @@ class Looks:
         return visual
 
     def _texture_coordinates(self, primitive: Primitive) -> FloatArray | None:
-        """Coordinates of the vertices on the base colour's texture, (n, 2), v upwards."""
+        """Texture coordinates of the vertices for the base colour, (n, 2), v upwards; None without any."""
         number = primitive.entry.get("material")
         material = {} if number is None else self.document.named("materials", number)
         texture = _flat(material).get("baseColorTexture", {})
@@ -105,7 +105,7 @@ class Looks:
         return found
 
     def _image(self, reference: Entry) -> Any:
-        """Return pillow's image of a texture, or None with a note."""
+        """Return the pillow image of a texture. If it cannot be read, add a note and return None."""
         texture = self.document.named("textures", reference.get("index"))
         sources = [texture.get("source"), *(extension(texture, name).get("source") for name in ALL_SOURCES)]
         reasons = []
@@ -119,7 +119,7 @@ class Looks:
         return None
 
     def _opened(self, number: int) -> Any:
-        """Return pillow's image, or a note on why it is not read."""
+        """Return image `number` as a pillow image, or a sentence on why it cannot be read."""
         if missing_packages("film", "PIL"):
             return "texture images are not read without pillow: run pip install 'taichi-soft[film]'"
         from PIL import Image, UnidentifiedImageError
@@ -140,7 +140,7 @@ class Looks:
             return opened
         except UnidentifiedImageError:
             return f"texture {name} is not read: its format is unknown to pillow. Save it as .png or .jpg"
-        except Exception as error:  # pillow's readers raise many kinds
+        except Exception as error:  # pillow's readers raise exceptions of many kinds
             return f"texture {name} is not read ({' '.join(str(error).split())[:150]})"
 
     def _add_note(self, note: str) -> None:
@@ -149,7 +149,7 @@ class Looks:
 
 
 def _colors(primitive: Primitive) -> NDArray[np.uint8] | None:
-    """Red, green, blue and alpha of the vertices, from 0 to 255, (n, 4)."""
+    """Red, green, blue and alpha of the vertices, from 0 to 255, (n, 4); None without colours."""
     rows = primitive.values("COLOR_0", "VEC3", "VEC4")
     if rows is None:
         return None
@@ -159,7 +159,7 @@ def _colors(primitive: Primitive) -> NDArray[np.uint8] | None:
 
 
 def _flat(material: Entry) -> Entry:
-    """All properties of a material in one object. Specular-glossiness is converted approximately."""
+    """Return all properties of a material in one object. Specular-glossiness is converted approximately."""
     gloss = extension(material, GLOSS)
     flat = {**material, **(material.get("pbrMetallicRoughness") or {})}
     if gloss and "pbrMetallicRoughness" not in material:

@@ -1,4 +1,4 @@
-"""Nodes of a glTF file: their matrices, and those that the default scene shows."""
+"""Nodes of a glTF file: their matrices, and which nodes the default scene shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ VISIBILITY = "KHR_node_visibility"
 
 
 def world_matrices(document: Document) -> FloatArray:
-    """Matrices from each node to the file's axes, (n, 4, 4).
+    """Matrix from each node's axes to the file's axes, (n, 4, 4).
 
     Raises: MeshError for a node with two parents, or one that is its own descendant.
     """
@@ -45,7 +45,7 @@ def world_matrices(document: Document) -> FloatArray:
 def shown_nodes(document: Document) -> list[int]:
     """Numbers of the visible nodes of the default scene, parents before their children.
 
-    Without a default scene the first one counts, and without scenes every node.
+    If the file has no default scene, the first scene is used. If it has no scene, all nodes are used.
     """
     nodes = document.entries("nodes")
     if document.entries("scenes"):
@@ -66,7 +66,7 @@ def shown_nodes(document: Document) -> list[int]:
 
 
 def instance_matrices(document: Document, node: Entry) -> FloatArray | None:
-    """Matrices from the instances of a node's mesh to the node, (k, 4, 4), or None."""
+    """Matrices from the instances of a node's mesh to the node's axes, (k, 4, 4); None without instances."""
     attributes = extension(node, INSTANCING).get("attributes")
     if not attributes:
         return None
@@ -87,7 +87,7 @@ def instance_matrices(document: Document, node: Entry) -> FloatArray | None:
 
 
 def extension(entry: Entry, name: str) -> Entry:
-    """Return an extension of an entry, or an empty object."""
+    """Return the extension `name` of an entry, or an empty object."""
     found = (entry.get("extensions") or {}).get(name, {})
     return found if isinstance(found, dict) else {}
 

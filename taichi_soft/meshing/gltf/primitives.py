@@ -33,7 +33,7 @@ class Primitive:
 
     Attributes:
         entry: its JSON.
-        name: name of its mesh and its number in that mesh, for errors.
+        name: text for errors, such as "primitive 0 of mesh 2".
     """
 
     def __init__(self, document: Document, entry: Entry, name: str) -> None:
@@ -74,14 +74,14 @@ class Primitive:
 
     @property
     def vertex_count(self) -> int:
-        """Number of positions."""
+        """Number of vertices."""
         if "POSITION" in self._compressed:
             return len(self._compressed["POSITION"])
         number = self._attributes["POSITION"]
         return read_count(self.document.named("accessors", number), "count", f"accessor {number}")
 
     def vertices(self, weights: Sequence[float]) -> tuple[FloatArray, FloatArray | None]:
-        """Positions (n, 3) and normals (n, 3) or None, with the morph targets blended in.
+        """Return positions (n, 3) and normals (n, 3) with the morph targets blended in; normals can be None.
 
         Args:
             weights: weights of the morph targets; missing ones are 0.
@@ -99,7 +99,7 @@ class Primitive:
         return positions, normals
 
     def triangles(self, count: int) -> NDArray[np.int64]:
-        """Vertices of the corners of its triangles, (m, 3).
+        """Vertex indices of its triangles, (m, 3).
 
         Args:
             count: number of vertices.
@@ -144,7 +144,7 @@ class Primitive:
         data, _ = self.document.view(compression.get("bufferView"))
         try:
             mesh = DracoPy.decode(bytes(data))
-        except Exception as error:  # the package raises many kinds on damaged data
+        except Exception as error:  # DracoPy raises exceptions of many kinds on damaged data
             reason = " ".join(str(error).split())[:100]
             raise MeshError(
                 f"cannot be read: the {DRACO} data of {self.name} is damaged ({reason})"
@@ -164,7 +164,7 @@ class Primitive:
 
 
 def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of a strip, (m, 3). Those that repeat a corner only connect strips and are skipped."""
+    """Triangles of a strip, (m, 3). Triangles that repeat a corner only connect strips, and are skipped."""
     found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     found[1::2] = found[1::2, [1, 0, 2]]
     a, b, c = found.T

@@ -36,7 +36,7 @@ SHAPELESS = (
 """Prefixes of extensions that do not change shapes: files that require them are read."""
 
 MAX_ROWS = 10_000_000
-"""Most vertices and triangles in total. Many nodes can show one mesh, so a small file could need a lot."""
+"""Largest sum of all vertices and triangles. Many nodes can show one mesh, so a small file can exceed it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class _Part:
     vertices: FloatArray  # (n, 3) [m]
     triangles: NDArray[np.int64]  # (m, 3)
     normals: FloatArray | None  # (n, 3), of any length; None if the file has none
-    visual: Any  # trimesh's, or None
+    visual: Any  # trimesh visual, or None
 
 
 def read_gltf(path: Path) -> list[Surface]:
@@ -87,7 +87,7 @@ class _Reader:
             node = self.document.named("nodes", number)
             if "mesh" in node:
                 found.extend(self._of_node(node, worlds, worlds[number]))
-        if not self.document.entries("nodes"):  # a library of meshes
+        if not self.document.entries("nodes"):  # a file without nodes is a library of meshes
             for number in range(len(self.document.entries("meshes"))):
                 found.extend(self._of_node({"mesh": number}, worlds, np.eye(4)))
         notes = self._notes(shown)
@@ -133,7 +133,7 @@ class _Reader:
                 yield _posed(part, poses)
 
     def _primitive(self, mesh: int, order: int, entry: Entry) -> Primitive:
-        """Return the primitive, shared by all nodes of a mesh so that it is decompressed only once."""
+        """Return a primitive. It is cached, so that it is decompressed once even if several nodes use it."""
         key = mesh, order
         if key not in self.primitives:
             self.primitives[key] = Primitive(self.document, entry, f"primitive {order} of mesh {mesh}")
@@ -233,7 +233,7 @@ def _posed(part: _Part, poses: FloatArray) -> _Part:
     vertices = np.einsum("...ij,...j->...i", linear, part.vertices) + poses[..., :3, 3]
     is_mirrored = np.asarray(np.linalg.det(linear) < 0.0)
     normals = None
-    if part.normals is not None:  # by the inverse transpose, up to the length
+    if part.normals is not None:  # transformed by the inverse transpose, up to a factor
         cofactors = np.cross(linear[..., [1, 2, 0], :], linear[..., [2, 0, 1], :])
         moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
         normals = np.where(is_mirrored[..., None], -moved, moved).reshape(-1, 3)
@@ -265,7 +265,7 @@ def _repeated(visual: Any, count: int) -> Any:
 
 
 def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
-    """Joints and their weights, (n, 4 k) each; no columns if there are none."""
+    """Joints of each vertex and their weights, (n, 4 k) each; (0, 0) if there are none."""
     joints, weights = [], []
     for group in range(16):
         numbers = primitive.rows(f"JOINTS_{group}", "VEC4")
@@ -280,7 +280,7 @@ def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
 
 
 def _unique(parts: list[_Part]) -> list[str]:
-    """Names of the parts, made unique by numbers at the end."""
+    """Names of the parts. Duplicate names get a number at the end."""
     found: dict[str, None] = {}
     last: Counter[str] = Counter()
     for part in parts:
