@@ -1,4 +1,4 @@
-"""`python -m lab drop-test`: random drops, and the sweep."""
+"""Command `python -m lab drop-test`: random drops, and a sweep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`python -m lab peers`: one drop here, in other engines and in a fine reference."""
+"""Command `python -m lab peers`: one drop in taichi-soft, in other engines and in a fine reference."""
 
 from __future__ import annotations
 

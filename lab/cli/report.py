@@ -1,4 +1,4 @@
-"""`python -m lab report`: the thesis's experiments."""
+"""Command `python -m lab report`: run the thesis's experiments."""
 
 from __future__ import annotations
 
