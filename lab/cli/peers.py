@@ -29,7 +29,7 @@ def peers(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Drop one body here, in a fine reference, and in each other engine that is installed.
+    """Drop one body in taichi-soft, in a fine reference, and in each installed engine.
 
     Print the cost and the error of each, and film them side by side in slow motion.
     """

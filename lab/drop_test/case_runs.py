@@ -36,7 +36,7 @@ PATIENCE = 150.0
 FREE_TIME, BRAKE = 20.0, 0.2
 """Time after which all velocities are damped [`Case.unit_time`], and the damping rate [1 / `Case.unit_time`].
 Without damping, a stiff ball would roll on a plane for minutes. Bodies that gain energy or slide down a slope
-keep moving in spite of it."""
+keep moving despite the damping."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:

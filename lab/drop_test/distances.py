@@ -1,4 +1,4 @@
-"""Signed distances of points (n, 3) from solids, in the solids' axes [m], float64.
+"""Functions for the signed distances of points (n, 3) from solids, in the solids' axes [m], float64.
 
 These formulas check the kernels and therefore share no code with them.
 """
@@ -15,7 +15,7 @@ Distance = Callable[[Floats], Floats]
 
 
 def half_space(normal: Floats, offset: float = 0.0) -> Distance:
-    """Return the distance from a half space.
+    """Return the distance function of a half space.
 
     Args:
         normal: unit normal of its plane, out of the half space, (3,).
@@ -25,12 +25,12 @@ def half_space(normal: Floats, offset: float = 0.0) -> Distance:
 
 
 def ball(radius: float) -> Distance:
-    """Return the distance from a ball centred at the origin."""
+    """Return the distance function of a ball centred at the origin."""
     return lambda x: np.asarray(np.linalg.norm(x, axis=1) - radius)
 
 
 def cuboid(size: Floats) -> Distance:
-    """Return the distance from a cuboid centred at the origin, with edges (3,) along the axes [m]."""
+    """Return the distance function of a cuboid centred at the origin, with edges (3,) along the axes [m]."""
 
     def distance(x: Floats) -> Floats:
         beyond = np.abs(x) - size / 2
@@ -41,7 +41,7 @@ def cuboid(size: Floats) -> Distance:
 
 
 def capsule(radius: float, length: float) -> Distance:
-    """Return the distance from a capsule around a segment of the z axis, centred at the origin."""
+    """Return the distance function of a capsule around a segment of the z axis, centred at the origin."""
 
     def distance(x: Floats) -> Floats:
         axis = x - np.outer(np.clip(x[:, 2], -length / 2, length / 2), (0.0, 0.0, 1.0))
@@ -51,7 +51,7 @@ def capsule(radius: float, length: float) -> Distance:
 
 
 def ring(major: float, minor: float) -> Distance:
-    """Return the distance from a torus about the z axis."""
+    """Return the distance function of a torus about the z axis."""
 
     def distance(x: Floats) -> Floats:
         along = np.hypot(x[:, 0], x[:, 1]) - major
@@ -61,7 +61,7 @@ def ring(major: float, minor: float) -> Distance:
 
 
 def ground(heights: Floats, spacing: float) -> Distance:
-    """Return a lower bound of the distance from a height field.
+    """Return a function for a lower bound of the distance from a height field.
 
     The bound is the height above the field times the cosine of its steepest slope. Each cell consists of two
     triangles that meet on the diagonal from (i, j) to (i + 1, j + 1).
