@@ -105,8 +105,9 @@ def _flesh(color: Color) -> Paint:
 
 
 def _mass_below(body: Body) -> float:
-    """Return the mass below the blade [kg]. A tetrahedron across the plane counts in proportion to its height
-    below.
+    """Return the mass below the blade [kg].
+
+    A tetrahedron across the plane counts in proportion to its height below.
     """
     heights = np.sort((body.positions()[body.tets] - CUT) @ np.cross(ALONG, ASIDE), axis=1)
     share = np.clip(-heights[:, 0] / (heights[:, 3] - heights[:, 0]), 0.0, 1.0)

@@ -61,8 +61,9 @@ class Case:
 
     @property
     def mach(self) -> float:
-        """Initial speed over the speed of sound in the body. Above 1, only the body's mass resists an
-        impact.
+        """Initial speed over the speed of sound in the body.
+
+        Above 1, only the body's mass resists an impact.
         """
         wave = math.sqrt(float(np.max(self.material.young / self.material.density)))
         return float(np.linalg.norm(self.velocity)) / wave

@@ -31,8 +31,9 @@ BOUNCE = 0.5
 
 @cache
 def _mesh(resolution: int) -> TetMesh:
-    """Make the mesh of the sphere. It is cached, because its Voronoi graph takes as long to compute as a
-    fall.
+    """Make the mesh of the sphere.
+
+    It is cached, because its Voronoi graph takes as long to compute as a fall.
     """
     return sphere(RADIUS, resolution)
 

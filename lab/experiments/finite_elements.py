@@ -171,8 +171,9 @@ def _ratio(numbers: Numbers) -> float:
 
 
 def _why(solid: list[tuple[Point, Numbers]]) -> str:
-    """Return a reason that names the laws that differ most. The mesh is the same, so the model is the
-    cause.
+    """Return a reason that names the laws that differ most.
+
+    The mesh is the same, so the model is the cause.
     """
     furthest = max(solid, key=lambda row: max(abs(_ratio(row[1][load]) - 1) for load in (*BEAM, "block")))
     return f"model: mesh and material are the same in both; {label(furthest[0])} is furthest away"

@@ -41,8 +41,9 @@ PAYS = 1.5
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: falls with each step. A quick report uses a coarse sphere and omits the
-    stiffest one.
+    """List the points: falls with each step.
+
+    A quick report uses a coarse sphere and omits the stiffest one.
     """
     is_full = effort is Effort.FULL
     common = {"resolution": 5 if is_full else 3, "repeats": 3 if is_full else 2}

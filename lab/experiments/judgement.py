@@ -1,5 +1,6 @@
-"""Make findings from booleans: for a claim as a whole, its parts, or several meshes. Format ranges of
-numbers.
+"""Make findings from booleans: for a claim as a whole, its parts, or several meshes.
+
+Format ranges of numbers.
 """
 
 from __future__ import annotations

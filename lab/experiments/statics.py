@@ -144,8 +144,9 @@ class StaticBody:
 
 
 def factorised(matrix: Any) -> Any:
-    """Return a function that solves for a right-hand side. Raises: NoEquilibriumError for a singular
-    matrix.
+    """Return a function that solves for a right-hand side.
+
+    Raises: NoEquilibriumError for a singular matrix.
     """
     from scipy.sparse.linalg import splu
 

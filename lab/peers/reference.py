@@ -24,8 +24,9 @@ FRACTION = 0.05
 
 
 class Reference:
-    """A body that steps by Verlet's method. Tensors of tetrahedra are (3, 3, m): rows, columns,
-    tetrahedra.
+    """A body that steps by Verlet's method.
+
+    Tensors of tetrahedra are (3, 3, m): rows, columns, tetrahedra.
     """
 
     def __init__(self, drop: Drop, steps: int) -> None:

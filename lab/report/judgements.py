@@ -57,8 +57,9 @@ class Judgement:
 
 
 def judge(sections: Sequence[Concluded]) -> list[Judgement]:
-    """Return all claims with their findings, in order. Raises: OptionError for a finding on an
-    unknown claim.
+    """Return all claims with their findings, in order.
+
+    Raises: OptionError for a finding on an unknown claim.
     """
     found: dict[str, list[tuple[Experiment, Finding]]] = {key: [] for key in CLAIMS}
     for experiment, _, section in sections:

@@ -40,8 +40,9 @@ from taichi_soft.core.types import ArchName
 
 
 def choose_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Return the experiments with these names in the order of the report, all if no name is given. Raises:
-    OptionError.
+    """Return the experiments with these names in the order of the report, all if no name is given.
+
+    Raises: OptionError.
     """
     for name in names:
         if name not in EXPERIMENTS:

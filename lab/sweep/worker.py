@@ -86,8 +86,9 @@ class Worker:
             self.end()
 
     def end(self) -> str:
-        """Wait until the process exits, and kill it after `END_LIMIT`. Returns: a description of how it
-        ended.
+        """Wait until the process exits, and kill it after `END_LIMIT`.
+
+        Returns: a description of how it ended.
         """
         if self._process is None:
             return ""

@@ -153,8 +153,9 @@ class _Motion:
         mesh.extras = {"targetNames": [f"frame {clip.first + index}" for index in shapes]}
 
     def _weights(self, count: int, place: list[int]) -> int:
-        """Add an array of weights, 1 for the shape of each frame. Returns: its accessor. Clips with equal
-        weights share it.
+        """Add an array of weights, 1 for the shape of each frame.
+
+        Returns: its accessor. Clips with equal weights share it.
         """
         key = (count, *place)
         if key not in self.weights:

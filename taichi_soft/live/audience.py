@@ -1,5 +1,6 @@
-"""Visitors of a live world. Each one receives messages, and frames at the rate that its browser can
-display.
+"""Visitors of a live world.
+
+Each one receives messages, and frames at the rate that its browser can display.
 """
 
 from __future__ import annotations

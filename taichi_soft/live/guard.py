@@ -1,5 +1,6 @@
-"""Access control of a live world. It admits this machine or holders of the token, and no pages of other
-origins.
+"""Access control of a live world.
+
+It admits this machine or holders of the token, and no pages of other origins.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Queue of requests to a world. It keeps the newest request of each kind, and limits the time of each
-visitor.
+"""Queue of requests to a world.
+
+It keeps the newest request of each kind, and limits the time of each visitor.
 """
 
 from __future__ import annotations

@@ -41,8 +41,9 @@ def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[An
 
 
 def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArray[np.float32], Any]:
-    """Quantise positions (n, 3) [m]. Returns: integers (n, 3), lower corner and size of the bounding
-    box [m].
+    """Quantise positions (n, 3) [m].
+
+    Returns: integers (n, 3), lower corner and size of the bounding box [m].
     """
     if len(positions) == 0:
         return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)

@@ -31,8 +31,9 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 def response(status: HTTPStatus, kind: str, content: bytes, name: str | None = None) -> Response:
-    """Make a response with content of a type. If `name` is given, the browser downloads it under this
-    name.
+    """Make a response with content of a type.
+
+    If `name` is given, the browser downloads it under this name.
     """
     headers = Headers()
     headers["Content-Type"] = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind

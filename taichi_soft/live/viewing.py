@@ -137,8 +137,9 @@ def _checked(colors: Mapping[Body, Color]) -> dict[Body, Color]:
 
 
 def _accepted(listener: Listener, server: subprocess.Popen[str]) -> Any:
-    """Wait for the server to connect, and return the connection. Raises: StateError if the server
-    ends first.
+    """Wait for the server to connect, and return the connection.
+
+    Raises: StateError if the server ends first.
     """
     found: list[Any] = []
     waiting = threading.Thread(target=lambda: found.append(listener.accept()), daemon=True)

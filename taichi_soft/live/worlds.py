@@ -103,8 +103,9 @@ class Worlds:
         self._audience.wake()
 
     def reset(self, sender: int = SERVER) -> None:
-        """Reset all worlds. Scenes with their own code are restarted, because a snapshot lacks the code's
-        state.
+        """Reset all worlds.
+
+        Scenes with their own code are restarted, because a snapshot lacks the code's state.
         """
         for pane, runner in list(self.panes.items()):
             if self.restarts(pane):

@@ -61,7 +61,7 @@ class Artist:
         self.times: list[float] = []
         self._spent = 0.0
         self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces by actor and topology version
-        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; the image is kept so that ids stay unique
+        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; the image is kept to keep its id unique
 
     def draw(self) -> NDArray[np.uint8]:
         """Draw the current state of the take without text. Returns: sRGB, uint8 (height, width, 3)."""
@@ -111,8 +111,9 @@ class Artist:
         return picture
 
     def _surfaces_of(self, actor: Actor) -> list[Surface]:
-        """Return the surfaces of an actor's skins, or of its body if it has no skin. A cut makes new
-        surfaces.
+        """Return the surfaces of an actor's skins, or of its body if it has no skin.
+
+        A cut makes new surfaces.
         """
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:

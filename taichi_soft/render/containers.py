@@ -36,7 +36,7 @@ LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
 # With one palette per film and ordered dithering, pixels that do not move stay equal: later frames compress
 # well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # frames per second; viewers slow down delays of 1/100 s, the unit of delays
+GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers slow down the next one, 100
 
 
 @contextlib.contextmanager

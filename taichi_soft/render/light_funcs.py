@@ -160,8 +160,9 @@ def smooth_rise(x):
 
 @ti.func
 def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
-    """Return the light of rubber. The arguments of all three materials are those of `glow` and its
-    intermediate results.
+    """Return the light of rubber.
+
+    The arguments of all three materials are those of `glow` and its intermediate results.
     """
     total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
     total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)

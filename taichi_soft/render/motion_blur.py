@@ -23,8 +23,9 @@ def shutter_times(pictures: int) -> list[float]:
 
 
 def mean_picture(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Average sRGB images, uint8 (height, width, 3), in linear light. A single image is returned
-    unchanged.
+    """Average sRGB images, uint8 (height, width, 3), in linear light.
+
+    A single image is returned unchanged.
     """
     if len(pictures) == 1:
         return pictures[0]

@@ -125,7 +125,8 @@ def _fit(
     """Return the matrix (4, 4) of a (size, size) map that contains points, and the edge of a texel [m].
 
     The line of sight is opposite to the last of `axes`. Texel sizes change in steps and texels are fixed in
-    the world, so that shadows do not crawl while a body moves. The map leaves a border of width `blur` around the points.
+    the world, so that shadows do not crawl while a body moves. The map leaves a border of width
+    `blur` around the points.
     """
     seen = points @ axes[:2].T.astype(np.float32)
     low, high = seen.min(axis=0) - 3.0 * blur, seen.max(axis=0) + 3.0 * blur

@@ -55,8 +55,9 @@ class Texture:
 
 
 def _halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Halve an image by averaging two by two pixels in linear light. An odd last row or column counts
-    twice.
+    """Halve an image by averaging two by two pixels in linear light.
+
+    An odd last row or column counts twice.
     """
     height, width = picture.shape[:2]
     padded = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

@@ -13,8 +13,9 @@ def texel_light(texels: ti.template(), decode: ti.template(), i):
 
 @ti.func
 def level_light(texels: ti.template(), levels: ti.template(), decode: ti.template(), level, uv):
-    """Return the linear light at `uv` in one mip level, bilinear between texel centres. The texture
-    repeats.
+    """Return the linear light at `uv` in one mip level, bilinear between texel centres.
+
+    The texture repeats.
     """
     start, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x = (uv.x - ti.floor(uv.x)) * width - 0.5
