@@ -125,7 +125,7 @@ def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName 
 
 
 def edge_damping(mesh: TetMesh, young: float, density: float, share: float) -> float:
-    """Damping b of an edge [N s/m]: share * l^2 * sqrt(E * density), where l is the mean edge length.
+    """Return the damping b of an edge [N s/m]: share * l^2 * sqrt(E * density), with the mean edge length l.
 
     `share` is about the damping ratio of the fastest vibrations. Vibrations of wavelength L have the damping
     ratio share * l / L.

@@ -51,7 +51,7 @@ class Solid:
     restitution: float | None
 
     def depth(self, points: Floats) -> float:
-        """Penetration depth of the deepest of the points (n, 3) [m]; negative outside."""
+        """Return the penetration depth of the deepest of the points (n, 3) [m]; it is negative outside."""
         return -float(self.distance((points - self.position) @ self.rotation).min())
 
 

@@ -34,7 +34,7 @@ class Outcome:
         return tuple(name for name, is_so in found if is_so)
 
     def badness(self, fault: str) -> float:
-        """Severity of a failure, for sorting: larger is worse."""
+        """Return the severity of a failure, for sorting: larger is worse."""
         share = self.flipped / len(self.case.mesh.tets)
         early = -(self.frozen_at or 0.0)
         return dict(zip(FAULTS, (early, self.out, self.inside, self.speed, share), strict=True))[fault]

@@ -85,7 +85,7 @@ def rate(numbers: Numbers) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge how much of the rotation each damping model leaves."""
+    """Judge how much of the rotation remains with each damping model."""
     edge, mean = (results.one(mesh="cube", damping=10.0, model=model) for model in MODELS)
     lost = max(abs(1.0 - left) for left in edge["left"])
     keeps, brakes = lost < KEPT, mean["left"][-1] < 0.5

@@ -22,8 +22,8 @@ class EdgeReading:
     """Direction of tension and stiffness of an edge in a deformed body."""
 
     normal: Floats  # the law's direction of tension, unit vector
-    tension_stiffness: float  # a E / l [N/m]
-    shear_stiffness: float  # a G / l [N/m]
+    tension_stiffness: float  # stiffness in tension, a E / l [N/m]
+    shear_stiffness: float  # stiffness in shear, a G / l [N/m]
 
 
 def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName) -> EdgeReading:

@@ -297,8 +297,9 @@ def _window_finding(results: Results, nu: float) -> Finding:
 
 
 def _from_the_other(results: Results, nu: float) -> str:
-    """Describe the upper edge that the thesis's other range implies, since their ratio hardly depends on the
-    mesh.
+    """Describe the upper edge that the thesis's other range implies.
+
+    The ratio of both upper edges hardly depends on the mesh.
     """
     (other,) = (each for each in WINDOWS if each != nu)
     shares = [

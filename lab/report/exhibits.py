@@ -29,7 +29,7 @@ LONG = 12
 """Largest number of rows of a table that is not folded."""
 
 WIDE = 640
-"""Width above which an image has a row of its own [pixels]."""
+"""Width above which an image is placed in a separate row [pixels]."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Image:
 
     @property
     def is_wide(self) -> bool:
-        """True if the image has a row of its own, so that its text stays readable."""
+        """True if the image is placed in a separate row, so that its text stays readable."""
         return self.width > WIDE
 
     @property

@@ -77,7 +77,7 @@ class Recent:
         if now < self._due:
             return
         if self._rows and moment < self._rows[-1][0]:
-            self._rows.clear()  # the world was restored to an earlier state
+            self._rows.clear()  # the world has been restored to an earlier state
         self._rows.append((moment, drawn.version, (frame.positions.copy(), frame.poses.copy())))
         most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(drawn.vertex_count, 1)))
         while len(self._rows) > most:

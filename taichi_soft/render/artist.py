@@ -61,7 +61,7 @@ class Artist:
         self.times: list[float] = []
         self._spent = 0.0
         self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces by actor and topology version
-        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; the image is kept to keep its id unique
+        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; storing the image keeps its id unique
 
     def draw(self) -> NDArray[np.uint8]:
         """Draw the current state of the take without text. Returns: sRGB, uint8 (height, width, 3)."""

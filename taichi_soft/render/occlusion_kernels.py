@@ -38,13 +38,13 @@ ALIKE = 0.03
 
 
 def spiral_taps() -> NDArray[np.float32]:
-    """Offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
+    """Return offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
     Each point of a block has one contiguous spiral of taps, which is denser inside.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
-    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # the golden angle
+    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # rotates by the golden angle
     radius = (k + 0.6) / TAPS
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     return places.reshape(-1, 2).astype(np.float32)

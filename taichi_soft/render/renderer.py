@@ -199,6 +199,6 @@ class Renderer:
 
 
 def _round_length(length: float) -> float:
-    """Round a length down to 1, 2 or 5 times a power of ten."""
+    """Round a length down to 1, 2 or 5 times a power of ten, and return it."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length)

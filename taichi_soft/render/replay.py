@@ -29,7 +29,7 @@ from taichi_soft.world.world import World, context_of_world
 class ReplayReport:
     """Result of a replay."""
 
-    world: World  # in its final state
+    world: World  # replayed world in its final state
     steps: int  # number of replayed steps
     first_difference: int | None  # step count of the first state that differs from the recording, or None
     failures: tuple[Failure, ...]  # failures of bodies that are frozen at the end

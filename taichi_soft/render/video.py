@@ -87,7 +87,7 @@ class VideoWriter:
         self.count += 1
 
     def close(self) -> None:
-        """Complete the film, check it and move it to `path`. Further calls do nothing.
+        """Complete the film, verify it and move it to `path`. Further calls do nothing.
 
         Raises: VideoError if there is no frame or a frame is missing. Then no file is left behind.
         """

@@ -43,7 +43,7 @@ class Ending:
     flipped: int  # number of inverted tetrahedra
     speed: float  # root mean square, weighted by mass [m/s]
     fastest: float  # largest speed of the fall [m/s]; infinite for a strongly deformed start
-    distance: float = 0.0  # from the rest shape after a strongly deformed start [sizes of the body]
+    distance: float = 0.0  # distance from the rest shape after a strongly deformed start [body sizes]
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:

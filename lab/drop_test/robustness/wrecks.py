@@ -59,7 +59,7 @@ def wrecked(x: Floats, wreck: str, seed: int) -> Floats:
 
 
 def distance_from_rest(rest: Floats, now: Floats, masses: Floats) -> float:
-    """Distance of a body from its rest shape after the best rigid motion (Kabsch 1976).
+    """Return the distance of a body from its rest shape after the best rigid motion (Kabsch 1976).
 
     The result is a root mean square weighted by mass, in units of the longest edge of the rest shape's
     bounding box.

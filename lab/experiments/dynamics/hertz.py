@@ -175,9 +175,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
-    """Name the reason of a deviation: the model if finite elements on the same mesh are closer, else the
-    mesh.
-    """
+    """Name the cause of a deviation: the model if finite elements on the mesh are closer, else the mesh."""
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:
         return f"the mesh: finite elements on it are off by up to {left:.1%}, and the laws are near to these"

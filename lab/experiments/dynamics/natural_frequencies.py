@@ -156,9 +156,7 @@ def _excess(results: Results, support: str, cells: int) -> str:
 
 
 def _extrapolated(results: Results, support: str, law: LawName = "virial") -> float:
-    """Extrapolate the frequency to cells of zero size from the two finest meshes, with an error of second
-    order.
-    """
+    """Extrapolate the frequency to cells of zero size from the two finest meshes (error of second order)."""
     rows = sorted((point["cells"], numbers[support]) for point, numbers in results.where(law=law))
     (coarse, low), (fine, high) = rows[-2:]
     return float((fine**2 * high - coarse**2 * low) / (fine**2 - coarse**2))

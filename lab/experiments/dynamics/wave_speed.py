@@ -185,7 +185,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(known: dict[tuple[str, float, int], float]) -> str:
-    """Name the reason of an error: the mesh if a finer mesh is closer to theory, else the model."""
+    """Name the cause of an error: the mesh if a finer mesh is closer to theory, else the model."""
     coarse, fine = (
         max(abs(known.get((law, POISSONS[0], cells), 0.0) - 1) for law in TETRAHEDRAL) for cells in (2, 4)
     )
