@@ -16,7 +16,7 @@ EXTRAS = {
     },
     "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
-"""For each extra its modules, and the packages that contain them, as in pyproject.toml."""
+"""Modules of each extra, and the packages that contain them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Outcome of a case."""
+"""The outcome of one drop-test case."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
-"""Stiffness of an isotropic material [Pa]."""
+"""Stiffness that an isotropic material has in every direction [Pa]."""
 
 COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")

@@ -19,7 +19,7 @@ class Claim:
 
     @property
     def is_of_thesis(self) -> bool:
-        """True for a claim of the thesis, False for a statement of theory."""
+        """True for a claim of the thesis, false for a statement of theory."""
         return self.source.startswith(("chapter", "section", "figure"))
 
 

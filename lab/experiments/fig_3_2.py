@@ -37,7 +37,7 @@ AMPLITUDE = 0.05
 """Amplitude of the middle particle [m]; the springs are 1 m long."""
 
 ANGLES = (0.05, 0.1)
-"""Values of h w."""
+"""Values of h w: step length times angular frequency."""
 
 DRAWN = 0.1
 STEADY = 0.02

@@ -179,4 +179,4 @@ CONVERGENCE = Experiment(
     measure,
     conclude,
 )
-"""Finer meshes."""
+"""The experiment on finer meshes."""

@@ -136,4 +136,4 @@ def conclude(results: Results) -> Section:
 PATCH_TEST = Experiment(
     "patch-test", "The patch test", "beyond the thesis", ("patch-test",), points, measure, conclude
 )
-"""The patch test."""
+"""The experiment with the patch test."""

@@ -72,7 +72,7 @@ class StaticBody:
     def __init__(
         self, mesh: TetMesh, material: Material, law: LawName, strain: StrainName | None = None
     ) -> None:
-        """Start at rest."""
+        """Create the body at rest."""
         self.mesh, self.material = mesh, material
         self._law, self._strain = law, strain
         self._gradient = SparseGradient(
