@@ -16,23 +16,23 @@ from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
-SIZE = (0.5, 0.5, 1.4)  # of the bar [m]
-PIVOT = np.array([0.0, 0.0, 3.8])  # [m]
-ROD = 1.8  # from the pivot to the plate [m]
-LENGTH = ROD + SIZE[2] / 2  # from the pivot to the centre of the bar [m]
+SIZE = (0.5, 0.5, 1.4)  # edges of the bar [m]
+PIVOT = np.array([0.0, 0.0, 3.8])  # position of the pendulum's pivot [m]
+ROD = 1.8  # distance from the pivot to the plate [m]
+LENGTH = ROD + SIZE[2] / 2  # distance from the pivot to the centre of the bar [m]
 WIDEST = np.radians(50.0)
 STRESS = ColorScale("von Mises stress", 0.0, 3.0e4, "Pa")
 STEP = FixedStep(dt=1 / 50)
 
 
 class Swing:
-    """The game's pendulum: moves the plate in every step, and records the load along the rod."""
+    """Moves the plate as a pendulum in every step, and records the load along the rod."""
 
     def __init__(self, frame: Frame, hold: Attachment) -> None:
-        """Start at the end of a swing."""
+        """Start the pendulum at the end of a swing."""
         self.frame, self.hold = frame, hold
         self.angle, self.speed = WIDEST, 0.0  # [rad], [rad/s]
-        self.loads: list[float] = []  # of each step [N]
+        self.loads: list[float] = []  # load along the rod in each step [N]
 
     def __call__(self, world: World) -> None:
         """Move the plate before a step."""
@@ -45,17 +45,17 @@ class Swing:
         self.frame.move_to(PIVOT - ROD * axes[:, 2], axes)
 
     def load(self) -> float:
-        """Load on the plate in the last step, along the rod [N]."""
+        """Return the load on the plate in the last step, along the rod [N]."""
         return float(-self.hold.force @ self.frame.rotation[:, 2])
 
     def caption(self) -> str:
-        """Text for each frame."""
+        """Return the load and the weight as text for a frame."""
         weight = float(self.hold.body.masses.sum()) * GRAVITY_EARTH
         return f"load {self.load() / 1e3:.1f} kN, weight {weight / 1e3:.1f} kN"
 
 
 def stage() -> Stage:
-    """The bar at the end of a swing, unstretched."""
+    """Make the stage: an unstretched bar at the end of a swing."""
     mesh = box(SIZE, (4, 4, 11))
     start = _turn(WIDEST)
     world = World()
@@ -77,7 +77,7 @@ def stage() -> Stage:
 
 
 def _turn(angle: float) -> NDArray[np.float64]:
-    """Rotation about y that swings the bar towards -x."""
+    """Return the rotation about y that swings the bar towards -x; `angle` in rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
@@ -87,7 +87,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Mean load along the rod over the last whole swing, in weights of the bar."""
+    """Return the mean load along the rod over the last full swing, over the weight of the bar."""
     swing = stage.act
     assert isinstance(swing, Swing)
     weight = float(swing.hold.body.masses.sum()) * GRAVITY_EARTH
@@ -96,7 +96,7 @@ def proof(stage: Stage) -> float:
 
 
 def period() -> float:
-    """Period of the swing [s], by Legendre's arithmetic-geometric mean."""
+    """Return the period of the swing [s], by Legendre's arithmetic-geometric mean."""
     a, b = 1.0, float(np.cos(WIDEST / 2))
     while a - b > 1e-12:
         a, b = (a + b) / 2, float(np.sqrt(a * b))

@@ -18,7 +18,7 @@ STRESS = ColorScale("von Mises stress", 0.0, 1.0e5, "Pa")
 
 
 def stage() -> Stage:
-    """The bars, tilted, above the floor."""
+    """Make the stage: the tilted bars above the floor."""
     mesh = load_mesh(ASSETS / "bars.npz")
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     reach = float(np.linalg.norm(mesh.vertices, axis=1).max())
@@ -47,7 +47,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Volume over the rest volume."""
+    """Return the volume over the rest volume."""
     body = stage.actors[0].body
     return body.volume() / body.mesh.volume
 

@@ -10,18 +10,18 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render import Camera
 from taichi_soft.render.film import Actor, Stage
 
-HEIGHT = 7.0  # of the lowest point [m]
+HEIGHT = 7.0  # initial height of the lowest point [m]
 
 
 def stage() -> Stage:
-    """The sphere before its fall."""
+    """Make the stage: the sphere before its fall."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     body = world.add_body(
         mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]), law="virial"
     )
     world.build()
-    # Close to the landing: there it fills a quarter of the image, and at the top it still fits in.
+    # Near the floor, the sphere fills a quarter of the image; at the top, it still fits.
     camera = Camera(eye=(1.1, -5.3, 1.2), target=(0.0, 0.0, 3.4), fov_degrees=82.0)
     step = FixedStep(dt=1 / 50, substeps=14)
     title = f"E = 1 MPa, falls {HEIGHT:g} m"
@@ -29,7 +29,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """How far the sphere has fallen [m]: g t^2 / 2 until it lands."""
+    """Return the distance that the sphere has fallen [m]: g t^2 / 2 until it lands."""
     body = stage.actors[0].body
     start = body.masses @ body.mesh.vertices[:, 2] / body.masses.sum() + HEIGHT - body.mesh.bounds[0][2]
     return float(start - body.center_of_mass()[2])

@@ -14,15 +14,15 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
-THICKNESS = 0.02  # of the skins of the bodies [m]
+THICKNESS = 0.02  # contact thickness of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
-DRAG = 1.0  # damping rate [1/s]: nothing else stops a ball that rolls between others
+DRAG = 1.0  # damping rate [1/s]; without it, balls between others would keep rolling
 STEP = FixedStep(dt=1 / 50)
 
 
 def stage() -> Stage:
-    """Bodies of four shapes in three layers over the bowl."""
+    """Make the stage: bodies of four shapes in three layers above the bowl."""
     shapes = [
         sphere(0.36, 3),
         box((0.6, 0.6, 0.6), (4, 4, 4)),
@@ -33,7 +33,7 @@ def stage() -> Stage:
     world.add_collider(MeshShape(_bowl()), position=(0, 0, RADIUS + WALL + 0.01), friction=0.4)
     actors = []
     for i in range(BODIES):
-        layer, number = divmod(i, 7)  # one in the centre, six around it
+        layer, number = divmod(i, 7)  # one body in the centre of a layer, six around it
         angle, reach = np.pi / 3 * number + 0.5 * layer, 0.95 if number else 0.0
         place = (reach * np.cos(angle), reach * np.sin(angle), 1.9 + 0.9 * layer)
         mesh = shapes[(i + layer) % 4]
@@ -48,7 +48,7 @@ def stage() -> Stage:
 
 
 def _bowl() -> trimesh.Trimesh:
-    """Lower half of a hollow ball with a round rim, centred at the opening."""
+    """Make the lower half of a hollow ball with a round rim. Its origin is the centre of the opening."""
     angles = np.linspace(0, np.pi / 2, 25)
     outer = (RADIUS + WALL) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = RADIUS * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
@@ -58,7 +58,7 @@ def _bowl() -> trimesh.Trimesh:
 
 
 def proof(stage: Stage) -> float:
-    """Depth of the deepest vertex inside another body [m]; 0 if there is none."""
+    """Return the depth of the deepest vertex inside another body [m]; 0 if there is none."""
     depths = [
         near.distance
         for body in stage.world.bodies

@@ -35,9 +35,9 @@ class Carriers:
     """Records the load on both ends of the bridge in each step."""
 
     def __init__(self, holds: list[Attachment]) -> None:
-        """Start before the first step."""
+        """Start with no recorded loads."""
         self.holds = holds
-        self.loads: list[float] = []  # [N], downwards
+        self.loads: list[float] = []  # downward load in each step [N]
 
     def __call__(self, world: World) -> None:
         """Record the load of the last step."""
@@ -46,7 +46,7 @@ class Carriers:
 
 
 def stage() -> Stage:
-    """The straight bridge between two pillars, with bodies above it."""
+    """Make the stage: a straight bridge between two pillars, with bodies above it."""
     mesh = _bridge()
     columns = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] % (PLANK + GAP)
     material = Material(np.where(columns < PLANK, WOOD, HEMP), 0.2, 300.0, damping_ratio=0.1)
@@ -76,7 +76,7 @@ def stage() -> Stage:
 
 
 def _bridge() -> TetMesh:
-    """Planks across, joined by ropes along both sides, from x = 0 to the length of the bridge."""
+    """Make planks joined by ropes along both sides, from x = 0 to the length of the bridge."""
     along, across = 2 * PLANKS - 1, 7
     grid = box((along, across, 1), (along, across, 1))
     grid = grid.translated(-grid.bounds[0])
@@ -94,7 +94,9 @@ def _bridge() -> TetMesh:
 
 
 def proof(stage: Stage) -> float:
-    """Mean load on the ends in the last 2 s, over the weight of the bridge and all bodies on it."""
+    """Return the mean load on the ends in the last 2 s, over the weight of the bridge and all bodies
+    on it.
+    """
     carriers = stage.act
     assert isinstance(carriers, Carriers)
     mass = sum(float(body.masses.sum()) for body in stage.world.bodies)

@@ -12,11 +12,11 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 CELLS = (24, 24)
-SIDE, MASS = 2.0, 0.5  # [m], [kg]
+SIDE, MASS = 2.0, 0.5  # edge [m] and mass [kg] of the cloth
 
 
 def stage() -> Stage:
-    """The cloth, initially horizontal."""
+    """Make the stage: a horizontal cloth pinned at two corners."""
     mesh = cloth((SIDE, SIDE), CELLS, MASS)
     stiffness = cloth_constants(mesh, CELLS, tensile=400.0, shear=150.0, bend=3.0)
     world = World(integrator="implicit_euler")
@@ -38,7 +38,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Largest length of a thread over its rest length."""
+    """Return the largest length of a thread over its rest length."""
     (actor,) = stage.actors
     mesh = actor.body.mesh
     threads = mesh.edge_lengths < 1.01 * SIDE / CELLS[0]

@@ -1,7 +1,7 @@
 """The same sphere under every law, with the cost of a step.
 
-Laws on tetrahedra agree for small strains. Laws along edges include Poisson's ratio at most through its
-effect on volume, and CMPM and its variants read strain along each edge (thesis section 4.3).
+Laws on tetrahedra agree for small strains. In laws along edges, Poisson's ratio affects at most the volume.
+CMPM and its variants compute strain along each edge (thesis section 4.3).
 """
 
 from functools import partial
@@ -16,16 +16,16 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
-HEIGHT = 2.2  # of the centres [m]
+HEIGHT = 2.2  # initial height of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 3
 COLORS = (*PALETTE, (0.93, 0.92, 0.88), (0.58, 0.16, 0.24), (0.70, 0.85, 0.30), (0.45, 0.75, 0.72))
-NO_BODY = (0.09, 0.10, 0.13)  # colour of a line of the legend without a sphere
+NO_BODY = (0.09, 0.10, 0.13)  # legend colour of laws that cannot run
 PITCH, DEPTH = 2.8, 3.2  # distance between spheres, across and along the view [m]
 
 
 def stage() -> Stage:
-    """Spheres of 540 tetrahedra 4 m above the floor, one per law."""
+    """Make the stage: spheres of 540 tetrahedra above the floor, one per law."""
     mesh = sphere(1.0, 3)
     world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
@@ -50,7 +50,7 @@ def stage() -> Stage:
 
 
 def _cost(mesh: TetMesh, law: str) -> float:
-    """Median time of one fixed step of the sphere alone [ms]."""
+    """Return the median time of a fixed step of a single sphere [ms]."""
     world = World(floor=None)
     world.add_body(mesh, SOFT, law=law)
     world.build()
@@ -60,7 +60,7 @@ def _cost(mesh: TetMesh, law: str) -> float:
 
 
 def proof(stage: Stage) -> float:
-    """Number of valid spheres: not frozen, and without inverted tetrahedra."""
+    """Return the number of valid spheres: not frozen, and without inverted tetrahedra."""
     return float(sum(not actor.body.is_frozen and actor.body.flipped_count() == 0 for actor in stage.actors))
 
 

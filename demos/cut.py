@@ -16,31 +16,31 @@ from taichi_soft.render.props import Prop
 from taichi_soft.render.stage import Paint
 
 MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
-SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
-HEIGHT = 2.05  # height of its centre [m]
+SIZE = (0.6, 0.6, 2.0)  # edges of the bar [m]
+HEIGHT = 2.05  # initial height of the bar's centre [m]
 SEAM, SLOPE = (
     -0.3,
     0.1,
-)  # height above the centre of the layer's edge that the blade follows [m], and its slope
+)  # plane of the cut: height above the bar's centre at its axis [m], and slope
 CUT = np.array([0.0, 0.0, 1.53])  # point where the blade crosses the axis of the stretched bar [m]
 ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # direction of the blade's motion
 ASIDE = np.array([0.0, 1.0, 0.0])  # direction of the blade's edge
-WAY, WIDTH = 2.6, 0.3  # distance that it travels, and width from its edge to its back [m]
-BEGIN, PASSING = 0.9, 0.5  # start time, and duration of the pass [s]
+WAY, WIDTH = 2.6, 0.3  # distance that the blade travels, and its width [m]
+BEGIN, PASSING = 0.9, 0.5  # start time and duration of the blade's pass [s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 
 class Knife:
-    """Moves through the bar; when half of it is on the other side, the bar is cut."""
+    """Moves the blade through the bar. The bar is cut when half of the blade has left it."""
 
     def __init__(self, blade: Frame, stage: Stage) -> None:
-        """Start next to the uncut bar."""
+        """Start with the blade next to the uncut bar."""
         self.blade, self.stage = blade, stage
         self.bar = stage.actors[0].body
         self.start = blade.position.astype(np.float64)
         self.fallen: Body | None = None
         self.parted = 0.0  # time of the cut [s]
-        self.whole = self.below = 0.0  # mass of the bar at that time, and of the part below the blade [kg]
+        self.whole = self.below = 0.0  # mass of the bar and of its part below the blade at the cut [kg]
 
     def __call__(self, world: World) -> None:
         """Move the blade before a step."""
@@ -56,13 +56,13 @@ class Knife:
             self.stage.actors.append(Actor(self.fallen, paint=_flesh(PALETTE[1])))
 
     def caption(self) -> str:
-        """Text for each frame."""
+        """Return the masses of the parts as text for a frame."""
         pieces = [self.bar] if self.fallen is None else [self.bar, self.fallen]
         return " + ".join(f"{piece.masses.sum():.0f} kg" for piece in pieces)
 
 
 def stage() -> Stage:
-    """The bar held at its upper end, unstretched."""
+    """Make the stage: an unstretched bar, held at its upper end."""
     mesh = _leaning(box(SIZE, (8, 8, 20)))
     top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
     asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=600)
@@ -86,14 +86,14 @@ def stage() -> Stage:
 
 
 def _leaning(bar: TetMesh) -> TetMesh:
-    """Shear the mesh so that its layers are parallel to the blade, which leaves smooth faces."""
+    """Shear the mesh so that a boundary between its layers coincides with the cut, for smooth faces."""
     x, y, z = bar.vertices.T
     nearness = np.clip(1.0 - np.abs(z - SEAM) / 0.6, 0.0, 1.0)
     return TetMesh(np.stack([x, y, z + SLOPE * x * nearness], axis=1), bar.tets)
 
 
 def _flesh(color: Color) -> Paint:
-    """Paint the faces of the cut paler."""
+    """Return a function that paints the faces of the cut paler."""
 
     def paint(body: Body) -> NDArray[np.float32]:
         x, y, z = body.mesh.vertices.T
@@ -105,14 +105,17 @@ def _flesh(color: Color) -> Paint:
 
 
 def _mass_below(body: Body) -> float:
-    """Mass below the blade [kg]; a tetrahedron across it counts in proportion to its height below."""
+    """Return the mass below the blade [kg].
+
+    A tetrahedron across the plane counts in proportion to its height below.
+    """
     heights = np.sort((body.positions()[body.tets] - CUT) @ np.cross(ALONG, ASIDE), axis=1)
     share = np.clip(-heights[:, 0] / (heights[:, 3] - heights[:, 0]), 0.0, 1.0)
     return float(body.material.density * body.mesh.volumes @ share)
 
 
 def proof(stage: Stage) -> float:
-    """Mass of the fallen part over the mass below the blade."""
+    """Return the mass of the fallen part over the mass below the blade at the cut."""
     knife = stage.act
     assert isinstance(knife, Knife)
     assert knife.fallen is not None

@@ -1,7 +1,7 @@
-"""A block with increasing density to the right: its heavy side deforms most, and rises last and least (fig.
-6.3).
+"""A block whose density increases to the right (fig. 6.3): its heavy side deforms most and rises last.
 
-The light side is in the air while the heavy side is still compressed, so the block rotates as it rises.
+The light side is in the air while the heavy side is still compressed, so the block rotates as it rises. The
+heavy side rises least.
 """
 
 import numpy as np
@@ -12,11 +12,11 @@ from taichi_soft.cli import main
 from taichi_soft.render import Camera, ColorScale
 from taichi_soft.render.film import Actor, Stage
 
-LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
+LIGHT, HEAVY = 200.0, 2000.0  # densities at the left and at the right end [kg/m^3]
 
 
 def stage() -> Stage:
-    """The horizontal block above the floor."""
+    """Make the stage: a horizontal block above the floor."""
     mesh = box((3.0, 1.5, 1.5), (8, 4, 4))
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 1.5) / 3.0
@@ -34,7 +34,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Height of the light end above the heavy one [m]."""
+    """Return the height of the light end above the heavy end [m]."""
     body = stage.actors[0].body
     x, now = body.mesh.vertices[:, 0], body.positions()[:, 2]
     return float(now[x < x.min() + 0.1].mean() - now[x > x.max() - 0.1].mean())

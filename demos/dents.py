@@ -17,7 +17,7 @@ SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0, damping
 
 
 def stage() -> Stage:
-    """Two spheres above the floor, on their way down at 6 m/s."""
+    """Make the stage: two spheres above the floor that move down at 6 m/s."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
@@ -52,7 +52,7 @@ def _mark_flips(color: tuple[float, float, float]):  # type: ignore[no-untyped-d
 
 
 def proof(stage: Stage) -> float:
-    """Number of inverted tetrahedra of the tolerant sphere minus that of the recovering one."""
+    """Return the number of inverted tetrahedra of the tolerant sphere minus that of the recovering sphere."""
     tolerant, recover = (actor.body.flipped_count() for actor in stage.actors)
     return float(tolerant - recover)
 

@@ -19,7 +19,7 @@ REACH, PERIOD, BEGIN = (
     0.5,
     3.0,
     1.2,
-)  # amplitude of its motion [m], period and start time [s]
+)  # amplitude [m], period and start time [s] of the ball's motion
 FALL = 0.35  # initial distance from the cloth to the ball [m]
 STEP = FixedStep(dt=1 / 60, substeps=2)
 
@@ -28,7 +28,7 @@ class Mover:
     """Moves the ball before every step."""
 
     def __init__(self, ball: Collider) -> None:
-        """Start in the centre."""
+        """Start with the ball in the centre."""
         self.ball = ball
 
     def __call__(self, world: World) -> None:
@@ -37,14 +37,14 @@ class Mover:
 
 
 def _place(time: float) -> NDArray[np.float64]:
-    """Position of the ball's centre [m], with a smooth start."""
+    """Return the position of the ball's centre [m]; its motion starts smoothly."""
     since = max(time - BEGIN, 0.0)
     sway = REACH * min(since / PERIOD, 1.0) * np.sin(2.0 * np.pi * since / PERIOD)
     return np.array([sway, 0.0, HEIGHT])
 
 
 def stage() -> Stage:
-    """The horizontal cloth above the ball."""
+    """Make the stage: a horizontal cloth above the ball."""
     world = World(integrator="implicit_euler")
     ball = world.add_collider(SphereShape(RADIUS), position=_place(0.0), friction=0.6, thickness=SKIN)
     mesh = cloth((SIDE, SIDE), CELLS, MASS)
@@ -70,7 +70,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Smallest distance of a cloth vertex from the ball [m]; negative if one is inside."""
+    """Return the smallest distance of a cloth vertex from the ball [m]; negative if a vertex is inside it."""
     mover = stage.act
     assert isinstance(mover, Mover)
     away = stage.actors[0].body.positions() - mover.ball.position

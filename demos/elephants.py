@@ -21,8 +21,8 @@ CELLS = 8  # cells of the cages along their longest side
 DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all toys: density [kg/m^3], Poisson's ratio, damping ratio
 STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # number of steps, and their height, depth and width [m]
 STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, lowest step first
-THICKNESS = 0.01  # of the skins of the bodies [m]
-DRAG = 0.8  # [1/s]
+THICKNESS = 0.01  # contact thickness of the bodies [m]
+DRAG = 0.8  # damping rate [1/s]
 STILL = 0.3  # speed below which a toy counts as resting [m/s]; they land at about 4 m/s
 STEP = FixedStep(dt=1 / 200)  # short, so that retries after strong compression are cheap
 
@@ -33,13 +33,15 @@ HERD = (
     (0.46, 2.0e4, "bgr", (-0.34, -0.30, 0.90), (0.1, -0.2, 0.0), -1.0),
     (0.46, 2.0e4, "rbg", (0.36, 0.05, 1.10), (0.1, -0.6, 0.0), 0.5),
 )
-"""Height [m], Young's modulus [Pa], dye, position above the top step, initial velocity [m/s] and forward
-spin [rad/s] of each toy."""
+"""Height [m], Young's modulus [Pa], dye, position relative to the edge of the top step [m], initial velocity
+[m/s] and forward spin [rad/s] of each toy."""
 
 
 def toy(height: float, dye: str) -> trimesh.Scene:
-    """Load the toy with a height [m], and recolour its cloth: pixels with more blue than red get their
-    channels in the order of `dye`."""
+    """Load the toy with a height [m], and recolour its cloth.
+
+    Pixels with more blue than red get their channels in the order of `dye`, such as "brg".
+    """
     scene = trimesh.load_scene(TOY, process=False)
     for mesh in scene.geometry.values():
         mesh.apply_scale(height / HEIGHT)
@@ -52,7 +54,7 @@ def toy(height: float, dye: str) -> trimesh.Scene:
 
 
 def stage() -> Stage:
-    """The elephants upright above the steps."""
+    """Make the stage: upright elephants above the steps."""
     world = World(friction=0.8)
     colors = {}
     for i in range(STEPS):
@@ -78,7 +80,7 @@ def stage() -> Stage:
 
 
 def ear_span(body: Body) -> float:
-    """Distance between the tips of the ears, over the rest distance."""
+    """Return the distance between the tips of the ears over the rest distance."""
     rest, now = body.mesh.vertices, body.positions()
     x = rest[:, 0]
     left, right = x < 0.85 * x.min(), x > 0.85 * x.max()
@@ -87,14 +89,14 @@ def ear_span(body: Body) -> float:
 
 
 def ground_below(places: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Height of the step or the floor below positions (n, 3), (n,) [m]."""
+    """Return the height of the step or the floor below positions (n, 3), (n,) [m]."""
     x, y, _ = places.T
     is_over = (np.abs(x) < WIDTH / 2) & (y < 0.0) & (y > -STEPS * TREAD)
     return np.where(is_over, RISE * np.ceil(STEPS + y / TREAD), 0.0)
 
 
 def proof(stage: Stage) -> float:
-    """Number of elephants that rest on the steps or the floor without penetrating them."""
+    """Return the number of elephants that rest on the steps or the floor without penetrating them."""
     count = 0
     for body in stage.world.bodies:
         rows = body.positions()

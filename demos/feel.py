@@ -1,6 +1,6 @@
-"""Three puddings on a tray that is jerked aside: each has the requested sag, frequency and settling time.
+"""Three puddings on a tray that is jerked: each has the requested sag, frequency and settling time.
 
-The same jerk makes the left one shiver briefly, and the right one sway for seconds.
+After the same jerk, the left pudding shivers briefly, and the right one sways for seconds.
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ PROFILE = ((0.0, 0.0), (0.50, 0.0), (0.52, 0.05), (0.40, 0.45), (0.36, 0.52), (0
 """Radius and height of the profile [m]."""
 
 CELLS, DENSITY, POISSON = 9, 300.0, 0.4
-SPACE = 1.5  # distance between puddings [m]
+SPACE = 1.5  # distance between the centres of puddings [m]
 TRAY = (4.6, 1.5, 0.1)  # length, width, thickness [m]
 JERK_AT, JERK, JERK_TIME = 0.5, 0.12, 0.12  # time, distance and duration of the jerk [s, m, s]
 STEP = FixedStep(dt=1 / 100)
 
 
 def stage() -> Stage:
-    """The puddings on the tray, each of the material found for its request."""
+    """Make the stage: puddings on the tray, each of a material found for its request."""
     pudding = trimesh.creation.revolve(np.array(PROFILE), sections=64)
     plain = Material(1e5, POISSON, DENSITY)
     cage = SoftBodyAsset.from_surface(pudding, plain, cells=CELLS)
@@ -69,7 +69,7 @@ class Jerk:
 
 
 def proof(stage: Stage) -> float:
-    """Largest relative deviation from a request."""
+    """Return the largest relative deviation from a request."""
     assert isinstance(stage.act, Jerk)
     misses = [
         abs(getattr(feel.simulated, name) / wish - 1)

@@ -27,24 +27,26 @@ from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.4)
-CRATE = np.array([2.4, 0.0, 0.0])  # centre of its bottom [m]
+CRATE = np.array([2.4, 0.0, 0.0])  # centre of the crate's bottom [m]
 INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # inner width of the crate, thickness and height of its walls [m]
 FIRST, EVERY = 0.8, 1.7  # time of the first grab, and interval between grabs [s]
-LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # displacement of the lift [m]; steepness of the throw
+LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # displacement of the lift [m]; slope of the throw
 LIFTING, PULL = 0.7, 10.0  # duration of the lift [s], acceleration of the throw [m/s^2]
 UP = np.array([0.0, 0.0, 1.0])
 STEP = FixedStep(dt=1 / 50)
 
 
 class Hand:
-    """Reaches, lifts, swings, and releases the body when its velocity carries it into the crate."""
+    """Reaches for a body, lifts it, swings it, and releases it when its velocity carries it into the
+    crate.
+    """
 
     def __init__(self, frame: Frame) -> None:
-        """Create a hand at rest that holds nothing."""
+        """Start with an empty hand at rest."""
         self.frame, self.rest = frame, frame.position.astype(np.float64)
         self.taken = 0
         self.grab: Grab | None = None
-        self.start = self.rest  # position of the grab
+        self.start = self.rest  # position at which the body was grabbed
 
     def __call__(self, world: World) -> None:
         """Move the hand before a step."""
@@ -66,7 +68,7 @@ class Hand:
         self.frame.move_to(place)
 
     def _reach(self, world: World, since: float) -> None:
-        """Move to the top of the next body, and grab it in time."""
+        """Move to the top of the next body, and grab it at the scheduled time."""
         body = world.bodies[self.taken]
         over = body.center_of_mass() + 2.0 * UP
         near = world.closest_point(over, bodies=[body])
@@ -77,13 +79,13 @@ class Hand:
 
 
 def _smooth(share: float) -> float:
-    """Smooth step from 0 to 1."""
+    """Return a smooth step from 0 to 1 for `share` from 0 to 1."""
     s = min(max(share, 0.0), 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def _flies_into_crate(body: Body) -> bool:
-    """True if the body, released now, would reach the height of the crate's rim beyond its centre."""
+    """True if the body, released now, would pass the crate's centre above its rim."""
     share = body.masses / body.masses.sum()
     place, velocity = share @ body.positions(), share @ body.velocities()
     root = np.sqrt(max(velocity[2] ** 2 + 2.0 * GRAVITY_EARTH * (place[2] - HEIGHT), 0.0))
@@ -92,7 +94,7 @@ def _flies_into_crate(body: Body) -> bool:
 
 
 def stage() -> Stage:
-    """Bodies in two rows on the floor, and the crate."""
+    """Make the stage: bodies in two rows on the floor, and the crate."""
     world = World(friction=0.8)
     _add_crate(world)
     contact = Contact(friction=0.6)
@@ -117,7 +119,7 @@ def stage() -> Stage:
 
 
 def _add_crate(world: World) -> None:
-    """Four walls, with the floor as their bottom."""
+    """Add the four walls of the crate. The floor is its bottom."""
     reach = (INSIDE + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
         size = (WALL if x else INSIDE + 2 * WALL, WALL if y else INSIDE, HEIGHT)
@@ -125,7 +127,7 @@ def _add_crate(world: World) -> None:
 
 
 def proof(stage: Stage) -> float:
-    """Number of valid bodies in the crate."""
+    """Return the number of bodies whose vertices all lie within the crate's walls."""
     half = np.array([INSIDE / 2 + 0.02, INSIDE / 2 + 0.02])
     return float(sum((np.abs(a.body.positions()[:, :2] - CRATE[:2]) < half).all() for a in stage.actors))
 

@@ -26,12 +26,12 @@ class Scale:
     """Records the load on the floor and the compression of the stack."""
 
     def __init__(self) -> None:
-        """Start before the first step."""
+        """Start with no recorded loads."""
         self.loads: list[float] = []  # load on the floor in each step [N]
         self.lowest = np.inf  # lowest height of the stack's top [m]
 
     def __call__(self, world: World) -> None:
-        """Record the results of the last step."""
+        """Record the load and the height of the stack after the last step."""
         if world.step_count:
             assert world.floor_collider is not None
             self.loads.append(-float(world.floor_collider.impulse[2]) / STEP.dt)
@@ -40,7 +40,7 @@ class Scale:
 
 
 def stage() -> Stage:
-    """The undeformed stack of blocks, and the ball above it."""
+    """Make the stage: an undeformed stack of blocks, and the ball above it."""
     world = World(friction=0.8)
     contact = Contact(friction=0.8, thickness=SKIN)
     block = box(SIZE, (7, 7, 3))
@@ -65,7 +65,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Mean load on the floor in the last second, over the total weight."""
+    """Return the mean load on the floor in the last second, over the total weight."""
     scale = stage.act
     assert isinstance(scale, Scale)
     weight = sum(float(body.masses.sum()) for body in stage.world.bodies) * GRAVITY_EARTH

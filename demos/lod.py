@@ -1,6 +1,6 @@
-"""Soft balls roll down a chute towards the camera; closer ones have more tetrahedra.
+"""Soft balls roll down a chute towards the camera; closer balls have more tetrahedra.
 
-When a ball changes its colour, its level of detail has changed, and its motion continues unchanged.
+A ball changes its colour with its level of detail. Its motion continues unchanged.
 """
 
 import numpy as np
@@ -13,18 +13,18 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-CELLS = (10, 6, 4)  # cells of the levels along a ball, the finest first
+CELLS = (10, 6, 4)  # cells along a ball in each level, finest first
 DISTANCES = (10.3, 13.8)  # distances from the camera above which the second and the third level are used [m]
-HYSTERESIS = 0.5  # distance that a body must come closer before its level is raised [m]
+HYSTERESIS = 0.5  # additional approach before a finer level is used [m]
 JELLY = Material(young=3.0e4, poisson=0.4, density=200.0)
 RADIUS, COUNT = 0.5, 5
-SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # [rad], [m], [m]
+SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # slope [rad], length and width [m] of the chute
 COLORS = tuple(PALETTE[i] for i in (0, 2, 3))  # colours of the levels
 STEP = FixedStep(dt=1 / 50)
 
 
 def stage() -> Stage:
-    """The balls above the upper end of the chute, which has a wall at its lower end."""
+    """Make the stage: balls above the upper end of a chute with a wall at its lower end."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     asset = SoftBodyAsset.from_surface(ball, JELLY, cells=CELLS, contact=Contact(friction=0.8))
     world = World(friction=0.8, soft_contact=False)
@@ -54,7 +54,7 @@ def stage() -> Stage:
 
 
 class Choice:
-    """Chooses a level for each ball before every step, and records the levels of each."""
+    """Chooses a level for each ball before every step, and records the levels that it had."""
 
     def __init__(self, eye: NDArray[np.float64]) -> None:
         self.eye = eye
@@ -67,7 +67,7 @@ class Choice:
 
 
 def level_of(body: Body, eye: NDArray[np.float64]) -> int:
-    """Choose a level by distance, with hysteresis."""
+    """Return the level for the distance from the camera, with hysteresis."""
     apart = float(np.linalg.norm(body.center_of_mass() - eye))
     coarser = sum(apart > each for each in DISTANCES)
     finer = sum(apart > each - HYSTERESIS for each in DISTANCES)
@@ -75,12 +75,12 @@ def level_of(body: Body, eye: NDArray[np.float64]) -> int:
 
 
 def paint(body: Body) -> NDArray[np.float32]:
-    """Colour all vertices by level."""
+    """Return the colour of the body's level for all its vertices."""
     return np.tile(np.array(COLORS[body.level], dtype=np.float32), (body.vertex_count, 1))
 
 
 def proof(stage: Stage) -> float:
-    """Number of balls that had every level."""
+    """Return the number of balls that had every level."""
     assert isinstance(stage.act, Choice)
     return float(sum(levels == set(range(len(CELLS))) for levels in stage.act.seen.values()))
 

@@ -11,13 +11,13 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 ROWS = 8
-PITCH = 2.8  # distance between spheres [m]
+PITCH = 2.8  # distance between the centres of spheres [m]
 LOWEST, SPREAD = 1.3, 4.5  # lowest initial height, and range above it [m]
 SOFT = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.03)
 
 
 def stage() -> Stage:
-    """A square grid of spheres at irregular heights."""
+    """Make the stage: a square grid of spheres at irregular heights."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World(soft_contact=False, sleep_speed=0.0)
     actors = []
@@ -38,7 +38,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Number of valid spheres: not frozen, and without inverted tetrahedra."""
+    """Return the number of valid spheres: not frozen, and without inverted tetrahedra."""
     return float(sum(a.body.flipped_count() == 0 and not a.body.is_frozen for a in stage.actors))
 
 

@@ -37,7 +37,7 @@ def step_bullet(soft):
         crate.node().apply_central_impulse(core.LVector3(*impulse))
         crate.node().apply_torque_impulse(core.LVector3(*angular))
     last[:] = now
-    rigid.do_physics(DT, 0)  # with substeps Bullet would report poses one step late
+    rigid.do_physics(DT, 0)  # with substeps, Bullet would report poses one step late
     for crate, collider in crates:
         collider.move_to(tuple(crate.get_pos()), tuple(np.roll(crate.get_quat(), -1)))
 

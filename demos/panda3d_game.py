@@ -84,7 +84,7 @@ class Game(ShowBase):
             self.render.set_light(self.render.attach_new_node(light))
 
     def add_rigid(self, name: str, shape: bullet.BulletShape, mass: float) -> core.NodePath:
-        """Add a rigid body to Bullet."""
+        """Add a rigid body to Bullet, and return its node."""
         path = self.render.attach_new_node(bullet.BulletRigidBodyNode(name))
         path.node().add_shape(shape)
         path.node().set_mass(mass)
@@ -92,7 +92,7 @@ class Game(ShowBase):
         return path
 
     def add_look(self, path: core.NodePath, size: tuple, color: tuple) -> core.NodePath:
-        """Add a visible box to a node."""
+        """Add a visible box to a node, and return the box."""
         look = self.loader.load_model("models/box").copy_to(path)
         look.set_texture_off(1)
         look.set_color(color)
@@ -100,27 +100,27 @@ class Game(ShowBase):
         return look
 
     def draw(self, node: core.NodePath) -> core.NodePath:
-        """Draw a node in every frame."""
+        """Add a node to those drawn in every frame, and return it."""
         node.reparent_to(self.render)
         self.task.nodes.append(node)
         return node
 
     def before_step(self, world: World) -> None:
-        """Update the level once per fixed step."""
+        """Move the platform and step Bullet, once per fixed step."""
         self.platform.set_x(MIDDLE + SWING * math.sin(world.time + DT))
         for mover in self.movers:
             mover.follow()
         self.coupling.step(DT)
 
     def drop(self) -> None:
-        """Drop another toy onto the platform, if one is left."""
+        """Drop another toy onto the platform if fewer than `TOYS` exist."""
         if len(self.toys) < TOYS:
             place = self.platform.get_pos() + core.LVector3(0.3 * (len(self.toys) % 3 - 1), 0, 0.9)
             body = self.world.spawn(self.toy, position=tuple(place))
             self.toys.append(self.draw(soft.SoftBodyNode(self.adapter, body)))
 
     def begin(self) -> None:
-        """Restore the initial state, with a first toy."""
+        """Restore the initial state, and drop a first toy."""
         self.hand.release()
         self.adapter.restore(self.start[0])
         self.coupling.restore(self.start[1])

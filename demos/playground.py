@@ -26,7 +26,7 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=8.0e4, poisson=0.3, density=400.0, damping_ratio=0.3)
-LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies above the ramp
+LAYERS, ROWS, COLUMNS = 2, 2, 4  # layers, rows and columns of bodies above the ramp
 SLOPE = 0.32  # slope of the ramp [rad]
 HUB = np.array([1.85, 0.0, 3.6])  # centre of the wheel [m]
 HOLLOW = np.array([1.7, 0.0, 0.0])  # centre of the hollow [m]
@@ -37,7 +37,7 @@ STEP = FixedStep(dt=1 / 50)
 
 
 class Course:
-    """All colliders. Before every step it moves a wheel, and bars that go up and down."""
+    """Adds all colliders, and moves the wheel and the vertically moving bars before every step."""
 
     def __init__(self, world: World) -> None:
         """Add all colliders."""
@@ -57,7 +57,7 @@ class Course:
             bar.teleport(self._bar(i, 0.0))
 
     def __call__(self, world: World) -> None:
-        """Move colliders to their poses at the end of the next step."""
+        """Move the colliders to their poses at the end of the next step."""
         time = world.time + STEP.dt
         for i, paddle in enumerate(self.paddles):
             paddle.move_to(HUB, _turn(1.1 * time + i * np.pi / 2))
@@ -70,27 +70,27 @@ class Course:
 
 
 def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
-    """Rotation first about x, then about y [rad], which turns the x axis towards -z."""
+    """Return a rotation first about x, then about y [rad]. The second turns the x axis towards -z."""
     c, s, k, w = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, k, -w], [0, w, k]])
 
 
 def _funnel() -> trimesh.Trimesh:
-    """A cone with a hole and a wall of 16 cm."""
+    """Make a cone with a hole and a wall of 16 cm."""
     inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.85, 1.55)])
     outer = inner + np.array([0.13, -0.1])
     return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
 
 
 def _ground() -> NDArray[np.float64]:
-    """Heights of a ring-shaped wall around a hollow, on a square of 6.8 m."""
+    """Return the heights of a ring-shaped wall around a hollow, on a square of 6.8 m."""
     x, y = np.meshgrid(*2 * [np.linspace(-3.4, 3.4, 35)], indexing="ij")
     away = (np.hypot(x, y) - RIM) / 0.6
     return np.asarray(0.03 + 1.0 * np.exp(-(away**2)))
 
 
 def stage() -> Stage:
-    """A block of bodies above the ramp."""
+    """Make the stage: a block of bodies above the ramp."""
     shapes = [
         sphere(0.34, 3),
         box((0.56, 0.56, 0.56), (4, 4, 4)),
@@ -124,7 +124,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Number of bodies in the hollow that do not penetrate the ground."""
+    """Return the number of bodies in the hollow that do not penetrate the ground."""
     inside = 0
     for actor in stage.actors:
         rows = actor.body.positions()

@@ -1,6 +1,7 @@
-"""Two machines play one game: each receives the other's inputs late, rewinds, and repeats the steps.
+"""Two machines play one game: each receives the other's inputs late, rewinds and repeats the steps.
 
-Each side shows one machine. After a key press the two differ for a few frames, and then agree again.
+Each side of the image shows one machine. After a key press, the two differ for a few frames and then agree
+again.
 """
 
 from dataclasses import dataclass, field
@@ -20,11 +21,11 @@ CONTACT = Contact(friction=0.3)
 ROOM, WALL, HEIGHT = 4.0, 0.12, 0.5  # width of the arena, thickness and height of its walls [m]
 BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # offset of the second machine's view [m]
 LATE = 8  # latency of an input to the other machine [ticks]
-PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # [m/s^2], [m/s]
+PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # acceleration of a pressed key [m/s^2], speed of a jump [m/s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 Keys = tuple[float, float, float]
-"""Input of a player in a tick: direction, (2,), and 1 to jump or 0."""
+"""Input of a player in a tick: direction (x, y), and 1 to jump or 0."""
 
 
 def make_world() -> World:
@@ -47,21 +48,21 @@ def make_world() -> World:
 
 @dataclass
 class Machine:
-    """One player's machine: a world, known inputs, and predictions for unknown ones."""
+    """One player's machine: its world, the known inputs, and predictions for unknown ones."""
 
     player: int
     world: World
-    known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # by tick and player
-    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # by tick
-    names: dict[int, str] = field(default_factory=dict)  # hash of the state before each tick
+    known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # known inputs, by tick and player
+    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # inputs of both players, by tick
+    names: dict[int, str] = field(default_factory=dict)  # state hash before each tick
     rewinds: int = 0
-    wrong: int = 0  # number of repeated ticks with another result
+    wrong: int = 0  # number of ticks that began in another state when repeated
 
     def __post_init__(self) -> None:
         self.rollback = Rollback(self.world, LATE + 1)
 
     def press(self) -> None:
-        """Choose the player's input in this tick from the current state: a chase with occasional jumps."""
+        """Choose the player's input for this tick from the current state: a chase with occasional jumps."""
         tick, me = self.world.step_count, self.player
         x, y, _ = self._keys(tick, me)
         if tick % (17 + 6 * me) == 0:
@@ -74,7 +75,7 @@ class Machine:
         self.known[tick, me] = (x, y, float(tick % (61 + 12 * me) == 40))
 
     def receive(self, tick: int, keys: Keys) -> None:
-        """Receive the other's input, and repeat the ticks since then if its prediction was wrong."""
+        """Receive an input of the other player. If its prediction was wrong, repeat the ticks since then."""
         self.known[tick, 1 - self.player] = keys
         if self.used[tick][1 - self.player] == keys:
             return
@@ -86,7 +87,7 @@ class Machine:
             self.world.step(STEP.dt, STEP.substeps)
 
     def begin_tick(self) -> None:
-        """Save the state, and apply the players' inputs."""
+        """Save the state, and apply both players' inputs."""
         tick = self.world.step_count
         self.rollback.save()
         name = self.world.state_hash()
@@ -118,7 +119,9 @@ class Match:
         self.machines = [Machine(player, world) for player, world in enumerate(worlds)]
 
     def __call__(self, world: World) -> None:
-        """Run a tick of both machines, except the step of the first world that follows."""
+        """Run a tick of both machines, except for the step of the first world, which the caller makes
+        next.
+        """
         tick = world.step_count
         for machine in self.machines:
             if tick >= LATE:
@@ -130,23 +133,23 @@ class Match:
         second.step(STEP.dt, STEP.substeps)
 
     def settled(self) -> list[int]:
-        """Ticks for which both machines know all inputs."""
+        """List the ticks for which both machines know all inputs."""
         return sorted(self.machines[0].names)[: -LATE or None]
 
     def agreed(self) -> int:
-        """Number of these ticks that both machines began in bit-identical states."""
+        """Return the number of settled ticks that both machines began in bit-identical states."""
         first, second = (machine.names for machine in self.machines)
         return sum(first[tick] == second[tick] for tick in self.settled())
 
     def caption(self) -> str:
-        """Text for each frame."""
+        """Return the latency, the rollbacks and the agreement as text for a frame."""
         rewinds = sum(machine.rewinds for machine in self.machines)
         agreed = f"{self.agreed()} of {len(self.settled())} hashes agree"
         return f"inputs {LATE} ticks late, {rewinds} rollbacks, {agreed}"
 
 
 def stage() -> Stage:
-    """The worlds of both machines, side by side."""
+    """Make the stage: the worlds of both machines, side by side."""
     first, second = make_world(), make_world()
     match = Match((first, second))
     colors = [PALETTE[0], PALETTE[1], *[PALETTE[2]] * 4]
@@ -165,7 +168,9 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Fraction of settled ticks that both machines began in the same state; 0 without a rollback."""
+    """Return the fraction of settled ticks that both machines began in the same state; 0 without a
+    rollback.
+    """
     match = stage.act
     assert isinstance(match, Match)
     if not all(machine.rewinds and machine.wrong for machine in match.machines):

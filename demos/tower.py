@@ -25,15 +25,15 @@ STEP = FixedStep(dt=1 / 50)
 
 
 class Ball:
-    """Swings like a pendulum that the tower does not slow down."""
+    """Swings the ball like a pendulum that the tower does not slow down."""
 
     def __init__(self, collider: Collider, rope: Frame) -> None:
-        """Start displaced and held."""
+        """Start with the ball displaced and held."""
         self.collider, self.rope = collider, rope
         self.angle, self.rate = -WIDEST, 0.0
 
     def __call__(self, world: World) -> None:
-        """Move the ball before a step."""
+        """Move the ball and the rope before a step."""
         if world.time >= BEGIN:
             for _ in range(10):
                 self.rate -= GRAVITY_EARTH / ROPE * np.sin(self.angle) * STEP.dt / 10
@@ -43,7 +43,7 @@ class Ball:
 
 
 def stage() -> Stage:
-    """The tower, and the displaced ball."""
+    """Make the stage: the tower, and the displaced ball."""
     world = World(friction=0.6, sleep_speed=0.0)
     contact = Contact(friction=0.6, thickness=SKIN)
     block = box(SIZE, (5, 5, 3))
@@ -72,20 +72,20 @@ def stage() -> Stage:
 
 
 def _pose(angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position [m] and axes of the ball and the rope."""
+    """Return the position [m] and the axes of the ball and the rope."""
     c, s = np.cos(angle), np.sin(angle)
     place = np.array([ROPE * s, 0.0, TOP - ROPE * c])
     return place, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
 
 
 def _rope_surface() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """A thin bar upwards from the ball's centre."""
+    """Return the surface of a thin bar that extends upwards from the ball's centre."""
     rod = box((0.05, 0.05, ROPE), (1, 1, 1))
     return rod.vertices - np.mean(rod.bounds, axis=0) + (0.0, 0.0, ROPE / 2), rod.surface
 
 
 def proof(stage: Stage) -> float:
-    """Number of blocks that are lower than initially by more than half of their height."""
+    """Return the number of blocks that sank by more than half their height."""
     heights = [body.center_of_mass()[2] for body in stage.world.bodies]
     stood = [SIZE[2] / 2 + 0.01 + i * (SIZE[2] + SKIN) for i in range(LAYERS)]
     return float(np.sum(np.subtract(stood, heights) > SIZE[2] / 2))

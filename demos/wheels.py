@@ -16,22 +16,22 @@ from taichi_soft.render.stage import Paint
 
 STIFFNESSES = (1.6e4, 4e4, 4e5)  # Young's moduli of the wheels, softest first [Pa]
 RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # radius and width of the wheels; radius of the driven hub [m]
-SPEED, TORQUE = 3.0, 1500.0  # [rad/s] and [N m]
+SPEED, TORQUE = 3.0, 1500.0  # speed [rad/s] and largest torque [N m] of the motors
 LANE, ASIDE = 1.4, 0.3  # distance between wheels, and additional width of the steps on each side [m]
 RISE, TREAD, STEPS = 0.14, 0.9, 3  # height and depth of the steps [m], and their number
 FOOT, TOP = 1.4, 2.8  # start of the first step, and length of the last one [m]
 GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # position at which the motors brake [m]
-BEGIN = 0.4  # start time [s]
+BEGIN = 0.4  # start time of the motors [s]
 DRAG = 2.0  # damping rate of a braking wheel, which would otherwise rock about its hub [1/s]
-SMOOTHING = 0.04  # smoothing of the displayed torques, per step
+SMOOTHING = 0.04  # weight of the last step in the displayed torques
 STEP = FixedStep(dt=1 / 50)
 
 
 class Drivers:
-    """Starts the motors, and brakes each at the top."""
+    """Starts all motors, and brakes each one at the top."""
 
     def __init__(self, motors: list[Motor]) -> None:
-        """Waiting."""
+        """Start with all motors waiting."""
         self.motors = motors
         self.torques = np.zeros(len(motors))  # running means [N m]
 
@@ -46,12 +46,12 @@ class Drivers:
                 motor.body.set_linear_damping(DRAG if is_there else 0.0)
 
     def caption(self) -> str:
-        """Text for each frame."""
+        """Return the torques as text for a frame."""
         return "torque " + "  ".join(f"{10 * round(t / 10):5.0f}" for t in self.torques) + " N m"
 
 
 def stage() -> Stage:
-    """Wheels side by side in front of the steps."""
+    """Make the stage: wheels side by side in front of the steps."""
     world = World()
     width = LANE * len(STIFFNESSES) + 2 * ASIDE
     for i in range(STEPS):
@@ -76,7 +76,7 @@ def stage() -> Stage:
     motors = [
         world.add_motor(body, hub, (0.0, 1.0, 0.0), speed=0.0, max_torque=TORQUE) for body in world.bodies
     ]
-    for body in world.bodies:  # prevents steering by the asymmetric tetrahedra
+    for body in world.bodies:  # keeps wheels straight despite asymmetric meshes
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
     camera = Camera.framing(
@@ -89,7 +89,7 @@ def stage() -> Stage:
 
 
 def _sectors(color: Color) -> Paint:
-    """Paint every other twelfth of a wheel paler, to show its rotation."""
+    """Return a function that paints every other twelfth of a wheel paler, to show its rotation."""
 
     def paint(body: Body) -> NDArray[np.float32]:
         x, y, _ = body.mesh.vertices.T
@@ -101,7 +101,7 @@ def _sectors(color: Color) -> Paint:
 
 
 def proof(stage: Stage) -> float:
-    """Number of wheels on the last step."""
+    """Return the number of wheels on the last step."""
     height = STEPS * RISE
     begin = FOOT + (STEPS - 1) * TREAD
     places = [actor.body.center_of_mass() for actor in stage.actors]

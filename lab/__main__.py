@@ -1,6 +1,7 @@
-"""`python -m lab`: the command line.
+"""Run the command line `python -m lab`.
 
-Importing it takes a second or two. Ctrl-C ends the process in that time too, by one line and exit code 130.
+The imports take one or two seconds. During them, too, Ctrl-C ends the process with one line and exit code
+130.
 """
 
 import os
@@ -18,7 +19,7 @@ if __name__ == "__main__":
     from lab.cli import main
 
     try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # commands clean up after Ctrl-C
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # so that commands can clean up after Ctrl-C
         main()
     except KeyboardInterrupt:
         _end()

@@ -16,21 +16,21 @@ EXTRAS = {
     },
     "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
-"""For each extra its modules, and the packages that contain them, as in pyproject.toml."""
+"""Modules of each extra, and the packages that contain them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """Packages of the extra, or of the given modules, that are not installed."""
+    """List the packages of an extra, or of these modules of it, that are not installed."""
     return missing_among(EXTRAS[extra], *modules)
 
 
 def how_to_install(extra: str) -> str:
-    """Command that installs an extra, for the folder of the checkout."""
+    """Return the command that installs an extra in this checkout."""
     return f"pip install -e '.[{extra}]'"
 
 
 def require_report() -> None:
-    """Raise a MissingExtraError if a package is missing that a report needs."""
+    """Raise a MissingExtraError if a package that a report needs is missing."""
     missing = missing_packages("lab")
     if missing:
         names = ", ".join(missing)

@@ -1,4 +1,4 @@
-"""`python -m lab`: the thesis's experiments, the drop test, and other engines."""
+"""Command line `python -m lab`: the thesis's experiments, the drop test, and other engines."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from taichi_soft.core.extras import require_extra
 
 
 def main(*arguments: str) -> None:
-    """Run the command line. Errors of this package end it by one line and exit code 1, wrong options by 2.
+    """Run the command line.
 
+    An error of this package prints one line and exits with code 1; invalid options exit with code 2.
     Args:
-        arguments: of the command; without any, those of the process.
+        arguments: arguments of the command; by default those of the process.
     """
     try:
         require_extra("cli", "the command line needs")

@@ -1,4 +1,4 @@
-"""The commands of `python -m lab`."""
+"""Commands of `python -m lab`."""
 
 from __future__ import annotations
 

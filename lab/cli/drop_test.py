@@ -1,4 +1,4 @@
-"""`python -m lab drop-test`: random drops, and the sweep."""
+"""Command `python -m lab drop-test`: random drops, and a sweep."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def drop_test(
     """Drop random bodies onto random courses and count the failures; exit code 1 if there are any.
 
     With --sweep: drop bodies of many meshes and materials onto a floor, and release strongly deformed ones,
-    each with the default law and with every law. A sweep that was interrupted resumes.
+    each with the default law and with every other law. An interrupted sweep resumes.
     """
     if not sweep and (only or damping or wrecks or workers):
         raise OptionError("--only, --damping, --wrecks and --workers are options of a sweep: add --sweep")

@@ -1,4 +1,4 @@
-"""`python -m lab peers`: one drop here, in other engines and in a fine reference."""
+"""Command `python -m lab peers`: one drop in taichi-soft, in other engines and in a fine reference."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def peers(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Drop one body here, in a fine reference, and in each other engine that is installed.
+    """Drop one body in taichi-soft, in a fine reference, and in each installed engine.
 
     Print the cost and the error of each, and film them side by side in slow motion.
     """

@@ -1,4 +1,4 @@
-"""`python -m lab report`: the thesis's experiments."""
+"""Command `python -m lab report`: run the thesis's experiments."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def report(
 ) -> None:
     """Run the thesis's experiments and judge its claims; exit code 1 if a point could not be computed.
 
-    Every number is stored at once, in the folder data beside the page. A report that was interrupted resumes
-    from there, and computes points that failed again.
+    Each result is stored immediately in the folder data next to the page. An interrupted report resumes from
+    there and retries failed points.
     """
     from lab.experiments import Effort
     from lab.report.machine import machine_facts

@@ -1,4 +1,4 @@
-"""Random bodies dropped onto random courses: which failures occur, and how often."""
+"""Drop random bodies onto random courses, and count the failures."""
 
 from lab.drop_test.case import make_case
 from lab.drop_test.case_runs import run_cases

@@ -1,4 +1,4 @@
-"""One random body and its course, both determined by two integers."""
+"""Random cases: a body and its course, determined by a seed and a case number."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from taichi_soft.elements.laws import LAWS
 Floats = NDArray[np.float64]
 
 SHAPES = ("box", "sphere", "cylinder", "torus", "beam")
-"""Case n has the kind n modulo 5, so that all kinds are tried equally often."""
+"""Shapes of bodies. Case n has shape n modulo 5, so that all shapes are equally frequent."""
 
 SMALLEST, LARGEST = 0.05, 10.0
-"""Longest edge of the body's box [m]."""
+"""Range of the longest edge of a body's bounding box [m]."""
 
 SOFTEST, STIFFEST = 1e4, 1e8
-"""Young's modulus [Pa]."""
+"""Range of Young's modulus [Pa]."""
 
 MOST_SAG = 0.1
-"""Largest density * g * size / E: softer bodies lie flat under their own weight."""
+"""Largest density * g * size / E. Softer bodies would collapse under their own weight."""
 
 FASTEST, FASTEST_RIM = 50.0, 10.0
-"""Largest speed of the centre, and of the rim by the spin [m/s]."""
+"""Largest speed of the centre of mass, and largest speed of the rim due to rotation [m/s]."""
 
 STEPS_PER_SECOND = 60
 
 
 @dataclass(frozen=True)
 class Case:
-    """A body, its motion and its course."""
+    """A body, its initial motion and its course."""
 
     seed: int
     number: int
     shape: str
-    size: float  # [m]
+    size: float  # longest edge of the body's bounding box [m]
     mesh: TetMesh
     material: Material
     damping_ratio: float
@@ -52,16 +52,19 @@ class Case:
     course: tuple[Solid, ...]
     law: LawName
     flips: FlipsName | None
-    substeps: int  # of a step of 1/60 s
+    substeps: int  # number of substeps per step of 1/60 s
 
     @property
     def unit_time(self) -> float:
-        """Time in which the body falls half its size [s]."""
+        """Time unit of the case: sqrt(size / g) [s], in which the body falls half its size."""
         return math.sqrt(self.size / GRAVITY_EARTH)
 
     @property
     def mach(self) -> float:
-        """Speed over the speed of sound in the body: above 1 only its mass resists an impact."""
+        """Initial speed over the speed of sound in the body.
+
+        Above 1, only the body's mass resists an impact.
+        """
         wave = math.sqrt(float(np.max(self.material.young / self.material.density)))
         return float(np.linalg.norm(self.velocity)) / wave
 
@@ -79,9 +82,13 @@ class Case:
 
 
 def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName | None = None) -> Case:
-    """Make case `number` of `seed` for a law and its flips: "recover" by default, if the law has a choice.
+    """Make a random case.
 
-    Damping is `edge_damping` with a ratio from 0.1 to 0.5, uniformly.
+    The damping is `edge_damping` with a ratio between 0.1 and 0.5, uniformly distributed.
+    Args:
+        seed, number: determine the case.
+        law: force law of the body.
+        flips: treatment of inverted tetrahedra; by default "recover" if the law supports it.
     """
     if flips is None and law in LAWS and Flips.RECOVER in LAWS[law].flips:
         flips = Flips.RECOVER.value
@@ -118,18 +125,22 @@ def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName 
 
 
 def edge_damping(mesh: TetMesh, young: float, density: float, share: float) -> float:
-    """Damping b of an edge [N s/m]: `share` times l^2 sqrt(E density), with the mean length l of an edge.
+    """Return the damping b of an edge [N s/m]: share * l^2 * sqrt(E * density), with the mean edge length l.
 
-    This is about that share of critical damping for the fastest vibrations, and l/L of it for those of wave
-    length L.
+    `share` is about the damping ratio of the fastest vibrations. Vibrations of wavelength L have the damping
+    ratio share * l / L.
     """
     return share * float(mesh.edge_lengths.mean()) ** 2 * math.sqrt(young * density)
 
 
 def shape_mesh(shape: str, size: float, parts: Floats) -> TetMesh:
-    """A mesh whose box has the longest edge `size` [m], with proportions from two numbers between 0 and 1.
+    """Make the mesh of a shape.
 
-    All meshes of one shape have the same counts, so that their worlds share kernels.
+    All meshes of one shape have equal numbers of vertices and tetrahedra, so that worlds reuse their kernels.
+    Args:
+        shape: one of `SHAPES`.
+        size: longest edge of the mesh's bounding box [m].
+        parts: two numbers from 0 to 1 that determine the proportions.
     """
     a, b = (float(part) for part in parts)
     if shape == "box":
@@ -152,6 +163,6 @@ def _direction(rng: np.random.Generator) -> Floats:
 
 
 def _rounded(substeps: float) -> int:
-    """Round up to 1, 2, 3, 4, 6, 8, 12, 16, ...: cases with the same number share a world."""
+    """Round up to 1, 2, 3, 4, 6, 8, 12, 16, ..., because cases with equal numbers can run in one world."""
     whole = 1 << max(0, math.ceil(math.log2(max(substeps, 1.0))))
     return whole * 3 // 4 if whole >= 4 and whole * 3 / 4 >= substeps else whole

@@ -1,4 +1,4 @@
-"""Run cases, many in one world: each body has its own group, and touches only its own course."""
+"""Run many cases in one world. Each body has a separate collision group and touches only its own course."""
 
 from __future__ import annotations
 
@@ -19,36 +19,37 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 PER_SHAPE = 6
-"""Cases of each shape in one world: five shapes then need one group fewer than there are."""
+"""Largest number of cases of each shape in one world. Each case occupies one collision group."""
 
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
-"""Capacity of every world, always the same, so that all worlds share kernels."""
+"""Capacity for colliders and height samples, equal in all worlds, so that they share kernels."""
 
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
-"""A body is at rest if it was slower than the first for the third [s]. The first is a root mean square over
-vertices, in sizes per second; for bodies below half a metre the second counts [m/s], half of the speed at
-which Box2D's bodies fall asleep: a small ball in a corner keeps rocking from facet to facet at a few mm/s."""
+"""A body is at rest if its speed stays below a limit for `CALM_TIME` [s]. The speed is the root mean square
+over vertices. The limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED`
+[m/s], which is half of Box2D's sleeping threshold: a small ball in a corner keeps rocking from facet to facet
+at a few mm/s."""
 
 PATIENCE = 150.0
-"""Time within which a body must come to rest, over the time in which it falls half its size, sqrt(size /
-g)."""
+"""Time within which a body must come to rest [`Case.unit_time`]."""
 
 FREE_TIME, BRAKE = 20.0, 0.2
-"""Time after which all velocities are damped, and the rate, in the same unit: a stiff ball on a plane would
-roll for minutes. Bodies that gain energy, or slide down a slope, keep moving."""
+"""Time after which all velocities are damped [`Case.unit_time`], and the damping rate [1 / `Case.unit_time`].
+Without damping, a stiff ball would roll on a plane for minutes. Bodies that gain energy or slide down a slope
+keep moving despite the damping."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:
-    """Run all cases, in worlds of those with the same number of substeps. Yields each outcome when the case
-    ends.
-    """
+    """Run all cases, and yield the outcome of each case when it ends."""
     for batch in batches(list(cases)):
         yield from _run_batch(batch)
 
 
 def batches(cases: list[Case]) -> Iterator[list[Case]]:
-    """Yield cases that fit in one world: with the same law and number of substeps, and `PER_SHAPE` of each
-    shape.
+    """Yield batches of cases that fit into one world.
+
+    The cases of a batch have the same law and number of substeps, and at most `PER_SHAPE` of them have the
+    same shape.
     """
     for kind in sorted({(case.law, case.substeps) for case in cases}):
         alike = [case for case in cases if (case.law, case.substeps) == kind]
@@ -58,18 +59,18 @@ def batches(cases: list[Case]) -> Iterator[list[Case]]:
 
 
 class _Run:
-    """One body and the measurements of its case."""
+    """The body of one case, and its measurements."""
 
     def __init__(self, case: Case, body: Body) -> None:
         self.case, self.body = case, body
         self.outer = np.unique(case.mesh.surface)
         self.before = body.positions()
         self.out, self.out_through = -np.inf, None  # type: float, str | None
-        self.calm = 0  # steps
+        self.calm = 0  # number of steps since the body last moved fast
         self.speed = np.inf
 
     def measure_step(self) -> None:
-        """Measure the body after a step."""
+        """Update the measurements after a step."""
         now = self.body.positions()
         paths = np.linalg.norm(now - self.before, axis=1).astype(np.float64)
         self.speed = float(np.sqrt((paths**2).mean())) * STEPS_PER_SECOND / self.case.size
@@ -86,11 +87,11 @@ class _Run:
 
     @property
     def is_at_rest(self) -> bool:
-        """True if it was slow for long enough."""
+        """True if the body has been slow for `CALM_TIME`."""
         return self.calm >= CALM_TIME * STEPS_PER_SECOND and not self.body.is_frozen
 
     def outcome(self, time: float, *, is_at_rest: bool) -> Outcome:
-        """Return the outcome after `time` [s]."""
+        """Return the outcome at world time `time` [s]."""
         outer = self.before[self.outer].astype(np.float64)
         depths = [(solid.depth(outer), solid) for solid in self.case.course if not solid.is_room]
         worst, deepest = max(((d - s.tolerance, d), s.name) for d, s in depths)
@@ -127,7 +128,7 @@ def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
 
 
 def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
-    """Build a world of the usual capacity with the cases in it."""
+    """Build a world with the cases of a batch. All worlds have the same capacity."""
     world = bare_world(floor=None, collider_room=MOST_COLLIDERS - 1 - sum(len(case.course) for case in batch))
     samples = 0
     bodies = []
@@ -155,7 +156,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
                 group=contact.group,
                 mask=contact.mask,
             )
-    # A collider that nothing touches fills the rest of the capacity.
+    # A collider that touches nothing uses up the remaining samples.
     world.add_collider(HeightFieldShape(np.zeros((2, (MOST_SAMPLES - samples) // 2)), 1.0), group=0, mask=0)
     for shape in SHAPES:
         missing = PER_SHAPE - sum(case.shape == shape for case in batch)
@@ -167,7 +168,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
 
 @cache
 def _filler(shape: str, law: LawName, flips: FlipsName | None) -> SoftBodyAsset:
-    """Asset of slots that stay empty: soft and pinned, so that nothing warns of its step or its weight."""
+    """Make the asset of empty slots. It is soft and pinned, so that it causes no warnings."""
     mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
     pinned = range(len(mesh.vertices))
     return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips, pinned=pinned)

@@ -1,4 +1,4 @@
-"""Random courses: a closed room with solids in it."""
+"""Random courses: a closed room with solid obstacles."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from taichi_soft.core.math.rotations import matrix_of
 Floats = NDArray[np.float64]
 
 HALF, HEIGHT, BELOW = 3.0, 8.0, 3.0
-"""Dimensions of the room over the size of the body: half its width, height of the lid, depth of the walls."""
+"""Dimensions of the room [sizes of the body]: half its width, height of the lid, depth of the walls."""
 
 THINNEST = 0.02
 """Thickness of walls, lids and floors [m]."""
@@ -33,39 +33,40 @@ STEEPEST = 0.35
 """Largest angle of a tilted floor [rad]."""
 
 CELLS = 24
-"""Cells of the grid of a mesh along its longest side."""
+"""Number of grid cells along the longest side of a mesh collider."""
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A collider, and an independent formula for the distance of a point from it."""
+    """A collider, and a separate formula for the signed distance from it."""
 
     name: str
     shape: Shape
-    distance: Distance  # in its own frame; everything beyond floor, walls and lid is inside
-    tolerance: float  # depth [m] below which a point still counts as on its surface
-    is_room: bool  # True for floor, walls and lid, which nothing may pass
+    distance: Distance  # in the solid's axes; points beyond floor, walls or lid are inside
+    tolerance: float  # largest depth of a point that counts as lying on the surface [m]
+    is_room: bool  # True for floor, walls and lid, which bodies must not pass
     position: Floats
     rotation: Floats  # (3, 3)
     friction: float
     restitution: float | None
 
     def depth(self, points: Floats) -> float:
-        """Penetration depth of the deepest of the points (n, 3) [m]; negative outside."""
+        """Return the penetration depth of the deepest of the points (n, 3) [m]; it is negative outside."""
         return -float(self.distance((points - self.position) @ self.rotation).min())
 
 
 def random_rotation(rng: np.random.Generator) -> Floats:
-    """Uniformly random rotation, (3, 3)."""
+    """Return a uniformly distributed random rotation matrix (3, 3)."""
     quaternion = rng.normal(size=4)
     matrix: Floats = matrix_of(quaternion / np.linalg.norm(quaternion))
     return matrix
 
 
 def make_course(rng: np.random.Generator, size: float) -> tuple[Solid, ...]:
-    """Make a room of 6 x 6 x 8 sizes of the body [m] with one to four solids in its lower half.
+    """Make a room with one to four obstacles in its lower half.
 
-    Every other course leaves the restitution of the bodies unchanged.
+    The room is 6 x 6 x 8 sizes of the body. With probability 1/2, the solids leave the bodies' restitution
+    unchanged.
     """
     friction, restitution = rng.uniform(0.2, 1.0), rng.choice([0.0, rng.uniform(0.0, 0.9)])
     surface = {"friction": float(friction), "restitution": float(restitution) or None}

@@ -1,6 +1,6 @@
-"""Signed distances of points (n, 3) from solids in their own frames [m]: float64, written from the formulas.
+"""Functions for the signed distances of points (n, 3) from solids, in the solids' axes [m], float64.
 
-They check the kernels, and therefore share no code with them.
+These formulas check the kernels and therefore share no code with them.
 """
 
 from __future__ import annotations
@@ -15,17 +15,22 @@ Distance = Callable[[Floats], Floats]
 
 
 def half_space(normal: Floats, offset: float = 0.0) -> Distance:
-    """Half space below the plane with that unit normal (3,), `offset` from the origin along it [m]."""
+    """Return the distance function of a half space.
+
+    Args:
+        normal: unit normal of its plane, out of the half space, (3,).
+        offset: distance of the plane from the origin along the normal [m].
+    """
     return lambda x: np.asarray(x @ normal - offset)
 
 
 def ball(radius: float) -> Distance:
-    """Ball about the origin."""
+    """Return the distance function of a ball centred at the origin."""
     return lambda x: np.asarray(np.linalg.norm(x, axis=1) - radius)
 
 
 def cuboid(size: Floats) -> Distance:
-    """Cuboid about the origin with edges (3,) along the axes."""
+    """Return the distance function of a cuboid centred at the origin, with edges (3,) along the axes [m]."""
 
     def distance(x: Floats) -> Floats:
         beyond = np.abs(x) - size / 2
@@ -36,7 +41,7 @@ def cuboid(size: Floats) -> Distance:
 
 
 def capsule(radius: float, length: float) -> Distance:
-    """Capsule around a segment of the z axis about the origin."""
+    """Return the distance function of a capsule around a segment of the z axis, centred at the origin."""
 
     def distance(x: Floats) -> Floats:
         axis = x - np.outer(np.clip(x[:, 2], -length / 2, length / 2), (0.0, 0.0, 1.0))
@@ -46,7 +51,7 @@ def capsule(radius: float, length: float) -> Distance:
 
 
 def ring(major: float, minor: float) -> Distance:
-    """A torus about the z axis."""
+    """Return the distance function of a torus about the z axis."""
 
     def distance(x: Floats) -> Floats:
         along = np.hypot(x[:, 0], x[:, 1]) - major
@@ -56,9 +61,10 @@ def ring(major: float, minor: float) -> Distance:
 
 
 def ground(heights: Floats, spacing: float) -> Distance:
-    """Lower bound of the distance from a height field, whose cells are split from (i, j) to (i + 1, j + 1).
+    """Return a function for a lower bound of the distance from a height field.
 
-    It is the height above the field times the cosine of the steepest slope.
+    The bound is the height above the field times the cosine of its steepest slope. Each cell consists of two
+    triangles that meet on the diagonal from (i, j) to (i + 1, j + 1).
     """
     nx, ny = heights.shape
     along, across = (np.abs(np.diff(heights, axis=axis)).max() / spacing for axis in (0, 1))

@@ -1,4 +1,4 @@
-"""Outcome of a case."""
+"""The outcome of one drop-test case."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from lab.drop_test.case import Case
 
 @dataclass(frozen=True)
 class Outcome:
-    """Measurements of a case."""
+    """Measurements of one case."""
 
     case: Case
     frozen_at: float | None  # time of the first non-finite value [s]
-    out: float  # largest distance of a surface vertex beyond floor, wall or lid at any time [m]
-    out_through: str | None  # which of them, if that is too far
-    inside: float  # depth of a surface vertex in another solid at the end [m]
-    inside_of: str | None  # which solid, if that is too deep
-    rest_at: float | None  # [s]; None if it never came to rest
-    speed: float  # root mean square over vertices at the end, in sizes per second
-    flipped: int  # inverted tetrahedra at the end
+    out: float  # largest distance of a surface vertex beyond floor, walls or lid over the run [m]
+    out_through: str | None  # name of that solid; None if the distance is within its tolerance
+    inside: float  # largest depth of a surface vertex in an obstacle at the end [m]
+    inside_of: str | None  # name of that obstacle; None if the depth is within its tolerance
+    rest_at: float | None  # time at which the body came to rest [s]; None if it did not
+    speed: float  # root mean square over vertices at the end [sizes of the body per second]
+    flipped: int  # number of inverted tetrahedra at the end
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Failures, worst first; empty without any."""
+        """Names of the failures, worst first; empty if there are none."""
         found = (
             ("non-finite", self.frozen_at is not None),
             ("through the room", self.out_through is not None),
@@ -34,7 +34,7 @@ class Outcome:
         return tuple(name for name, is_so in found if is_so)
 
     def badness(self, fault: str) -> float:
-        """Severity of a fault, for sorting: earlier, farther, deeper, faster or more is worse."""
+        """Return the severity of a failure, for sorting: larger is worse."""
         share = self.flipped / len(self.case.mesh.tets)
         early = -(self.frozen_at or 0.0)
         return dict(zip(FAULTS, (early, self.out, self.inside, self.speed, share), strict=True))[fault]
@@ -55,4 +55,4 @@ class Outcome:
 
 
 FAULTS = ("non-finite", "through the room", "in an obstacle", "not at rest", "inside out")
-"""All kinds of faults, worst first."""
+"""Names of all failures, worst first."""

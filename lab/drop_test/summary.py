@@ -1,4 +1,4 @@
-"""Summary of many outcomes."""
+"""Summarise the outcomes of a run."""
 
 from __future__ import annotations
 
@@ -33,16 +33,18 @@ class Summary:
 
     @property
     def failed(self) -> tuple[Outcome, ...]:
-        """Outcomes with a fault."""
+        """Outcomes with at least one failure."""
         return tuple(outcome for outcome in self.outcomes if outcome.faults)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of cases with each fault; a case can have several."""
+        """Number of cases with each failure; a case can have several."""
         return {name: sum(name in each.faults for each in self.outcomes) for name in FAULTS}
 
     def lines(self, worst: int) -> Iterator[str]:
-        """Lines to print, with the `worst` cases of each fault and the commands that repeat them."""
+        """Yield lines to print: totals, and the `worst` cases of each failure with the commands that repeat
+        them.
+        """
         total = len(self.outcomes)
         yield f"{total} cases, {total - len(self.failed)} of them sound"
         yield CRITERION
@@ -63,7 +65,7 @@ class Summary:
             )
 
     def rows(self) -> dict[str, Any]:
-        """Rows for JSON."""
+        """Return the summary as data for JSON."""
         return {
             "cases": len(self.outcomes),
             "criterion": CRITERION,

@@ -1,4 +1,4 @@
-"""Experiments of the thesis, and checks against theory, one file per figure or claim."""
+"""Experiments of the thesis and checks against theory, one file per figure or claim."""
 
 from lab.experiments.anisotropy import ANISOTROPY
 from lab.experiments.bars_bounce import BARS_BOUNCE

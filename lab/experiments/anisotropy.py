@@ -25,18 +25,18 @@ from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
-"""Stiffness of an isotropic material [Pa]."""
+"""Stiffness that an isotropic material has in every direction [Pa]."""
 
 COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
-"""Laws of a quick report: each takes seconds to compile."""
+"""Laws that a quick report omits, because each takes seconds to compile."""
 
 LEAST_SPREAD = 1e-3
-"""Spread below which the mesh hides the anisotropy of a law."""
+"""Largest spread that says nothing about a law, because the mesh hides its anisotropy."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:
-    """Delaunay mesh of a cube of 1 m with inner vertices moved at random."""
+    """Make a Delaunay mesh of a cube of 1 m whose inner vertices are moved at random."""
     grid = box((1.0, 1.0, 1.0), (cells,) * 3)
     inner = (np.abs(grid.vertices - grid.bounds.mean(axis=0)) < 0.499).all(axis=1)
     move = np.random.default_rng(seed).uniform(-0.25, 0.25, grid.vertices.shape) / cells
@@ -44,7 +44,11 @@ def jittered_block(cells: int, seed: int = 0) -> TetMesh:
 
 
 def mesh_of(name: str, size: int) -> TetMesh:
-    """Body of that name; `size` is the number of elements along it, except for the beam with a hole."""
+    """Make a mesh by name.
+
+    Args:
+        size: number of elements along the mesh; ignored for the beam with a hole.
+    """
     shapes = {
         "block": lambda: box((1.0, 1.0, 1.0), (size,) * 3),
         "cylinder": lambda: cylinder(1.0, 2.0, rings=size - 1, layers=size),
@@ -60,7 +64,7 @@ MESHES = ("uneven block", "block", "cylinder", "ball")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: CMPM and CMPM2 on all meshes, the other laws on the block."""
+    """List the points: CMPM and CMPM2 on all meshes, all other laws on the block."""
     size, count = (3, 24) if effort is Effort.QUICK else (6, 200)
     others = [law for law in LAWS if law not in (*COMPARED, *(LEFT_OUT if effort is Effort.QUICK else ()))]
     pairs = [(law, mesh) for law in COMPARED for mesh in MESHES] + [(law, "block") for law in others]
@@ -68,13 +72,13 @@ def points(effort: Effort) -> list[Point]:
 
 
 def in_plane(count: int) -> NDArray[np.float64]:
-    """Unit vectors in the plane of x and z, over half a turn, (count + 1, 3)."""
+    """Return unit vectors in the x-z plane, evenly spread over half a turn, (count + 1, 3)."""
     turn = np.pi * np.arange(count + 1) / count
     return np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness over lambda + 2 mu, in all directions and in the plane of x and z."""
+    """Measure the stiffness over lambda + 2 mu in directions over a hemisphere and in the x-z plane."""
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
 
     def stiffness(rows: NDArray[np.float64]) -> list[float]:

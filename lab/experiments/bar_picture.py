@@ -1,4 +1,4 @@
-"""Picture of bars under their loads, with exaggerated displacements."""
+"""Image of loaded bars with exaggerated displacements."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from lab.experiments.irregular_block import irregular_block
 from taichi_soft.render import Camera, Renderer, Surface, colormap, draw_labels
 
 SIZE = (960, 540)
-"""Width and height of the picture [pixels]."""
+"""Width and height of the image [pixels]."""
 
 
 def bar_picture(
     length: float, cells: int, displacements: dict[str, ArrayLike], factor: float
 ) -> NDArray[np.uint8]:
-    """Draw bars one above the other, coloured by the displacement of each vertex over the largest.
+    """Draw bars one above the other, coloured by the displacement of each vertex over the largest
+    displacement.
 
     Args:
         length, cells: as in `irregular_block`.
-        displacements: (n, 3) [m] by name.
+        displacements: displacements of the vertices, (n, 3) [m], by name of the bar.
         factor: exaggeration of the displacements.
     """
     mesh = irregular_block(length, WIDTH, cells)

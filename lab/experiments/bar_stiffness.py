@@ -1,4 +1,4 @@
-"""Stiffness of a bar under loads with a known theory, by a law or by finite elements."""
+"""Stiffness of a bar under loads with known solutions, for a law or finite elements."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from taichi_soft import Material
 
 YOUNG, POISSON, DENSITY, WIDTH = 1e6, 0.3, 1000.0, 1.0
 LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
-"""Names of the finite elements of scikit-fem, used like names of laws."""
+"""Names of the finite elements of scikit-fem, used in place of a law's name."""
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
-    """Ratio by load, and the size of the mesh; displacements, (n, 3) [m] by load, if the point is "drawn".
+    """Measure the stiffness of a bar over its theoretical stiffness.
 
     Args:
-        point: "law" (or `LINEAR`, `QUADRATIC`), "strain", and "cells" across the bar.
+        point: "law" (a law, `LINEAR` or `QUADRATIC`), "strain", "cells" across the bar, and "drawn", which is
+            true to return displacements too.
         length: length of the bar [m].
-        loads: some of `free_ends`.
+        loads: names of loads of `free_ends`.
+    Returns: the ratio for each load, the numbers of "vertices" and "tets", and "displacements", (n, 3) [m]
+        by load.
     """
     mesh = irregular_block(length, WIDTH, point["cells"])
     material = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)

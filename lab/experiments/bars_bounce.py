@@ -1,7 +1,7 @@
-"""A complex object of bars bounces (thesis figure 6.2): bars bend on impact, and vibrate after lift-off.
+"""A complex object of bars bounces (thesis figure 6.2): its bars bend on impact and vibrate after lift-off.
 
-Three crossed bars fall onto three of their six ends. Bending is measured relative to the crossing, vibration
-by the kinetic energy beyond that of a rigid body.
+Three crossed bars fall onto three of their six ends. Bending is measured relative to the crossing. Vibration
+is measured as the kinetic energy beyond that of a rigid body.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 MATERIAL = Material(young=1e7, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
-HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # length of a bar, and height of the lowest end [m]
+HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # half a bar's length, its thickness, initial height [m]
 DT, SUBSTEPS, SECONDS = 0.01, 24, 1.7
 UPRIGHT = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
-"""Rotation that makes the diagonal of the three bars vertical."""
+"""Rotation that turns the diagonal of the three bars upright."""
 SEEN, BENT, VIBRATES = 0.05, 3.0, 0.01
-"""Visible deflection over a bar's free length; deflection over change of length that counts as bending;
-energy of vibration in flight over that of the impact."""
+"""Limits: deflection over a bar's free length above which it is visible; deflection over change of length
+above which the bars bend; vibration energy in flight over the impact's energy above which they vibrate."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: one fall; for a full report also a fall of a body half as stiff."""
+    """List the points: one fall, and for a full report also the fall of a body half as stiff."""
     stiffnesses = (1.0,) if effort is Effort.QUICK else (1.0, 0.5)
     return [{"stiffness": share} for share in stiffnesses]
 
 
 def bars_mesh() -> TetMesh:
-    """Mesh of the bars about their crossing, with ends at +-1.3 m of each axis."""
+    """Return the mesh of the bars, centred at their crossing, with ends at +-1.3 m on each axis."""
     mesh = load_mesh(ASSETS / "bars.npz")
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
 
 def measure(point: Point) -> Numbers:
-    """Measure deflections, lengths and energies at 100 Hz, and five poses."""
+    """Measure deflections, lengths and energies at 100 Hz, and store four poses."""
     mesh = bars_mesh()
     world = bare_world(retries=0)
     material = Material(MATERIAL.young * point["stiffness"], 0.2, 1000.0, 20.0, damping_ratio=0.0)
@@ -82,9 +82,10 @@ def measure(point: Point) -> Numbers:
 
 
 def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
-    """Largest deflection of an end across its bar [m], and largest change of length of half a bar [1].
+    """Return the largest deflection of an end across its bar [m], and the largest relative change of length.
 
-    Both are relative to the crossing and its rotation. Lengths run through the centres of the sections.
+    Both are relative to the crossing and its rotation. Lengths are those of half bars, along the centres of
+    their sections.
     """
     rest = mesh.vertices
     hub = (np.abs(rest) < 0.6 * THICKNESS).all(axis=1)
@@ -106,7 +107,7 @@ def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
 
 
 def energies(body: Body) -> tuple[float, float]:
-    """Kinetic energy, and its excess over that of a rigid body with the same momenta [J]."""
+    """Return the kinetic energy, and its excess over that of a rigid body with the same momenta [J]."""
     masses, x, v = body.masses[:, None], body.positions().astype(np.float64), body.velocities().astype(float)
     total = masses.sum()
     x, mean = x - (masses * x).sum(axis=0) / total, (masses * v).sum(axis=0) / total
@@ -118,7 +119,9 @@ def energies(body: Body) -> tuple[float, float]:
 
 
 def flight_of(series: Numbers) -> tuple[int, int, int]:
-    """First step on the floor, and first and last + 1 of the longest flight after it."""
+    """Find the first step on the floor, and the first step and the end (exclusive) of the longest flight
+    after it.
+    """
     low = np.array(series["lowest"]) < 1e-3
     touched = int(np.argmax(low))
     best, start = (touched, touched), touched
@@ -131,7 +134,10 @@ def flight_of(series: Numbers) -> tuple[int, int, int]:
 
 
 def frequency_of(energy: list[float]) -> float:
-    """Strongest frequency of a vibration with this kinetic energy at each step: half of the energy's [Hz]."""
+    """Return the strongest frequency of a vibration from its kinetic energy in each step [Hz].
+
+    The kinetic energy oscillates at twice this frequency.
+    """
     if len(energy) < 4:
         return 0.0
     spectrum = np.abs(np.fft.rfft(np.array(energy) - np.mean(energy), 4096))

@@ -1,4 +1,4 @@
-"""Bars in tension, torsion and bending against closed forms (beyond the thesis)."""
+"""Bars in tension, torsion and bending, compared with closed forms (not in the thesis)."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from lab.experiments.stiffness_dots import draw_stiffness_dots
 
 LENGTH = 4.0
 EXAGGERATION = 250.0
-"""Exaggeration of displacements in the picture."""
+"""Factor on the displacements in the image."""
 LOADS = ("tension", "shear", "torsion", "bending", "cantilever")
 EXACT = 1e-3
-"""Error of tension and shear: linear tetrahedra represent a uniform stress exactly, so that only the error of
-small strain remains."""
+"""Tolerance for tension and shear: linear tetrahedra represent a uniform stress exactly, so only the error of
+the small strain remains."""
 SAME = 0.01
-"""Difference between laws on tetrahedra and linear finite elements on one mesh."""
+"""Tolerance between laws on tetrahedra and linear finite elements on the same mesh."""
 LIMIT = 0.03
-"""Error of the extrapolation from two meshes: it leaves 1 %, and the clamped end of the cantilever
-another."""
+"""Tolerance of the extrapolation from two meshes. The extrapolation and the cantilever's clamped end each
+cause an error of about 1 %."""
 
 TEXT = (
     f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m (E = {YOUNG:g} Pa, nu = {POISSON:g}) is drawn out, "
@@ -58,7 +58,9 @@ TEXT = (
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: every law and finite elements on one mesh; one law and linear elements on two finer meshes."""
+    """List the points: every law and finite elements on one mesh, one law and linear elements on two finer
+    meshes.
+    """
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)
     finer = [{**laws[0], "cells": fine}, {**laws[0], "cells": middle, "drawn": True}]
@@ -68,12 +70,12 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure stiffness over that of theory, by load."""
+    """Measure the stiffness over theory for each load."""
     return stiffness_over_theory(point, LENGTH, LOADS)
 
 
 def conclude(results: Results) -> Section:
-    """Judge: tension is exact; torsion and bending are too stiff, as for linear elements, and converge."""
+    """Judge whether tension is exact, and whether torsion and bending converge to theory from above."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     coarse = rows[0][0]["cells"]
     of_laws = [row for row in rows if row[0]["law"] not in (LINEAR, QUADRATIC)]
@@ -176,7 +178,7 @@ def conclude(results: Results) -> Section:
 
 
 def _extrapolated(coarse: float, fine: float, cells: tuple[int, int]) -> float:
-    """Limit of an error that falls with the square of a cell's size (Richardson)."""
+    """Extrapolate a value to cells of zero size, with an error of second order (Richardson)."""
     ratio = (cells[1] / cells[0]) ** 2
     return (ratio * fine - coarse) / (ratio - 1)
 
@@ -190,4 +192,4 @@ BEAMS = Experiment(
     measure,
     conclude,
 )
-"""Bars under load."""
+"""The experiment on bars under load."""

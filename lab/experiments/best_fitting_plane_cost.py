@@ -1,4 +1,4 @@
-"""Cost and stability of the best fitting plane and of its cheap normal, beside CMPM (thesis 4.4.2)."""
+"""Cost and stability of the best fitting plane and its cheap normal, compared with CMPM (thesis 4.4.2)."""
 
 from __future__ import annotations
 
@@ -33,20 +33,25 @@ FITTED: LawName = "best_fitting_plane"
 SPLIT: LawName = "split_ring_plane"
 LAWS: tuple[LawName, ...] = (CMPM, FITTED, SPLIT)
 AS_STABLE = 0.9
-"""Largest step over that of the best fitting plane with which a law counts as stable as that."""
+"""Ratio of a law's largest step to that of the best fitting plane above which both are equally stable."""
 MESHES = ("another uneven block", "uneven block", "ball")
 STEP, SUBSTEPS = 1e-4, 200
-"""Length [s] and number of substeps of a call: so short that bodies at rest stay there."""
+"""Length [s] and number of the substeps of a timed call. They are so short that a body at rest stays at
+rest."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """All three laws on three meshes, each in turns with CMPM."""
+    """List the points: one per mesh. Each compares all three laws."""
     size, repeats = (3, 5) if effort is Effort.QUICK else (6, 15)
     return [{"mesh": mesh, "size": size, "repeats": repeats} for mesh in MESHES]
 
 
 def measure(point: Point) -> Numbers:
-    """Median time of a substep [s], its ratio to CMPM's in turns, and vibrations, of each law."""
+    """Measure the median time of a substep of each law [s], its ratio to CMPM's time, and the small
+    vibrations.
+
+    Calls of each law alternate with calls of CMPM.
+    """
     mesh = mesh_of(point["mesh"], point["size"])
     step = {law: partial(_world(mesh, law).step, SUBSTEPS * STEP, SUBSTEPS) for law in LAWS}
     seconds: dict[str, float] = {}
@@ -73,7 +78,7 @@ def _world(mesh: TetMesh, law: LawName) -> World:
 
 
 def conclude(results: Results) -> Section:
-    """Judge cost, largest step and growth of vibrations on all meshes."""
+    """Judge the cost, the largest step and the growth of vibrations on all meshes."""
     found = {mesh: results.one(mesh=mesh) for mesh in MESHES}
     slower = [numbers["ratio"][FITTED] for numbers in found.values()]
     steps = [numbers["step"][FITTED] / numbers["step"][CMPM] for numbers in found.values()]

@@ -1,4 +1,4 @@
-"""Statements that the report judges: claims of the thesis, and theory that its models should meet."""
+"""Statements that the report judges: claims of the thesis, and theory that its models should satisfy."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement.
+    """A statement to judge.
 
     Args:
-        source: section or figure of the thesis, or the theory that the statement comes from.
+        source: section or figure of the thesis, or the theory behind the statement.
         text: the statement, one sentence.
     """
 
@@ -19,7 +19,7 @@ class Claim:
 
     @property
     def is_of_thesis(self) -> bool:
-        """True for a claim of the thesis, False for a statement of theory."""
+        """True for a claim of the thesis, false for a statement of theory."""
         return self.source.startswith(("chapter", "section", "figure"))
 
 

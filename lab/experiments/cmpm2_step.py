@@ -1,4 +1,4 @@
-"""Largest steps of CMPM2 and of CMPM (thesis section 4.4.1)."""
+"""Largest stable steps of CMPM2 and CMPM (thesis section 4.4.1)."""
 
 from __future__ import annotations
 
@@ -24,20 +24,24 @@ from taichi_soft import Material
 
 UNDAMPED = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 DAMPED = Material(1e6, 0.25, 1000.0, 30.0, damping_ratio=0.0)
-"""Material with damping that shortens the step by a tenth, and stops most growing vibrations."""
+"""Damped material. The damping shortens the largest step by a tenth, and stops most growing vibrations."""
 
 LAWS = ("cmpm", "cmpm2")
 MESHES = ("another uneven block", "uneven block", "block", "ball")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: both laws on four meshes."""
+    """List the points: both laws on four meshes."""
     size = 3 if effort is Effort.QUICK else 5
     return [{"law": law, "mesh": mesh, "size": size} for law in LAWS for mesh in MESHES]
 
 
 def measure(point: Point) -> Numbers:
-    """Largest stable step [s], as 2 / w and by running; growth rate of undamped vibrations at rest [1/s]."""
+    """Measure the largest stable step and the growth rate of undamped vibrations at rest [1/s].
+
+    The step is 2 over the highest angular frequency without damping ("undamped"), and the result of running a
+    damped body ("run") [s].
+    """
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
     small = vibration(mesh, UNDAMPED, law)
     return {
@@ -48,7 +52,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the steps of CMPM2 over those of CMPM."""
+    """Judge whether the steps of CMPM2 are longer than those of CMPM."""
     found = {(law, mesh): results.one(law=law, mesh=mesh) for law in LAWS for mesh in MESHES}
     ratios = {mesh: found["cmpm2", mesh]["undamped"] / found["cmpm", mesh]["undamped"] for mesh in MESHES}
     runs = [(found["cmpm2", mesh]["run"], found["cmpm", mesh]["run"]) for mesh in MESHES]

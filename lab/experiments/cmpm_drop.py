@@ -1,4 +1,4 @@
-"""A sphere that falls onto the floor with leapfrog or implicit Euler, by default a stiff one of CMPM."""
+"""Drop a sphere onto the floor with leapfrog or implicit Euler; by default a stiff sphere of CMPM."""
 
 from __future__ import annotations
 
@@ -11,30 +11,35 @@ from taichi_soft.core.types import IntegratorName, LawName
 from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""So stiff that leapfrog needs steps of about 1e-4 s. Without damping this law gains energy at any step."""
+"""Stiff material: leapfrog needs steps of about 1e-4 s. Without damping, CMPM gains energy at any step
+length."""
 
 RADIUS, HEIGHT = 1.0, 1.5
-"""Radius of the sphere, and height of its centre at the start [m]."""
+"""Radius of the sphere, and initial height of its centre [m]."""
 
 FRAME, FRAMES = 0.06, 12
 TOUCHES = 0.25
-"""Time [s] at which the sphere is still in the air; it falls 0.5 m in 0.32 s."""
+"""Time at which the sphere is still in the air [s]; it falls 0.5 m in 0.32 s."""
 
 OFF, SHRUNK = 0.05, 0.9
-"""Limits for a whole body: largest deviation of the fall [m], and least volume over that at rest."""
+"""Limits for a valid fall: largest deviation from the reference in the air [m], and smallest volume over the
+rest volume."""
 
 BOUNCE = 0.5
-"""Part of the bounce of a fall with short steps that a sound fall keeps at least."""
+"""Smallest bounce that counts as kept, over the bounce with short steps."""
 
 
 @cache
 def _mesh(resolution: int) -> TetMesh:
-    """Mesh of the sphere, cached: its Voronoi graph takes as long to compute as a fall."""
+    """Make the mesh of the sphere.
+
+    It is cached, because its Voronoi graph takes as long to compute as a fall.
+    """
     return sphere(RADIUS, resolution)
 
 
 class Drop:
-    """A sphere above the floor."""
+    """A world with a sphere above the floor."""
 
     def __init__(
         self,
@@ -48,8 +53,8 @@ class Drop:
         """Build the world.
 
         Args:
-            factor: step over the largest stable step of leapfrog.
-            resolution: of the mesh, see `sphere`.
+            factor: length of a step over leapfrog's largest stable step.
+            resolution: resolution of the mesh, see `sphere`.
         """
         self.world = bare_world(integrator=integrator, retries=0)
         mesh = _mesh(resolution)
@@ -65,7 +70,11 @@ class Drop:
 
 
 def fall(drop: Drop) -> Numbers:
-    """Height [m] frame by frame, the least volume, and whether the body flips or freezes."""
+    """Simulate a fall.
+
+    Returns: height in each frame [m], smallest volume over the rest volume, largest number of inverted
+        tetrahedra, and whether the body froze.
+    """
     height, volume, flipped = [], [], 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnstableStepWarning)
@@ -86,17 +95,23 @@ def fall(drop: Drop) -> Numbers:
 
 
 def rebound(height: list[float]) -> float:
-    """Height of the bounce off the floor [m], from the heights frame by frame."""
+    """Return the height of the bounce above rest on the floor [m].
+
+    Args:
+        height: height of the centre in each frame [m].
+    """
     return max(0.0, max(height[round(TOUCHES / FRAME) + 1 :]) - RADIUS)
 
 
 def bounces(numbers: Numbers, reference: list[float]) -> bool:
-    """True if it keeps at least `BOUNCE` of the bounce of the reference."""
+    """True if the bounce is at least `BOUNCE` of the bounce of the reference."""
     return rebound(numbers["height"]) >= BOUNCE * rebound(reference)
 
 
 def is_whole(numbers: Numbers, reference: list[float]) -> bool:
-    """True if the sphere falls as the reference, stays whole, and lies or bounces on the floor at the end."""
+    """True if the sphere falls like the reference, stays valid, and lies or bounces on the floor at
+    the end.
+    """
     air = [i for i in range(FRAMES) if (i + 1) * FRAME < TOUCHES]
     off = max(abs(numbers["height"][i] - reference[i]) for i in air)
     whole = not numbers["frozen"] and numbers["flipped"] == 0 and numbers["least_volume"] > SHRUNK

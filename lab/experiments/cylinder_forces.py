@@ -1,4 +1,4 @@
-"""Forces of a short cylinder that is stretched and sheared (thesis figure 6.4)."""
+"""Forces of a short cylinder that is stretched or sheared (thesis figure 6.4)."""
 
 from __future__ import annotations
 
@@ -20,24 +20,26 @@ from lab.experiments.experiment import (
 from lab.experiments.judgement import judged
 from taichi_soft import Material, TetMesh, cylinder, internal_forces
 
-YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # the thesis's
-POISSON = (0.0, 0.2, 0.4)  # it shows 0.2 and mentions others
+YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # those of the thesis [Pa, m]
+POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions others
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
-COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about the thesis's, and 2592
+COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about as many as in the thesis, and 2592
 EXACT = 0.01
-"""Relative error of a slope that counts as exact."""
+"""Largest relative error of a slope that counts as exact."""
 CLOSE = 0.15
-"""Relative error of a slope that counts as close, or a little under."""
+"""Largest relative error of a slope that counts as close."""
 NO_SHEAR = 0.01
-"""Shear force over tensile force that counts as none."""
+"""Largest shear force over tensile force that counts as zero."""
 SHAKEN = 0.2
-"""Largest random displacement of a vertex along an axis, over the mean length of an edge."""
+"""Largest random displacement of a vertex along an axis [mean edge length]."""
 STRAIGHT = 0.05
-"""Change of force over strain up to which a line counts as straight."""
+"""Largest relative change of force over strain along a curve that counts as straight."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Both directions with each nu; another E; ends that slide; an uneven mesh; a finer mesh."""
+    """List the points: both directions for each nu, another E, sliding ends, an uneven mesh, and a finer
+    mesh.
+    """
     is_full = effort is Effort.FULL
     count = 20 if is_full else 5
     usual = {"young": YOUNG, "slide": False, "mesh": list(COARSE), "shaken": False, "count": count}
@@ -51,7 +53,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Forces on the top up to a strain of 0.5; fewer if there is no state of rest."""
+    """Measure the forces on the top up to a strain of 0.5, or as far as an equilibrium is found."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     if point["shaken"]:
         mesh = _shaken(mesh)
@@ -74,7 +76,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _shaken(mesh: TetMesh) -> TetMesh:
-    """The mesh with the vertices inside moved at random: without the symmetry that cancels shear forces."""
+    """Move the inner vertices at random, to remove the symmetry that cancels shear forces."""
     x = mesh.vertices
     moves = np.random.default_rng(1).uniform(-SHAKEN, SHAKEN, x.shape) * mesh.edge_lengths.mean()
     is_inside = (np.hypot(x[:, 0], x[:, 1]) < 0.99 * RADIUS) & (np.abs(x[:, 2]) < 0.49 * HEIGHT)
@@ -82,7 +84,7 @@ def _shaken(mesh: TetMesh) -> TetMesh:
 
 
 def conclude(results: Results) -> Section:
-    """Judge slopes and curvature, and how they depend on nu and E."""
+    """Judge the slopes and the curvature of the forces, and their dependence on nu and E."""
     usual = {"young": YOUNG, "slide": False, "mesh": list(COARSE), "shaken": False}
     tension = {nu: results.one(way="tension", poisson=nu, **usual) for nu in POISSON}
     shear = {nu: results.one(way="shear", poisson=nu, **usual) for nu in POISSON}
@@ -237,7 +239,7 @@ def conclude(results: Results) -> Section:
 
 
 def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
-    """Largest shear force over the tensile force at the same strain."""
+    """Return the largest shear force over the tensile force at the same strain."""
     return max(
         float((np.hypot(n["shear"], n["aside"]) / np.abs(n["tension"])).max())
         for point, n in rows
@@ -246,7 +248,7 @@ def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
 
 
 def _ratio(numbers: Numbers, way: str, modulus: float) -> list[float]:
-    """Force over modulus, area and strain."""
+    """Return the force over modulus, area and strain, for each strain."""
     forces, strain = np.array(numbers[way]), np.array(numbers["strain"])
     return list((forces / (modulus * numbers["area"] * strain)).tolist())
 
@@ -285,4 +287,4 @@ CYLINDER_FORCES = Experiment(
     measure,
     conclude,
 )
-"""Figure 6.4."""
+"""The experiment of figure 6.4."""

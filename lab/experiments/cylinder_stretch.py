@@ -21,16 +21,18 @@ from lab.experiments.experiment import (
 from lab.experiments.judgement import judged, judged_but_for
 from taichi_soft import Material, cylinder, internal_forces
 
-RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # the thesis's
-POISSON = (0.4, 0.0, -0.4)  # of the negative one the thesis gives only the sign
-COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra, the thesis has 492; and 2592
+RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # those of the thesis [m, Pa]
+POISSON = (0.4, 0.0, -0.4)  # for the negative value, the thesis gives only the sign
+COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra (492 in the thesis), and 2592
 FURTHEST, MODERATE = 0.5, 0.25
 KEPT = 0.05
-"""Largest change of volume, over that at rest, that counts as kept."""
+"""Largest relative change of volume that counts as preserved."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each nu with the linearised strain; 0.4 with the exact one; and on a finer mesh."""
+    """List the points: each nu with the linearised strain, 0.4 with the exact strain, and each nu on a finer
+    mesh.
+    """
     is_full = effort is Effort.FULL
     usual = {"strain": "linear", "mesh": list(COARSE), "steps": 20 if is_full else 4}
     found = [{"poisson": nu, **usual} for nu in POISSON]
@@ -39,7 +41,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume, and width at half the height, over those at rest, for each stretch; the last shape."""
+    """Measure volume and width at mid-height over their rest values for each stretch, and store the last
+    shape.
+    """
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)
     stretch = [FURTHEST * (k + 1) / point["steps"] for k in range(point["steps"])]
@@ -58,7 +62,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge volume and width for each nu."""
+    """Judge the volume and the width for each nu."""
     usual = {"strain": "linear", "mesh": list(COARSE)}
     curves = {nu: results.one(poisson=nu, **usual) for nu in POISSON}
     exact = results.one(poisson=0.4, strain="exact", mesh=list(COARSE))
@@ -155,4 +159,4 @@ CYLINDER_STRETCH = Experiment(
     measure,
     conclude,
 )
-"""Figure 6.3 (b)."""
+"""The experiment of figure 6.3 (b)."""

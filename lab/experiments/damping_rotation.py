@@ -1,9 +1,9 @@
-"""Damping relative to the mean velocity of a tetrahedron brakes rotation, edge damping does not (section
+"""Damping relative to the mean velocity of a tetrahedron brakes rotation; edge damping does not (section
 6.4).
 
-A body rotates freely. From a stiff one, the first kind removes angular momentum at the rate b S / I, with I
-its moment of inertia about the axis and S the sum of squared distances, across the axis, of all tetrahedra's
-corners from their own centre.
+A stiff body rotates freely. The first kind of damping removes angular momentum at the rate b S / I. I is the
+moment of inertia about the axis. S sums the squared distances of each tetrahedron's corners from the
+tetrahedron's centre, measured perpendicular to the axis.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ from taichi_soft import Material, TetMesh, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.world.bare import bare_world
 
-YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # rad/s, so slow that nothing stretches
+YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # spin [rad/s] without visible stretch
 DT, SUBSTEPS = 1 / 60, 12
 MODELS = ("edge", "tet_mean")
 KEPT, RATE_ERROR = 1e-3, 0.05
-"""Loss of angular momentum that edge damping may cause, and relative deviation of the other's rate."""
+"""Largest relative loss of angular momentum with edge damping, and largest relative error of the other
+model's rate."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """A cube; with other damping constants, and the thesis's sphere, for a full report."""
+    """List the points: a cube, and for a full report also other damping constants and the thesis's sphere."""
     cases = [("cube", 10.0, 2.0)]
     if effort is Effort.FULL:
         cases += [("cube", 1.0, 10.0), ("cube", 100.0, 2.0), ("sphere", 100.0, 2.0)]
@@ -48,12 +49,14 @@ def points(effort: Effort) -> list[Point]:
 
 
 def body_mesh(name: str) -> TetMesh:
-    """A cube of 1 m, or the thesis's sphere."""
+    """Return the mesh of a cube of 1 m, or that of the thesis's sphere."""
     return box((1.0, 1.0, 1.0), (3, 3, 3)) if name == "cube" else load_mesh(ASSETS / "sphere.npz")
 
 
 def measure(point: Point) -> Numbers:
-    """Angular momentum about the axis over time, relative to the start, and the expected rate."""
+    """Measure the angular momentum over time, relative to its initial value, and compute the expected decay
+    rate.
+    """
     mesh = body_mesh(point["mesh"])
     world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
@@ -75,14 +78,14 @@ def measure(point: Point) -> Numbers:
 
 
 def rate(numbers: Numbers) -> float:
-    """Decay rate while more than a tenth is left [1/s]."""
+    """Return the decay rate, fitted while more than a tenth of the angular momentum is left [1/s]."""
     time, left = np.array([0.0, *numbers["time"]]), np.array([1.0, *numbers["left"]])
     seen = left > 0.1
     return 0.0 if seen.sum() < 2 else -float(np.polyfit(time[seen], np.log(left[seen]), 1)[0])
 
 
 def conclude(results: Results) -> Section:
-    """Judge the remaining spin."""
+    """Judge how much of the rotation remains with each damping model."""
     edge, mean = (results.one(mesh="cube", damping=10.0, model=model) for model in MODELS)
     lost = max(abs(1.0 - left) for left in edge["left"])
     keeps, brakes = lost < KEPT, mean["left"][-1] < 0.5

@@ -1,7 +1,7 @@
-"""A body that grows denser to the right is dropped (thesis figure 6.3).
+"""A body whose density increases to the right is dropped (thesis figure 6.3).
 
-Claim: the heavy side is compressed most, and bounces last and least. For comparison, a body with the mean
-density everywhere is dropped as well: its sides must not differ.
+The claim: its heavy side is compressed most, and bounces last and least. For comparison, a body with the same
+mean density everywhere is dropped; its sides must not differ.
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from lab.experiments.experiment import (
 from taichi_soft import Material, TetMesh, box
 from taichi_soft.world.bare import bare_world
 
-SIZE = (3.0, 1.5, 1.5)  # [m]
+SIZE = (3.0, 1.5, 1.5)  # edges of the body [m]
 LIGHT, HEAVY, YOUNG, POISSON, DAMPING = 200.0, 2000.0, 4e5, 0.2, 20.0
 DROP = 3.0  # initial height of the body's lower face [m]
 DT, SUBSTEPS = 0.01, 10
-TOUCH = 1e-3  # height below which a vertex lies on the floor [m]
+TOUCH = 1e-3  # height below which a vertex counts as lying on the floor [m]
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: growing and uniform density; for a full report on a finer mesh too."""
+    """List the points: increasing and uniform density, for a full report on a finer mesh too."""
     cells = (4,) if effort is Effort.QUICK else (4, 6)
     return [{"density": kind, "cells": count} for count in cells for kind in ("grows", "mean")]
 
 
 def block(cells: int) -> TetMesh:
-    """Block about its centre with the given number of cells along its height."""
+    """Make a block centred at the origin, with `cells` cells along its height."""
     mesh = box(SIZE, (2 * cells, cells, cells))
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
 
 def density_of(mesh: TetMesh, kind: str) -> NDArray[np.float64]:
-    """Density of each tetrahedron [kg/m^3]."""
+    """Return the density of each tetrahedron [kg/m^3]; `kind` is "grows" or "mean"."""
     right = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] / SIZE[0] + 0.5
     share = right if kind == "grows" else np.full(len(mesh.tets), 0.5)
     return LIGHT + (HEAVY - LIGHT) * share
 
 
 def measure(point: Point) -> Numbers:
-    """Height of both ends' bottoms and thickness of both ends, each over time, and four poses."""
+    """Measure the height of the lower edge and the thickness of each end over time, and store four poses."""
     mesh = block(point["cells"])
     substeps = SUBSTEPS * point["cells"] // 4
     world = bare_world(retries=0)
@@ -88,8 +88,10 @@ def measure(point: Point) -> Numbers:
 
 
 def side(numbers: Numbers, end: str) -> dict[str, float]:
-    """Compression of an end [1] in the first contact, time at which it leaves the floor for good [s], and
-    height that its bottom reaches before the body touches down again [m].
+    """Measure one end: "left" or "right".
+
+    Returns: "pressed", relative compression in the first contact; "leaves", time at which it leaves the floor
+        [s]; and "rises", height of its lower edge until the body touches down again [m].
     """
     height, thickness = np.array(numbers[f"{end}_height"]), np.array(numbers[f"{end}_thickness"])
     other = np.array(numbers["left_height" if end == "right" else "right_height"])
@@ -107,7 +109,7 @@ def side(numbers: Numbers, end: str) -> dict[str, float]:
 
 
 def conclude(results: Results) -> Section:
-    """Judge which side is compressed more, leaves later, and rises less."""
+    """Judge which side is compressed more, leaves the floor later, and rises less."""
     grows, even = (results.one(density=kind, cells=4) for kind in ("grows", "mean"))
     light, heavy = side(grows, "left"), side(grows, "right")
     most = heavy["pressed"] > light["pressed"]

@@ -1,4 +1,6 @@
-"""Stiffness of a body against a uniform stretch along any direction, from the work of the stretch."""
+"""Stiffness of a body against a uniform stretch along any direction, computed from the work of the
+stretch.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +13,11 @@ from taichi_soft.core.types import LawName
 Floats = NDArray[np.float64]
 
 STRETCH = 0.002
-"""Stretch; small, for the stiffness at rest."""
+"""Relative stretch, small enough to measure the stiffness at rest."""
 
 
 def directions(count: int) -> Floats:
-    """Unit vectors spread evenly over half a sphere (a Fibonacci lattice), (count, 3)."""
+    """Return unit vectors spread evenly over a hemisphere (Fibonacci lattice), (count, 3)."""
     i = np.arange(count) + 0.5
     z, turn = i / count, i * np.pi * (3 - 5**0.5)
     ring = np.sqrt(1 - z * z)
@@ -23,9 +25,10 @@ def directions(count: int) -> Floats:
 
 
 def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: Floats) -> float:
-    """Twice the work per volume and squared strain [Pa]: lambda + 2 mu of an isotropic material.
+    """Return the stiffness against a stretch without lateral contraction [Pa].
 
-    There is no displacement across the direction. The work is that of the forces at half the stretch.
+    It is twice the work per volume and squared strain. For an isotropic material it equals lambda + 2 mu. The
+    work is computed from the forces at half the stretch.
     """
     move = STRETCH * np.outer(mesh.vertices @ direction, direction)
     forces = internal_forces(mesh, material, mesh.vertices + move / 2, law=law)
@@ -33,5 +36,5 @@ def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: 
 
 
 def spread(values: Floats | list[float]) -> float:
-    """Largest less smallest over the mean."""
+    """Return the largest value minus the smallest, over the mean."""
     return float(np.ptp(values) / np.mean(values))

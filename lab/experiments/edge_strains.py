@@ -1,7 +1,7 @@
-"""Read the strain that a law of chapter 4 computes for one edge from the stiffness of the edge.
+"""Find the strain that a law of chapter 4 computes for an edge, from the stiffness of the edge.
 
-Moving a vertex changes the force at the other end of an edge: by a E / l along the law's direction of
-tension, and by a G / l across it. The eigenvectors of that matrix give the direction.
+Moving one end of an edge changes the force at the other end: by a E / l per metre along the law's direction
+of tension, and by a G / l across it. The eigenvectors of this stiffness matrix give the direction.
 """
 
 from __future__ import annotations
@@ -19,37 +19,47 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EdgeReading:
-    """Reading of one edge in a deformed body."""
+    """Direction of tension and stiffness of an edge in a deformed body."""
 
     normal: Floats  # the law's direction of tension, unit vector
-    tension_stiffness: float  # a E / l [N/m]
-    shear_stiffness: float  # a G / l [N/m]
+    tension_stiffness: float  # stiffness in tension, a E / l [N/m]
+    shear_stiffness: float  # stiffness in shear, a G / l [N/m]
 
 
 def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName) -> EdgeReading:
-    """Read the edge between vertices 0 and 1."""
+    """Read the edge between vertices 0 and 1 of a body at `positions`."""
     block = force_gradient(mesh, material, positions, law=law)[0, :, 1, :]
     values, vectors = np.linalg.eigh((block + block.T) / 2)
-    normal = vectors[:, 2]  # E is above G
+    normal = vectors[:, 2]  # the largest eigenvalue, because E > G
     if normal @ (positions[1] - positions[0]) < 0:
         normal = -normal
     return EdgeReading(normal, float(values[2]), float(values[0]))
 
 
 def strains(vector: Floats, normal: Floats) -> tuple[float, float]:
-    """Tensile and shear strain, eq. 4.3, of a vector of length 1 along the normal at rest."""
+    """Return the tensile and the shear strain (eq. 4.3) of an edge.
+
+    Args:
+        vector: the edge, which has length 1 and the direction of the normal at rest.
+        normal: direction of tension, a unit vector.
+    """
     stretch = float(normal @ vector)
     return stretch - 1, float(np.linalg.norm(vector - stretch * normal))
 
 
 def ringed_edge(count: int, radius: float = 1.0) -> TetMesh:
-    """An edge of length 1 along z between vertices 0 and 1, and vertices spread evenly around its centre."""
+    """Make a mesh of an edge of length 1 along z and `count` vertices spread evenly around its centre.
+
+    The edge joins vertices 0 and 1.
+    """
     turn = 2 * np.pi * np.arange(count) / count
     return edge_in_ring(radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1))
 
 
 def edge_in_ring(ring: Floats) -> TetMesh:
-    """The same edge with a ring of vertices (n, 3) around it, counterclockwise."""
+    """Make a mesh of an edge of length 1 along z and a ring of vertices (n, 3) around it,
+    counterclockwise.
+    """
     count = len(ring)
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     tets = [[0, 1, 2 + i, 2 + (i + 1) % count] for i in range(count)]

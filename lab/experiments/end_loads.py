@@ -1,7 +1,7 @@
-"""Loads on the ends of a bar along x: driven coordinates or forces, and their work.
+"""Loads on the ends of a bar along x: prescribed displacements or forces, and their work.
 
-All are of small strain, at most `STRAIN` within a uniform bar. Stiffness is defined by work: for a
-displacement q, the work of its reactions over q^2; for a force F, F^2 over its work.
+Strains in a uniform bar are at most `STRAIN`. Stiffness is defined by work. For a displacement q, it is the
+work of the reactions over q^2; for a force F, it is F^2 over the work of F.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class EndLoad:
     """A load on a bar.
 
     Args:
-        amplitude: q, the displacement [m or rad], or F, the force [N].
-        traction: (3,) on the right end [Pa]; zero for a displacement.
+        amplitude: the displacement q [m or rad] or the force F [N].
+        traction: traction on the right end, (3,) [Pa]; zero for a displacement.
     """
 
     loading: Loading
@@ -33,20 +33,20 @@ class EndLoad:
     traction: Floats
 
     def stiffness(self, settled: Equilibrium) -> float:
-        """Stiffness in equilibrium under the load [N/m or N m]."""
+        """Return the stiffness, from the equilibrium under the load [N/m or N m]."""
         work = float(((settled.reactions + self.loading.forces) * settled.displacement).sum())
         return self.amplitude**2 / work if self.traction.any() else work / self.amplitude**2
 
 
 def ends(mesh: TetMesh) -> tuple[Mask, Mask]:
-    """Masks of the vertices in the left and in the right end, (n,) each."""
+    """Return masks of the vertices at the left and at the right end, (n,) each."""
     x = mesh.vertices[:, 0]
     reach = 1e-9 * (x.max() - x.min())
     return x - x.min() < reach, x.max() - x < reach
 
 
 def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Loads on ends that are glued to rigid plates, of which the right one or both move."""
+    """Return loads by name for ends that are glued to rigid plates. The right plate or both move."""
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
@@ -64,11 +64,11 @@ def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Loads with a known solution: on ends that are free to contract or to warp, and a cantilever.
+    """Return loads with a known solution, by name: on ends that can contract or warp, and a cantilever.
 
-    Tension and bending displace the ends along x only, torsion across x only: with the stresses of a uniform
-    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends. In shear, the
-    whole surface slides uniformly along z, because free sides would bulge.
+    Tension and bending displace the ends along x only, torsion across x only. With the stresses of a uniform
+    bar and those of Saint-Venant, these are exact solutions of linear elasticity up to the ends. In shear,
+    the whole surface moves uniformly along z, because free sides would bulge.
     """
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
@@ -78,7 +78,7 @@ def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
     along[left | right, 0] = True
     low = np.flatnonzero(left)[np.argsort(y[left] + z[left])[0]]
     next_to = np.flatnonzero(left)[np.argsort(z[left] - y[left])[0]]
-    along[low, 1:] = along[next_to, 2] = True  # fixes the bar in y and z, and its rotation about x
+    along[low, 1:] = along[next_to, 2] = True  # fix y, z and the rotation about x
     across = np.zeros(mesh.vertices.shape, bool)
     across[left | right, 1:] = True
     across[low, 0] = True
@@ -99,7 +99,10 @@ def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def end_forces(mesh: TetMesh, traction: Floats) -> Floats:
-    """Forces of a traction on the right end [Pa], a third of each triangle's on its corners, (n, 3) [N]."""
+    """Return the vertex forces of a traction [Pa] on the right end, (n, 3) [N].
+
+    Each corner of a triangle receives a third of the triangle's force.
+    """
     _, right = ends(mesh)
     triangles: NDArray[np.int32] = mesh.surface[right[mesh.surface].all(axis=1)]
     corners = mesh.vertices[triangles]
@@ -110,10 +113,10 @@ def end_forces(mesh: TetMesh, traction: Floats) -> Floats:
 
 
 def theory(young: float, poisson: float, length: float, width: float) -> dict[str, float]:
-    """Stiffness under `free_ends` of a bar of square section.
+    """Return the stiffness of a bar of square section under the loads of `free_ends`, by name.
 
-    E A / L; G A / L; G J / L with Saint-Venant's J; E I / L; and Timoshenko's cantilever, with Cowper's shear
-    coefficient (1966) of a rectangle.
+    The formulas are E A / L, G A / L, G J / L with Saint-Venant's J, E I / L, and Timoshenko's cantilever
+    with Cowper's shear coefficient of a rectangle (1966).
     """
     shear, area, inertia = young / (2 * (1 + poisson)), width**2, width**4 / 12
     odd = np.arange(1, 40, 2)

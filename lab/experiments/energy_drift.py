@@ -1,8 +1,8 @@
-"""Undamped kinetic energy over time (thesis section 6.4): it accumulates, and very little damping stops it.
+"""Kinetic energy without damping over time (thesis section 6.4): it accumulates, and little damping stops it.
 
-The thesis's stress is not the derivative of an energy. The exception is the virial law at nu = 1/4, with
-W = 1/2 lambda (J (tr b - 5) + 2), b = F F^T. In this case, and under a law with an energy, the kinetic energy
-must not accumulate.
+The thesis's stress is not the derivative of an energy, except for the virial law at nu = 1/4, with W = 1/2
+lambda (J (tr b - 5) + 2) and b = F F^T. There, and under a law with an energy, kinetic energy must not
+accumulate.
 """
 
 from __future__ import annotations
@@ -29,19 +29,21 @@ from taichi_soft import Body, FrozenBodyWarning, Material, box
 from taichi_soft.world.bare import bare_world
 
 YOUNG, DENSITY, EDGE = 1e5, 1000.0, 1.0
-STRETCH, TWIST = 1.15, 0.4  # and rad/m, at the start
+STRETCH, TWIST = 1.15, 0.4  # initial stretch, and initial twist [rad/m]
 DT = 1 / 60
-READ_EVERY = 3  # steps
+READ_EVERY = 3  # steps between two measurements
 CONSERVATIVE = 0.25  # Poisson's ratio at which the linear virial stress has an energy
 LITTLE = 0.05
-"""Fraction of the critical damping of a cube's longest vibration that counts as "very little"."""
+"""Largest fraction of critical damping of a cube's longest vibration that counts as very little."""
 GROWS, STAYS = 1.15, 1.05
-"""Kinetic energy of the last quarter over that of the first, above which it grows and below which it
-stays."""
+"""Mean kinetic energy of the last quarter over that of the first: growing above the first value, constant
+below the second."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: Poisson's ratios of the thesis and 1/4 with little or no damping; the law with an energy."""
+    """List the points: Poisson's ratios of the thesis and 1/4, with little or no damping; a law with an
+    energy.
+    """
     seconds = 20.0 if effort is Effort.QUICK else 60.0
     cases = [("virial", nu, b, 6) for nu in (0.1, 0.25, 0.4) for b in (0.0, 10.0)]
     cases.append(("st_venant_kirchhoff", 0.1, 0.0, 6))
@@ -55,7 +57,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the energies of a floating cube that is released stretched and twisted."""
+    """Measure the energies over time of a cube that is released stretched and twisted, without gravity."""
     mesh = box((EDGE, EDGE, EDGE), (3, 3, 3))
     world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, point["poisson"], DENSITY, point["damping"], damping_ratio=0.0)
@@ -82,25 +84,28 @@ def measure(point: Point) -> Numbers:
 
 
 def _elastic_energy(body: Body, point: Point) -> float:
-    """Elastic energy of the conservative laws [J]."""
+    """Return the elastic energy of a law that has one [J]."""
     if point["law"] != "virial":
         return body.elastic_energy()
     F, now = body.deformations(), body.volumes()
-    per_volume = (F**2).sum(axis=(1, 2)) - 5  # J V0 is the present volume
+    per_volume = (F**2).sum(axis=(1, 2)) - 5  # times J V0, which is the current volume
     lam = YOUNG * point["poisson"] / ((1 + point["poisson"]) * (1 - 2 * point["poisson"]))
     return float(0.5 * lam * (now @ per_volume + 2 * EDGE**3))
 
 
 def growth(numbers: Numbers) -> float:
-    """Mean kinetic energy of the last quarter over that of the first; infinite if the body failed."""
+    """Return the mean kinetic energy of the last quarter over that of the first; infinite if the body
+    failed.
+    """
     kinetic = numbers["kinetic"]
     quarter = max(1, len(kinetic) // 4)
     return math.inf if numbers["frozen"] else float(np.mean(kinetic[-quarter:]) / np.mean(kinetic[:quarter]))
 
 
 def damping_ratio(numbers: Numbers) -> float:
-    """Fraction of critical damping. K decays with 2 zeta omega; omega is that of waves twice as long as the
-    edge.
+    """Return the fraction of critical damping.
+
+    Kinetic energy decays at the rate 2 zeta omega. omega is the frequency of waves twice as long as the edge.
     """
     time, kinetic = np.array(numbers["time"]), np.array(numbers["kinetic"])
     early = time < 5.0
@@ -109,7 +114,7 @@ def damping_ratio(numbers: Numbers) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether energy accumulates exactly where the stress has no energy."""
+    """Judge whether energy accumulates exactly if the stress has no energy."""
     undamped = {
         nu: results.one(law="virial", poisson=nu, damping=0.0, substeps=6) for nu in (0.1, CONSERVATIVE, 0.4)
     }
@@ -175,7 +180,9 @@ def conclude(results: Results) -> Section:
 
 
 def _least_damping(results: Results) -> float:
-    """Smallest damping that stops the growth at every Poisson's ratio, or the largest tried [N s/m]."""
+    """Return the smallest damping that stops the growth for every Poisson's ratio, or the largest tried [N
+    s/m].
+    """
     damped = {p["damping"] for p, _ in results.where(law="virial") if p["damping"] > 0.0}
     stops = [b for b in damped if max(growth(n) for _, n in results.where(law="virial", damping=b)) < 1.0]
     return float(min(stops) if stops else max(damped))

@@ -1,7 +1,6 @@
-"""Bodies at rest between plates: vertices at both ends are driven, the others move until they are free of
-force.
+"""Equilibrium of a body between plates: vertices on the plates are prescribed, the others move freely.
 
-Newton's method on the forces in float64 finds the state in which a damped body would come to rest.
+Newton's method on forces in float64 finds the state in which a damped body would come to rest.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ from lab.experiments.sparse_gradient import Floats, SparseGradient
 from taichi_soft.meshing import TetMesh
 
 Forces = Callable[[Floats], Floats]
-"""Function of positions (n, 3) [m] that returns forces (n, 3) [N]."""
+"""Function that maps positions (n, 3) [m] to forces (n, 3) [N]."""
 
 SMALLEST = 1e-9
-"""Largest remaining force on free coordinates, over the largest of all."""
+"""Largest remaining force on free coordinates, over the largest force."""
 DIFFERENCE = 1e-6
-"""Step of the finite differences, over the mean length of an edge."""
+"""Step of the finite differences [mean edge length]."""
 
 
 class Plates:
-    """A body about the origin with its lowest and highest vertices on plates across z.
+    """A body about the origin whose lowest and highest vertices are on plates across z.
 
     Args:
-        mesh: at rest, with the same cross-section at all heights.
-        slide: True if vertices on the plates can move along them; else they stay in place there.
+        mesh: the body at rest, with the same cross-section at all heights.
+        slide: True if vertices on the plates can slide along them; False fixes them to the plates.
     """
 
     def __init__(self, mesh: TetMesh, *, slide: bool = False) -> None:
@@ -42,10 +41,10 @@ class Plates:
         if slide:
             driven[:, :2] = False
             axis = np.hypot(*mesh.vertices[:, :2].T) + 1e9 * ~bottom
-            driven[axis.argmin(), :2] = True  # rigid motions of the body
+            driven[axis.argmin(), :2] = True  # fix rigid motions
             driven[np.where(bottom, mesh.vertices[:, 0], -np.inf).argmax(), 1] = True
         self.free: NDArray[np.int64] = np.flatnonzero(~driven)
-        """Coordinates, 3 vertex + axis."""
+        """Indices of free coordinates, 3 * vertex + axis."""
         self._gradient = SparseGradient(_neighbours(mesh), DIFFERENCE * float(mesh.edge_lengths.mean()))
 
     @property
@@ -54,16 +53,17 @@ class Plates:
         return self.mesh.volume / self.height
 
     def pull(self, forces: Floats) -> Floats:
-        """Force that drives the top plate, from the forces of the body there, (3,) [N]."""
+        """Return the force that moves the top plate (3,) [N], from the internal forces (n, 3)."""
         return np.asarray(-forces[self.top].sum(axis=0))
 
     def path(self, forces: Forces, direction: Sequence[float], shares: Sequence[float]) -> list[Floats]:
-        """States of rest while the top moves in `direction`, with the bottom fixed.
+        """Find the equilibria while the top moves in `direction` and the bottom is fixed.
 
         Args:
+            direction: displacement of the top per share [height of the body].
             shares: displacements of the top over the height, ascending from above 0, in steps small enough to
-                follow the branch from rest.
-        Returns: a state for each share, up to the first that has none.
+                follow the branch that begins at rest.
+        Returns: positions (n, 3) [m] for each share, up to the first share without an equilibrium.
         """
         z = self.mesh.vertices[:, 2:]
         x = self.mesh.vertices.copy()
@@ -78,7 +78,9 @@ class Plates:
         return states
 
     def rest(self, forces: Forces, start: Floats) -> Floats | None:
-        """Free coordinates at rest, found from `start`; None if the iteration fails."""
+        """Return the equilibrium positions (n, 3) [m], found from the positions `start`; None if Newton's
+        method fails.
+        """
         from scipy.sparse.linalg import splu
 
         x, f = start, forces(start)
@@ -106,12 +108,12 @@ class Plates:
         return None
 
     def gradient(self, forces: Forces, x: Floats) -> Any:
-        """df/dx of the free coordinates, a sparse matrix [N/m], by central differences."""
+        """Return df/dx of the free coordinates by central differences, a sparse matrix [N/m]."""
         return self._gradient.at(forces, x)[self.free][:, self.free].tocsc()
 
 
 def _neighbours(mesh: TetMesh) -> Any:
-    """True for vertices that are the same or share an edge: sparse, symmetric (n, n)."""
+    """Return a sparse, symmetric (n, n) matrix that is true for vertices that are equal or share an edge."""
     from scipy.sparse import csr_matrix
 
     every = np.arange(len(mesh.vertices))

@@ -1,7 +1,7 @@
-"""Experiments: points to measure one by one, and a conclusion from all of them.
+"""Experiments: points that are measured one by one, and a conclusion from all of them.
 
-A point is plain data, and so are its numbers. Points can therefore be computed in other processes, and stored
-in a file. The pages, plots and tables are made afterwards from these numbers.
+A point and its measured numbers are plain data, so points can be measured in other processes and stored in a
+file. Pages, plots and tables are made from these numbers afterwards.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from taichi_soft.core.errors import TaichiSoftError
 from taichi_soft.core.types import Choice
 
 Point = dict[str, Any]
-"""Names and values of the varied quantities: numbers, strings, booleans."""
+"""Values of the varied quantities, by name: numbers, strings, booleans."""
 
 Numbers = dict[str, Any]
-"""Measured numbers, strings, booleans and lists of these, in SI units."""
+"""Measured numbers, strings, booleans and lists of these, by name, in SI units."""
 
 
 class MissingPointError(TaichiSoftError):
-    """A conclusion needs a point that failed."""
+    """A point that a conclusion needs has failed."""
 
 
 class Effort(Choice):
@@ -35,7 +35,7 @@ class Effort(Choice):
 
 
 class Verdict(Choice):
-    """Result of a measurement for a claim."""
+    """Agreement of a measurement with a claim."""
 
     AGREES = "agrees"
     PARTLY = "agrees in part"
@@ -45,13 +45,13 @@ class Verdict(Choice):
 
 @dataclass(frozen=True)
 class Finding:
-    """Measurement and verdict for one claim.
+    """A measurement and its verdict on one claim.
 
     Args:
-        claim: its key in `CLAIMS`.
-        measured: a sentence with the figures and their units, and the tolerance of the verdict.
-        verdict: whether the figures agree with the claim.
-        why: reason if they do not, or only in part: model, mesh or reading of the text, and the evidence.
+        claim: key of the claim in `CLAIMS`.
+        measured: a sentence with the figures, their units, and the tolerance of the verdict.
+        verdict: agreement of the figures with the claim.
+        why: reason if they do not fully agree (model, mesh or reading of the text), with evidence.
     """
 
     claim: str
@@ -62,10 +62,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of numbers and words.
+    """A table of numbers and words.
 
     Args:
-        name: name of its file, unique within the experiment.
+        name: file name, unique within the experiment.
         columns: headings, with the unit in brackets: "force [N]".
     """
 
@@ -80,9 +80,9 @@ class Plot:
     """A plot.
 
     Args:
-        name: name of its file, unique within the experiment.
-        caption: one or two sentences: what is drawn, and what it shows.
-        draw: draws into an empty figure of matplotlib, with units on every axis.
+        name: file name, unique within the experiment.
+        caption: one or two sentences on what the plot shows.
+        draw: function that draws into an empty figure of matplotlib, with units on every axis.
         size: width and height [inches].
     """
 
@@ -94,7 +94,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of bodies, (height, width, 3) uint8, red first."""
+    """An image of bodies, RGB, uint8 (height, width, 3)."""
 
     name: str
     caption: str
@@ -106,7 +106,7 @@ class Section:
     """Conclusion of an experiment.
 
     Args:
-        text: paragraphs for a reader who knows the thesis: the set-up, and the result.
+        text: paragraphs on the set-up and the result, for a reader who knows the thesis.
     """
 
     text: tuple[str, ...]
@@ -118,7 +118,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Result:
-    """A point that was measured, or failed."""
+    """The numbers of a measured point, or its error."""
 
     point: Point
     numbers: Numbers | None
@@ -128,12 +128,12 @@ class Result:
 
 @dataclass(frozen=True)
 class Results:
-    """All points of an experiment."""
+    """Results of all points of an experiment."""
 
     rows: tuple[Result, ...] = field(default=())
 
     def where(self, **values: Any) -> list[tuple[Point, Numbers]]:
-        """Measured points with these values, in order, and their numbers."""
+        """Return the measured points with these values and their numbers, in order."""
         return [
             (row.point, row.numbers)
             for row in self.rows
@@ -141,7 +141,7 @@ class Results:
         ]
 
     def one(self, **values: Any) -> Numbers:
-        """Numbers of the only point with these values.
+        """Return the numbers of the only measured point with these values.
 
         Raises: MissingPointError if there is none, or more than one.
         """
@@ -152,7 +152,7 @@ class Results:
 
     @property
     def failed(self) -> list[Result]:
-        """Points that failed."""
+        """Results of the points that failed."""
         return [row for row in self.rows if row.numbers is None]
 
 
@@ -163,11 +163,11 @@ class Experiment:
     Args:
         name: short and unique, as in `python -m lab report NAME`.
         source: section or figure of the thesis, or the theory beyond it.
-        claims: keys in `CLAIMS`; its section has one finding for each.
-        points: points of a quick or a full report.
-        measure: function of a module that measures one point, in any process. The device was chosen before.
-        conclude: function of the measured points. Raises: MissingPointError if a needed point is missing.
-        is_timing: True if its points measure time: they run alone, one after the other.
+        claims: keys in `CLAIMS`; the section has one finding for each.
+        points: function that lists the points of a quick or a full report.
+        measure: module-level function that measures one point, in any process. The device is already chosen.
+        conclude: function that judges the results. Raises: MissingPointError if a needed point is missing.
+        is_timing: True if its points measure time. They then run alone, one after the other.
     """
 
     name: str
@@ -181,7 +181,7 @@ class Experiment:
 
 
 def section_of(experiment: Experiment, results: Results) -> Section:
-    """Conclusion from the results. If points are missing, its claims cannot be told."""
+    """Return the conclusion of an experiment. If points are missing, its verdicts are "cannot be told"."""
     try:
         return experiment.conclude(results)
     except MissingPointError as error:

@@ -1,4 +1,4 @@
-"""Decay by both Euler methods (thesis figure 3.1): y' = lambda y with lambda < 0, y(0) = 1.
+"""Exponential decay with both Euler methods (thesis figure 3.1): y' = lambda y with lambda < 0 and y(0) = 1.
 
 y is the velocity of a damped particle without other forces.
 """
@@ -26,21 +26,21 @@ from lab.experiments.oscillators import SLACK, run_oscillators
 EULER = ("explicit_euler", "implicit_euler")
 INTEGRATORS = (*EULER, "leapfrog")
 RATES = (-0.1, -0.25, -0.5, -0.75, -1.5)
-"""h lambda; at the last value, explicit Euler changes sign in every step."""
+"""Values of h lambda. For the last one, explicit Euler changes the sign of y in every step."""
 
 DRAWN = -0.5
 START = 1e-2
-"""y(0) [m/s]; times and velocities are divided by it."""
+"""Initial velocity y(0) [m/s]; measured velocities are divided by it."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: each method, over 6 or 20 steps."""
+    """List the points: each method, over 6 or 20 steps."""
     steps = 6 if effort is Effort.QUICK else 20
     return [{"integrator": name, "steps": steps} for name in INTEGRATORS]
 
 
 def measure(point: Point) -> Numbers:
-    """Compute y after each step, for each of `RATES`."""
+    """Measure y after each step, for each of `RATES`."""
     none = np.zeros(len(RATES))
     _, v = run_oscillators(
         point["integrator"], none + SLACK, -np.array(RATES), (none, none + START), point["steps"]
@@ -49,9 +49,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge on which side of the exact curve each method lies, at steps for which explicit Euler keeps the
-    sign.
-    """
+    """Judge on which side of the exact curve each method lies, for steps that keep the sign of y."""
     found = {name: results.one(integrator=name) for name in INTEGRATORS}
     steady = [rate for rate in RATES if rate > -1]
 

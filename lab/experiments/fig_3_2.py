@@ -1,7 +1,7 @@
-"""A standing wave by both Euler methods (thesis figure 3.2): the first mode of a row of springs.
+"""A standing wave with both Euler methods (thesis figure 3.2): the first mode of a row of springs.
 
-The row discretises the wave equation. Its modes and their change of amplitude per step are known exactly:
-explicit Euler multiplies it by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides by that.
+The row discretises the wave equation. Its modes and the change of amplitude per step are known exactly:
+explicit Euler multiplies the amplitude by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides by it.
 """
 
 from __future__ import annotations
@@ -29,27 +29,30 @@ from taichi_soft.world.bare import bare_world
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
-"""Particles between the fixed ones. With more, explicit Euler amplifies round-off in higher modes first."""
+"""Number of particles between the fixed ends. With more, explicit Euler first amplifies round-off in higher
+modes."""
 
 PERIODS = 2
 AMPLITUDE = 0.05
 """Amplitude of the middle particle [m]; the springs are 1 m long."""
 
 ANGLES = (0.05, 0.1)
-"""Values of h w."""
+"""Values of h w: step length times angular frequency."""
 
 DRAWN = 0.1
 STEADY = 0.02
-"""Change of amplitude over the whole run that counts as none."""
+"""Largest relative change of amplitude over a run that counts as constant."""
 
 
 def points(_: Effort) -> list[Point]:
-    """Points: each method and step, also in a quick report."""
+    """List the points: each method and step length."""
     return [{"integrator": name, "angle": angle} for name in INTEGRATORS for angle in ANGLES]
 
 
 def measure(point: Point) -> Numbers:
-    """Displacement of the mode and its amplitude after each step of 1 s, over those at the start."""
+    """Measure the displacement of the mode and its amplitude after each step of 1 s, over the initial
+    amplitude.
+    """
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2
@@ -82,13 +85,13 @@ def measure(point: Point) -> Numbers:
 
 
 def per_step(integrator: IntegratorName, angle: float) -> float:
-    """Factor on the amplitude in one step, in closed form."""
+    """Return the exact factor on the amplitude per step; `angle` is h w."""
     growth = float(np.hypot(1.0, angle))
     return {"explicit_euler": growth, "implicit_euler": 1 / growth}.get(integrator, 1.0)
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether amplitudes grow or decay, and at the correct rate."""
+    """Judge whether the amplitudes grow or decay, and whether the rate is correct."""
     findings, rows = [], []
     for claim, name in (
         ("wave-explicit", INTEGRATORS[0]),

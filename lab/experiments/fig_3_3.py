@@ -1,7 +1,7 @@
-"""Regions of stability (thesis figure 3.3), from steps of damped oscillators.
+"""Regions of stability (thesis figure 3.3), measured from steps of damped oscillators.
 
-m u'' = -k u - b u' has the eigenvalues lambda and its conjugate. h lambda takes the points of a grid. With b
->= 0 it lies in the left half of the plane or on the imaginary axis.
+An oscillator m u'' = -k u - b u' has the eigenvalue lambda and its conjugate. Each oscillator realises one
+point h lambda of a grid. Because b >= 0, the grid covers the left half of the plane and the imaginary axis.
 """
 
 from __future__ import annotations
@@ -28,20 +28,23 @@ from taichi_soft.core.types import IntegratorName
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler")
 LEFT, TOP = -3.0, 2.4
-"""Bounds of the plane of h lambda; its lower half mirrors the upper."""
+"""Bounds of the plane of h lambda. The lower half mirrors the upper one."""
 
 CLOSE = 1e-3
-"""Distance of the closed form from 1 below which a point is not judged: rounding of float32 decides there."""
+"""Distance of the exact factor from 1 below which a point is not judged, because rounding of float32 decides
+there."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: each method on a grid of 31 x 16 or 76 x 40 values."""
+    """List the points: each method on a grid of 31 x 16 or 76 x 40 values."""
     cells = 10 if effort is Effort.QUICK else 25
     return [{"integrator": name, "cells": cells} for name in INTEGRATORS]
 
 
 def grid(cells: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Real and imaginary parts of h lambda: the imaginary axis, and centres of the cells to its left."""
+    """Return the real and imaginary parts of h lambda: the imaginary axis, and centres of the cells to its
+    left.
+    """
     step = 1.0 / cells
     x = np.append(-(np.arange(round(-LEFT * cells)) + 0.5)[::-1] * step, 0.0)
     y = (np.arange(round(TOP * 2 / 3 * cells)) + 0.5) * step * 1.5
@@ -49,7 +52,7 @@ def grid(cells: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def measure(point: Point) -> Numbers:
-    """Largest factor of a step at each point of the grid, row by row from the real axis up."""
+    """Measure the largest factor of a step at each point of the grid, row by row from the real axis up."""
     x, y = grid(point["cells"])
     z = (x + 1j * y[:, None]).ravel()
     factors = step_factors(point["integrator"], np.abs(z) ** 2, -2 * z.real)
@@ -57,12 +60,12 @@ def measure(point: Point) -> Numbers:
 
 
 def closed_form(integrator: IntegratorName, z: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Factor of a step, eq. 3.5 and 3.6."""
+    """Return the exact factor of a step at each h lambda (eq. 3.5 and 3.6)."""
     return np.asarray(np.abs(1 + z) if integrator == "explicit_euler" else np.abs(1 / (1 - z)))
 
 
 def conclude(results: Results) -> Section:
-    """Judge where the measured factor and the closed form lie on different sides of 1."""
+    """Judge for which points the measured and the exact factor lie on different sides of 1."""
     rows, wrong_of, worst_of, maps = [], {}, {}, {}
     for name in INTEGRATORS:
         measured = np.array(results.one(integrator=name)["factor"])

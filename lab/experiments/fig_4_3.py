@@ -1,4 +1,4 @@
-"""Strain of an edge in a body that is stretched at an angle to it (thesis section 4.3, figure 4.3)."""
+"""Strain of an edge in a body that is stretched at an angle to the edge (thesis section 4.3, figure 4.3)."""
 
 from __future__ import annotations
 
@@ -24,34 +24,35 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 POISSONS = (0.0, 0.25)
 STRETCHES = (0.01, 0.3)
-"""Stretches: a small one, to compare with components of strain, and one as large as in a drawing."""
+"""Relative stretches: a small one, to compare with the strain tensor, and one as large as in a drawing."""
 
 THESIS_ANGLE = 30
 """Angle of figure 4.3 (b) [degrees]."""
 
 WRONG = 0.1
-"""Error of a reading, over the stretch, from which it counts as wrong."""
+"""Error of a strain over the stretch above which it counts as wrong."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: angles between edge and stretch [degrees], and Poisson's ratios."""
+    """List the points: angles between edge and stretch [degrees], for each Poisson's ratio."""
     step = 30 if effort is Effort.QUICK else 5
     return [{"angle": angle, "poisson": nu} for nu in POISSONS for angle in range(0, 91, step)]
 
 
 def measure(point: Point) -> Numbers:
-    """Strains that CMPM reads in an edge of a body stretched along z, by `STRETCHES`, and the stress of its
-    face [Pa].
+    """Measure the strains that CMPM computes for an edge, and the stress on the edge's face.
 
-    The stress is given along and across the normal, in a bar that is stretched by the first and becomes
-    thinner.
+    Returns: "tensile" and "shear", strains of the edge in a body stretched along z by each of `STRETCHES`;
+        "stress", along and across the normal of the face in a bar that is stretched by the first and
+            contracts
+        laterally [Pa].
     """
     turn = np.radians(point["angle"])
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
     upright = ringed_edge(4)
     mesh = TetMesh(upright.vertices @ rotation.T, upright.tets)
     material = Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)
-    r = mesh.vertices[1] - mesh.vertices[0]  # 1 m
+    r = mesh.vertices[1] - mesh.vertices[0]  # length 1 m
     found: Numbers = {"tensile": [], "shear": []}
     for stretch in STRETCHES:
         F = np.diag([1, 1, 1 + stretch])
@@ -69,20 +70,24 @@ def measure(point: Point) -> Numbers:
 
 
 def components(angle: float, stretch: float) -> tuple[float, float]:
-    """Components of the strain tensor along the edge, and across it as an angle, for a small stretch."""
+    """Return the tensile component of the strain tensor along the edge, and the shear angle, for a small
+    stretch.
+    """
     turn = np.radians(angle)
     return float(stretch * np.cos(turn) ** 2), float(stretch * np.sin(2 * turn))
 
 
 def traction(angle: float, stretch: float) -> tuple[float, float]:
-    """Stress on the edge's face in a bar in tension, along and across its normal [Pa], by Hooke's law."""
+    """Return the stress on the edge's face in a bar in tension, along and across its normal [Pa], by Hooke's
+    law.
+    """
     turn = np.radians(angle)
     pull = float(YOUNG * stretch * np.cos(turn))
     return pull * float(np.cos(turn)), pull * float(np.sin(turn))
 
 
 def conclude(results: Results) -> Section:
-    """Compare readings with the components of strain, and stresses with Hooke's law."""
+    """Compare the strains with the strain tensor, and the stresses with Hooke's law."""
     s = STRETCHES[0]
     angles = sorted({int(point["angle"]) for point, _ in results.where(poisson=POISSONS[1])})
     at = {nu: {angle: results.one(angle=angle, poisson=nu) for angle in angles} for nu in POISSONS}

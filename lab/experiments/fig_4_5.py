@@ -1,5 +1,5 @@
-"""One element stretched along many axes (thesis figure 4.5): a regular tetrahedron instead of the triangle
-there.
+"""An element that is stretched along many axes (thesis figure 4.5): a tetrahedron instead of the thesis's
+triangle.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 LAWS = ("cmpm", "cmpm2", "virial")
 APART = "nu = 0.25, G = E / 20"
-"""An independent shear modulus, as the laws of chapter 4 allow."""
+"""Name of a material with an independent shear modulus, as the laws of chapter 4 allow."""
 
 PLAIN, JUDGED = "nu = 0", "nu = 0.25"
 MATERIALS = {
@@ -44,26 +44,27 @@ COMBINATIONS = [
     if law != "virial" or material.shear_modulus is None
 ]
 ANISOTROPIC = 0.01
-"""Spread of the stiffness over all directions above which it is not rounding: the virial law has 1e-9."""
+"""Spread of the stiffness over all directions above which a law is anisotropic. Rounding causes 1e-9."""
 
 REGULAR = float(np.degrees(np.arctan(np.sqrt(0.5))))
 APEX_ANGLES = (25.0, 30.0, REGULAR, 45.0)
-"""Angles between the pull and the edges at the pulled particle [degrees], of slender, regular and flat
+"""Angles between the pull and the edges at the pulled particle [degrees], for slender, regular and flat
 tetrahedra. The thesis gives no angle."""
 
 STRETCHES = (0.01, 0.3, 1.0)
-"""Stretches of the body: a small one, and one as large as in a drawing. The thesis gives none."""
+"""Relative stretches of the body: small ones, and one as large as in a drawing. The thesis gives none."""
 
 MUCH = 2.0
-"""Shear strain over tensile strain above which it counts as much larger."""
+"""Shear strain over tensile strain above which shear counts as much larger."""
 
 SMALL = 0.5
-"""Tensile strain over the stretch below which it counts as small."""
+"""Tensile strain over the stretch below which tension counts as small."""
 
 
 def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
-    """A tetrahedron on a base with edges of 1 m. Three edges meet in vertex 1 at the top, at `apex_angle`
-    [degrees] to z.
+    """Make a tetrahedron on a regular base with edges of 1 m.
+
+    Three edges meet at its top, vertex 1, at `apex_angle` [degrees] to the z axis.
     """
     turn = 2 * np.pi * np.arange(3) / 3
     base = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) / np.sqrt(3)
@@ -73,8 +74,8 @@ def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: each law and material, along 40 or 400 directions; and readings of tetrahedra of several
-    heights.
+    """List the points: each law and material along 40 or 400 directions, and the strains of several
+    tetrahedra.
     """
     count = 40 if effort is Effort.QUICK else 400
     return [
@@ -84,8 +85,8 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness along every direction [Pa], or the reading by CMPM2 of an edge at a pulled top vertex for
-    `STRETCHES`.
+    """Measure the stiffness in every direction [Pa], or the strains of an edge at a pulled top vertex with
+    CMPM2.
     """
     if "apex" in point:
         mesh, material = tetrahedron(point["apex"]), MATERIALS[JUDGED]
@@ -99,7 +100,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _reading(results: Results) -> Finding:
-    """Judge whether an edge at the pulled particle reads little tension and much more shear."""
+    """Judge whether CMPM2 computes little tension and much more shear for an edge at the pulled particle."""
     told, holds = [], []
     for angle in APEX_ANGLES:
         numbers = results.one(apex=angle)
@@ -124,7 +125,7 @@ def _reading(results: Results) -> Finding:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the spread of the stiffness of each law, and the readings."""
+    """Judge the spread of each law's stiffness, and the strains of CMPM2."""
     spreads = {
         (law, name): spread(results.one(law=law, material=name)["moduli"]) for law, name in COMBINATIONS
     }

@@ -1,4 +1,4 @@
-"""Angles of best fitting planes and of split rings to their edges (thesis section 4.4.2, figure 4.7)."""
+"""Angles of best fitting planes and split rings to their edges (thesis section 4.4.2, figure 4.7)."""
 
 from __future__ import annotations
 
@@ -27,29 +27,31 @@ from taichi_soft.meshing import EdgeRings
 
 BEAM = "beam with hole"
 THESIS_COUNTS = {2: 140, 3: 1386, 4: 2091, 5: 1874, 6: 1820, 7: 1449, 8: 753, 9: 250, 10: 60, 11: 10, 12: 2}
-"""Edges by the number of particles round them, of the thesis's beam with a hole (1679 particles)."""
+"""Number of edges by the number of particles around them, in the thesis's beam with a hole (1679
+particles)."""
 
 FITTED, SPLIT = "best_fitting_plane", "split_ring_plane"
 LAWS = {FITTED: "best fitting plane", SPLIT: "split ring", "cmpm2": "subfaces (CMPM2)"}
 FAR, MANY = 30.0, 0.1
-"""Angle that counts as far from perpendicular [degrees], and share of the edges that counts as many. The
+"""Angle that counts as far from perpendicular [degrees], and fraction of the edges that counts as many. The
 thesis has a box plot without figures."""
 NEAR, FEW = 10.0, 0.1
-"""Angle between the normals up to which a cheap one represents a fitted one [degrees], and share of the edges
-that may lie beyond it."""
+"""Angle between a cheap and a fitted normal up to which the cheap one is a good approximation [degrees], and
+fraction of the edges that may exceed it."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """The beam with a hole, a ball, and blocks that are even and uneven."""
+    """List the points: the beam with a hole, a ball, an even block and an uneven block."""
     size = 4 if effort is Effort.QUICK else 8
     return [{"mesh": name, "size": size} for name in (BEAM, "ball", "block", "uneven block")]
 
 
 def measure(point: Point) -> Numbers:
-    """Angles between edges and normals, and between fitted and cheap normals, in percentiles [degrees].
+    """Measure the angles between edges and normals, and between fitted and cheap normals, in percentiles
+    [degrees].
 
-    Edges with two particles around them are left out. With three, both normals are the same: the angles
-    between the normals leave these out too.
+    Edges with two particles around them are omitted. Edges with three have equal fitted and cheap normals,
+    and the angles between normals omit them too.
     """
     mesh = mesh_of(point["mesh"], point["size"])
     edge, _ = EdgeRings.of(mesh).neighbours
@@ -77,7 +79,9 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the share of planes that are far off, on a mesh like the thesis's and on others."""
+    """Judge the fraction of planes that are far from perpendicular, on a mesh like the thesis's and on
+    others.
+    """
     beam = results.one(mesh=BEAM)[FITTED]
     rows = [(point["mesh"], numbers) for point, numbers in results.where()]
     shares = ", ".join(f"{name} {100 * n[FITTED]['far']:.0f} %" for name, n in rows)

@@ -1,4 +1,4 @@
-"""Every law against an independent finite element code on the same mesh (beyond the thesis)."""
+"""Compare every law with an independent finite element code on the same mesh (not in the thesis)."""
 
 from __future__ import annotations
 
@@ -30,18 +30,20 @@ from taichi_soft import Material, TetMesh
 YOUNG, DENSITY = 1e6, 1000.0
 LENGTH, WIDTH = 4.0, 1.0
 AGREEMENT = 0.01
-"""Tolerance of stiffness and displacement: strains of 1e-4 cause errors of a few hundredths of it."""
+"""Tolerance of stiffness and displacement. Strains of 1e-4 cause errors of a few hundredths of it."""
 BEAM = ("tension", "shear", "torsion", "bending")
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: every law at nu = 0.3 on a coarse mesh, or at three ratios on a finer one."""
+    """List the points: every law for nu = 0.3 on a coarse mesh, or for three ratios on a finer mesh."""
     cells, ratios = (2, (0.3,)) if effort is Effort.QUICK else (5, (0.0, 0.25, 0.4))
     return [{**variant, "poisson": nu, "cells": cells} for nu in ratios for variant in variants(effort)]
 
 
 def measure(point: Point) -> Numbers:
-    """Stiffness and displacement of beam and block, over those of linear finite elements on the same mesh."""
+    """Measure stiffness and displacement of beam and block over those of linear finite elements on the same
+    mesh.
+    """
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
     beam = irregular_block(LENGTH, WIDTH, point["cells"])
     block = irregular_block(WIDTH, WIDTH, point["cells"])
@@ -67,7 +69,7 @@ def _compared(mesh: TetMesh, loads: dict[str, EndLoad], material: Material, poin
 
 
 def conclude(results: Results) -> Section:
-    """Judge: laws on tetrahedra agree, laws along edges do not."""
+    """Judge whether laws on tetrahedra agree with finite elements, and laws along edges do not."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     solid = [(point, numbers) for point, numbers in rows if is_tetrahedral(point["law"])]
     bonds = [numbers for point, numbers in rows if not is_tetrahedral(point["law"])]
@@ -169,7 +171,10 @@ def _ratio(numbers: Numbers) -> float:
 
 
 def _why(solid: list[tuple[Point, Numbers]]) -> str:
-    """Name the laws that differ most. The mesh is the same, so the model is the reason."""
+    """Return a reason that names the laws that differ most.
+
+    The mesh is the same, so the model is the cause.
+    """
     furthest = max(solid, key=lambda row: max(abs(_ratio(row[1][load]) - 1) for load in (*BEAM, "block")))
     return f"model: mesh and material are the same in both; {label(furthest[0])} is furthest away"
 
@@ -183,4 +188,4 @@ FINITE_ELEMENTS = Experiment(
     measure,
     conclude,
 )
-"""Comparison with finite elements."""
+"""The experiment that compares laws with finite elements."""

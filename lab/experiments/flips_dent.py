@@ -1,7 +1,7 @@
-"""Tetrahedra inverted by a hard impact (thesis section 6.6): they stay as dents.
+"""Tetrahedra that invert on a hard impact (thesis section 6.6): they stay inverted, as dents.
 
-The thesis's sphere is thrown at the floor with three treatments of inverted tetrahedra: the thesis's, none,
-and one that restores them.
+The thesis's sphere is thrown at the floor with three treatments of inverted tetrahedra: that of the thesis,
+none, and one that restores them.
 """
 
 from __future__ import annotations
@@ -31,23 +31,24 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=1e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
-SPEED, HEIGHT = 20.0, 1.05  # of the sphere that is thrown down, of radius 1 m
-STEP = 1 / 700  # the thesis's [s]
+SPEED, HEIGHT = 20.0, 1.05  # initial speed [m/s] and height [m] of the sphere
+STEP = 1 / 700  # length of a step, that of the thesis [s]
 SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
 MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
-"""Fraction of all tetrahedra that makes a dent; of those inverted at half-time that are so at the end; of
-these in the most compressed quarter (0.25 by chance); extent over that at rest of a body that failed."""
+"""Fraction of inverted tetrahedra that makes a dent; fraction of those inverted at half-time that are still
+inverted at the end; fraction of these in the most compressed quarter (0.25 by chance); extent over that at
+rest above which a body failed."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: every treatment of flips at one speed, or at three."""
+    """List the points: every treatment of flips at one speed, or at three."""
     speeds = (SPEED,) if effort is Effort.QUICK else (17.0, SPEED, 24.0)
     return [{"flips": flips, "speed": speed} for speed in speeds for flips in FLIPS]
 
 
 def measure(point: Point) -> Numbers:
-    """Measure which tetrahedra invert and where, over the impact and a few seconds."""
+    """Measure which tetrahedra invert during the impact and in the seconds after it."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     rest = mesh.vertices
     world = bare_world(retries=0)
@@ -99,7 +100,9 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether flips leave dents in the compressed region, and whether the rest is intact."""
+    """Judge whether flips leave dents in the compressed region, and whether the other tetrahedra are
+    intact.
+    """
     by_flips = {flips: results.one(flips=flips, speed=SPEED) for flips in FLIPS}
     thesis = {point["speed"]: numbers for point, numbers in results.where(flips="tolerant")}
     dented = [speed for speed, numbers in thesis.items() if _is_dented(numbers)]
@@ -175,7 +178,7 @@ def _listed(values: Iterable[float]) -> str:
 
 
 def _is_dented(numbers: Numbers) -> bool:
-    """True if flips stay, and are where the compression was largest."""
+    """True if inverted tetrahedra stay, and lie where the compression was largest."""
     return bool(numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS and numbers["in_pressed"] > PLACED)
 
 

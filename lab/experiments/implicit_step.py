@@ -1,6 +1,6 @@
-"""Gain of implicit Euler for CMPM (thesis section 4.2): length of a step, and rate of the simulation.
+"""Gain of implicit Euler for CMPM (thesis section 4.2): step length and simulation rate.
 
-A stiff sphere falls onto the floor, with leapfrog and its largest step, and with implicit Euler.
+A stiff sphere falls onto the floor with leapfrog and its largest step, and with implicit Euler.
 """
 
 from __future__ import annotations
@@ -39,19 +39,20 @@ from lab.experiments.timing import in_turns
 from taichi_soft.core.types import IntegratorName
 
 THESIS_GAIN = 100.0
-"""Step of implicit Euler over that of leapfrog in the thesis: 1e-2 s instead of 1e-4 s."""
+"""Step of implicit Euler over the step of leapfrog in the thesis: 1e-2 s over 1e-4 s."""
 
 THESIS_RATES = (20.0, 30.0)
 RATE_TOLERANCE = 1.5
-"""Factor by which a gain may lie outside `THESIS_RATES`: a linear solve costs more on some processors."""
+"""Factor by which a gain may lie outside `THESIS_RATES`, because a linear solve costs more on some
+processors."""
 
 EXPLICIT, IMPLICIT = (0.9, 1.3), (10.0, THESIS_GAIN, 300.0)
-"""Steps, over leapfrog's largest stable one."""
+"""Step lengths over leapfrog's largest stable step, for leapfrog and for implicit Euler."""
 STEPS: dict[IntegratorName, tuple[float, ...]] = {"leapfrog": EXPLICIT, "implicit_euler": IMPLICIT}
 
 
 def points(effort: Effort) -> list[Point]:
-    """Falls with several steps, and the times of both integrators in turns."""
+    """List the points: falls with several step lengths, and the times of both integrators."""
     resolution, repeats = (3, 2) if effort is Effort.QUICK else (5, 5)
     falls = [(name, factor) for name, factors in STEPS.items() for factor in factors]
     common = {"resolution": resolution}
@@ -62,7 +63,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Height and volume frame by frame; or the least seconds that each frame takes with both integrators."""
+    """Measure a fall, or the shortest time of each frame with both integrators [s]."""
     if point["run"] == "fall":
         return fall(Drop(point["integrator"], point["factor"], point["resolution"]))
     slow, fast = np.array([_in_turns(point) for _ in range(point["repeats"])]).min(axis=0)
@@ -70,7 +71,10 @@ def measure(point: Point) -> Numbers:
 
 
 def _in_turns(point: Point) -> tuple[list[float], list[float]]:
-    """Times of all frames [s]. The worlds end with the call: later ones compile nothing."""
+    """Return the times of all frames with leapfrog and with implicit Euler [s].
+
+    Frames of both alternate. The worlds are dropped at the end of the call; later calls compile nothing.
+    """
     explicit = Drop("leapfrog", EXPLICIT[0], point["resolution"])
     implicit = Drop("implicit_euler", point["factor"], point["resolution"])
     return in_turns(explicit.frame, implicit.frame, FRAMES)
@@ -89,7 +93,9 @@ def _up_to(step: float) -> str:
 def _rate_finding(
     rates: Numbers, keeps_bounce: bool, rebounds: dict[tuple[IntegratorName, float], float]
 ) -> Finding:
-    """A gain within the thesis's range, widened by the tolerance; in part if it costs the bounce."""
+    """Judge the gain in rate by the thesis's range and its tolerance; it agrees only in part if the bounce is
+    lost.
+    """
     gain = sum(rates["explicit"]) / sum(rates["implicit"])
     low, high = THESIS_RATES[0] / RATE_TOLERANCE, THESIS_RATES[1] * RATE_TOLERANCE
     slow, fast = rebounds["leapfrog", EXPLICIT[0]], rebounds["implicit_euler", THESIS_GAIN]
@@ -117,7 +123,7 @@ def _rate_finding(
 
 
 def conclude(results: Results) -> Section:
-    """Judge the steps by the falls, and the rate by the times."""
+    """Judge the step lengths by the falls, and the rate by the times."""
     falls: dict[tuple[IntegratorName, float], Numbers] = {
         (name, factor): results.one(run="fall", integrator=name, factor=factor)
         for name, factors in STEPS.items()

@@ -1,7 +1,7 @@
-"""Gain of implicit Euler for tetrahedra (thesis section 6.5): seconds with it, and with leapfrog.
+"""Gain of implicit Euler for tetrahedra (thesis section 6.5): its computing time compared with leapfrog's.
 
-A sphere falls onto the floor. Three materials are compared, because the gain grows with the stiffness:
-leapfrog then needs shorter steps, and implicit Euler does not.
+A sphere falls onto the floor. The gain grows with the stiffness, because leapfrog then needs shorter steps
+and implicit Euler does not; so three materials are compared.
 """
 
 from __future__ import annotations
@@ -31,16 +31,20 @@ BODIES: dict[str, tuple[Material, tuple[float, ...]]] = {
     "stiff": (Material(1e8, 0.3, 1000.0, 1000.0, damping_ratio=0.0), (10.0, 30.0, 100.0)),
     "very stiff": (MATERIAL, (10.0, 100.0, 300.0)),
 }
-"""Material, and steps of implicit Euler over the largest stable step of leapfrog, up to about one a frame."""
+"""Material, and steps of implicit Euler over leapfrog's largest stable step, up to about one step per
+frame."""
 
 EXPLICIT = 0.9
-"""Step of leapfrog, over its largest stable one."""
+"""Step of leapfrog over its largest stable step."""
 PAYS = 1.5
-"""Gain from which implicit Euler counts as paying: less may be the noise of a clock on a busy machine."""
+"""Smallest gain that counts as an advantage; smaller gains may be noise on a busy machine."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Falls with each step; for a quick report of a coarse sphere, without the very stiff one."""
+    """List the points: falls with each step.
+
+    A quick report uses a coarse sphere and omits the stiffest one.
+    """
     is_full = effort is Effort.FULL
     common = {"resolution": 5 if is_full else 3, "repeats": 3 if is_full else 2}
     names = list(BODIES) if is_full else list(BODIES)[:2]
@@ -53,7 +57,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """The fall frame by frame; and the least seconds of each frame in turns with leapfrog."""
+    """Measure a fall, and with implicit Euler also the shortest times of its frames in alternation with
+    leapfrog.
+    """
     material, resolution = BODIES[point["body"]][0], point["resolution"]
 
     def drop(integrator: Any, factor: float) -> Drop:
@@ -170,4 +176,4 @@ IMPLICIT_TETRAHEDRA = Experiment(
     conclude,
     is_timing=True,
 )
-"""Implicit Euler for tetrahedra."""
+"""The experiment on implicit Euler for tetrahedra."""

@@ -1,6 +1,6 @@
 """Orders of the integrators (thesis section 3.5), and accuracy of lazy leapfrog.
 
-An oscillator is released from rest and compared with the cosine.
+An oscillator is released from rest, and its motion is compared with the cosine.
 """
 
 from __future__ import annotations
@@ -24,31 +24,35 @@ from lab.experiments.experiment import (
 from lab.experiments.oscillators import run_oscillators
 
 ORDERS = {"explicit_euler": 1, "lazy_leapfrog": 1, "leapfrog": 2, "implicit_euler": 1}
-"""Theoretical orders, of position and velocity at the same time. The thesis states all but that of lazy
+"""Theoretical orders for position and velocity at the same time. The thesis gives all except that of lazy
 leapfrog."""
 
 ORDER_TOLERANCE = 0.15
 START = 0.02
-"""Displacement at the start [m]; errors are divided by it."""
+"""Initial displacement [m]; errors are divided by it."""
 
 STEPS = (32, 64, 128, 256)
-"""Steps in one period; with more, rounding of float32 dominates."""
+"""Numbers of steps per period. With more, rounding of float32 dominates."""
 
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
-"""h w and length of the long run."""
+"""h w and number of periods of the long run."""
 
 NEARLY = 5.0
-"""Largest error over leapfrog's in the long run that counts as nearly as good."""
+"""Largest error over that of leapfrog in the long run that counts as nearly as good."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: each integrator over one period at four steps, and over ten periods at one step."""
-    del effort  # both take a second
+    """List the points: each integrator over one period with four step lengths, and over ten periods
+    with one.
+    """
+    del effort  # both take about 1 s
     return [{"integrator": name, "run": run} for name in ORDERS for run in ("period", "long")]
 
 
 def measure(point: Point) -> Numbers:
-    """Errors of one period, or displacements of the long run; these also from a changed first velocity."""
+    """Measure the error over one period, or the displacements of the long run, also from a shifted initial
+    velocity.
+    """
     name = point["integrator"]
     if point["run"] == "period":
         angles = 2 * np.pi / np.array(STEPS)
@@ -59,7 +63,7 @@ def measure(point: Point) -> Numbers:
         return {"errors": [float(gap[: n + 1, i].max()) for i, n in enumerate(STEPS)]}
     k = LONG_ANGLE**2
     steps = round(LONG_PERIODS * 2 * np.pi / LONG_ANGLE)
-    # Add half a kick, so that leapfrog's first half kick gives the velocity of lazy leapfrog's whole one.
+    # With half a kick added, leapfrog's first half kick gives the velocity of lazy leapfrog's full kick.
     kicked = ((START, START), (0.0, -k * START / 2))
     u, _ = run_oscillators(name, (k, k), (0.0, 0.0), kicked, steps)
     return {
@@ -69,7 +73,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the slopes of the errors, and the errors of the long run over leapfrog's."""
+    """Judge the slopes of the errors, and the errors of the long run over those of leapfrog."""
     errors = {name: results.one(integrator=name, run="period")["errors"] for name in ORDERS}
     slopes = {name: float(np.log2(e[-3] / e[-1])) / 2 for name, e in errors.items()}
     long = {name: results.one(integrator=name, run="long") for name in ORDERS}

@@ -1,4 +1,4 @@
-"""Cubes of irregular tetrahedra, like those of a mesher."""
+"""Cubes of irregular tetrahedra, like those from a mesher."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from taichi_soft import TetMesh, box, delaunay_mesh
 
 SHAKEN = 0.25
-"""Largest displacement of a vertex along an axis, over the edge of a cell."""
+"""Largest displacement of a vertex along an axis [cell edge]."""
 
 
 def cube(cells: int, seed: int | None = None) -> TetMesh:
-    """A cube of edge 1 m about the origin.
+    """Make a cube of edge 1 m about the origin.
 
     Args:
-        cells: number along each edge.
-        seed: seed of the displacements. Vertices on the surface move along it. Delaunay's rule then connects
-            them anew. None leaves a regular grid.
+        cells: number of cells along each edge.
+        seed: seed of the random displacements. Vertices on the surface move along it, and Delaunay's rule
+            reconnects all vertices. None keeps a regular grid.
     """
     regular = box((1.0, 1.0, 1.0), (cells, cells, cells))
     if seed is None:

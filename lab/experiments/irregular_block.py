@@ -1,4 +1,4 @@
-"""A block of tetrahedra of many shapes and directions, which favours no law."""
+"""A block of tetrahedra of many shapes and orientations, which favours no law."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ import numpy as np
 from taichi_soft import TetMesh
 
 JITTER = 0.12
-"""Largest random displacement of vertices, over the edge of a cell."""
+"""Largest random displacement of a vertex [cell edge]."""
 FLAT = 1e-6
-"""Volume over that of a cell, below which a tetrahedron consists of four points in one face of the block."""
+"""Volume over that of a cell below which the four corners of a tetrahedron lie in one face of the block."""
 
 
 def irregular_block(length: float, width: float, cells: int) -> TetMesh:
-    """A block of square section about the origin, its axis along x; deterministic.
+    """Make a block of square section about the origin, with its axis along x. The result is deterministic.
 
-    A body-centred lattice, with vertices moved at random within the block's faces and edges, and connected so
-    that all circumspheres are empty. Corners, edges and faces of the block stay exactly in place.
+    The vertices form a body-centred lattice, are moved at random within the block's faces and edges, and are
+    connected by Delaunay's rule. Corners, edges and faces of the block stay exact.
     Args:
-        length, width: edges along x, and along y and z [m]; length should be a whole number of cells.
-        cells: number across the width.
+        length, width: edge along x, and edges along y and z [m]; `length` should be an integer number of
+            cells.
+        cells: number of cells across the width.
     """
     from scipy.spatial import Delaunay
 

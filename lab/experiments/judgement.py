@@ -1,4 +1,7 @@
-"""Findings from booleans, for a claim as a whole, for its parts or for several meshes; ranges of numbers."""
+"""Make findings from booleans: for a claim as a whole, its parts, or several meshes.
+
+Format ranges of numbers.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +13,18 @@ from lab.experiments.experiment import Finding, Verdict
 
 @dataclass(frozen=True)
 class Span:
-    """Several numbers, which an f-string prints as one, or as the smallest and the largest."""
+    """Several numbers that an f-string formats as their range, or as one number."""
 
     values: Collection[float]
 
     def __format__(self, how: str) -> str:
-        """Format both ends; one number if they look the same."""
+        """Format the smallest and the largest number; only one if both look the same."""
         low, high = format(min(self.values), how), format(max(self.values), how)
         return low if low == high else f"{low} to {high}"
 
 
 def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
-    """Finding that agrees, or differs for the given reason."""
+    """Make a finding that agrees, or differs for the reason `why`."""
     if agrees:
         return Finding(claim, measured, Verdict.AGREES)
     return Finding(claim, measured, Verdict.DIFFERS, why)
@@ -30,7 +33,7 @@ def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
 def judged_but_for(
     claim: str, measured: str, agrees: bool, why: str, exceptions: Collection[str], because: str
 ) -> Finding:
-    """Finding that agrees, agrees except for `exceptions`, or differs for the reason `why`.
+    """Make a finding that agrees, agrees except for `exceptions`, or differs for the reason `why`.
 
     Args:
         exceptions: names for which the claim does not hold, such as laws.
@@ -44,7 +47,7 @@ def judged_but_for(
 
 
 def judged_on_meshes(claim: str, measured: str, agrees: Collection[bool], why: str) -> Finding:
-    """Finding that agrees if it does on every mesh, differs on none, and else cannot be told.
+    """Make a finding that agrees if all meshes agree, differs if none do, and otherwise cannot be told.
 
     The thesis does not publish its meshes.
     """

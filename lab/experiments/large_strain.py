@@ -1,4 +1,4 @@
-"""Strains of over 100 % with the laws of chapter 6 (thesis chapter 7)."""
+"""Strains above 100 % with the laws of chapter 6 (thesis chapter 7)."""
 
 from __future__ import annotations
 
@@ -21,24 +21,28 @@ from lab.experiments.judgement import judged_but_for
 from taichi_soft import Material, cylinder, internal_forces
 
 RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6
-"""Cylinder of figure 6.3 (b) [m, Pa]."""
+"""Cylinder of figure 6.3 (b): radius and height [m], Young's modulus [Pa]."""
 MESH = (2, 10)
-"""Rings and layers: 720 tetrahedra."""
+"""Rings and layers of the cylinder's mesh, which has 720 tetrahedra."""
 POISSON = (0.0, 0.1, 0.2, 0.3, 0.4)
 STRAINS = ("linear", "exact")
 WANTED, FURTHEST = 1.0, 1.2
-"""Strain of the claim, and strain up to which the cylinder is stretched."""
+"""Strain of the claim, and largest strain tried."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each nu with the linearised and the exact strain; for a quick report two with the linearised one."""
+    """List the points: each nu with the linearised and the exact strain; two linearised ones in a quick
+    report.
+    """
     if effort is Effort.QUICK:
         return [{"poisson": nu, "strain": "linear", "steps": 12} for nu in (0.0, 0.4)]
     return [{"poisson": nu, "strain": strain, "steps": 24} for strain in STRAINS for nu in POISSON]
 
 
 def measure(point: Point) -> Numbers:
-    """Force over E A s, volume and the smallest tetrahedron over those at rest, as far as there is a rest."""
+    """Measure force over E A s, volume and smallest tetrahedron over their rest values, as far as equilibria
+    exist.
+    """
     mesh = cylinder(RADIUS, HEIGHT, *MESH)
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)
 
@@ -58,18 +62,18 @@ def measure(point: Point) -> Numbers:
 
 
 def reach(numbers: Numbers) -> float:
-    """Largest stretch with a state of rest in which no tetrahedron is inverted."""
+    """Return the largest stretch whose equilibrium has no inverted tetrahedron."""
     sound = [s for s, v in zip(numbers["stretch"], numbers["smallest"], strict=True) if v > 0]
     return float(max(sound, default=0.0))
 
 
 def width_limit(nu: float) -> float:
-    """Stretch at which the linearised strain leaves a bar no width: 1 - nu (2 s + s^2) = 0."""
+    """Return the stretch at which the linearised strain gives a bar zero width: 1 - nu (2 s + s^2) = 0."""
     return float(np.sqrt(1 + 1 / nu) - 1) if nu > 0 else np.inf
 
 
 def conclude(results: Results) -> Section:
-    """Judge how far each nu can be stretched."""
+    """Judge how far the cylinder can be stretched with each nu."""
     found = {(p["strain"], p["poisson"]): n for p, n in results.where()}
     linear = {nu: n for (strain, nu), n in found.items() if strain == "linear"}
     results.one(poisson=0.0, strain="linear")
@@ -154,4 +158,4 @@ LARGE_STRAIN = Experiment(
     measure,
     conclude,
 )
-"""Strains of over 100 %."""
+"""The experiment on strains above 100 %."""

@@ -1,4 +1,4 @@
-"""Stability of a body under a law: from its vibrations at rest, and by running it."""
+"""Stability of a body under a law, from its vibrations at rest and from a run."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from taichi_soft.world.bare import bare_world
 
 STEPS = 200
 GROWTH = 3.0
-"""Growth of a small random displacement within `STEPS` that counts as unstable."""
+"""Growth of a small random displacement within `STEPS` steps above which a body counts as unstable."""
 
 SHORTEST, LONGEST, HALVINGS = 0.25, 1.4, 7
-"""Bounds of the search for the largest step, over a guess, and number of halvings: to 1 %."""
+"""Bounds of the search for the largest step [estimated step], and number of bisections, for a precision of 1
+%."""
 
 
 @dataclass(frozen=True)
 class Vibration:
-    """Small motion about the rest shape, without damping."""
+    """Small undamped vibrations about the rest shape."""
 
-    frequency: float  # highest [1/s]
-    growth_rate: float  # largest [1/s]: forces without an energy can feed a vibration at any step
+    frequency: float  # highest angular frequency [1/s]
+    growth_rate: float  # largest [1/s]; forces without an energy can amplify a vibration at any step length
 
 
 def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
-    """Compute all eigenvalues of M^-1 K, with K from differences of the forces."""
+    """Compute the vibrations from all eigenvalues of M^-1 K, with K by finite differences of the forces."""
     count = mesh.vertices.size
     nudge = 1e-6 * float(mesh.edge_lengths.min())
     stiffness = np.empty((count, count))
@@ -42,13 +43,13 @@ def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
         stiffness[:, k] = (behind - ahead).ravel() / (2 * nudge)
     mass = np.repeat(bare_world(floor=None, retries=0).add_body(mesh, material, law=law).masses, 3)
     squares = np.linalg.eigvals(stiffness / mass[:, None])
-    squares = squares[np.abs(squares) > 1e-6 * np.abs(squares).max()]  # without rigid motion
+    squares = squares[np.abs(squares) > 1e-6 * np.abs(squares).max()]  # without rigid motions
     roots = np.sqrt(squares.astype(complex))
     return Vibration(float(roots.real.max()), float(np.abs(roots.imag).max()))
 
 
 class ShakenBody:
-    """A body that is displaced slightly at random, again and again."""
+    """A body that can be run repeatedly from small random displacements."""
 
     def __init__(self, mesh: TetMesh, material: Material, law: LawName) -> None:
         """Build a world without gravity."""
@@ -60,7 +61,7 @@ class ShakenBody:
         self.noise = size * np.random.default_rng(0).normal(size=self.rest.shape)
 
     def stays(self, h: float) -> bool:
-        """True if it stays near its shape over `STEPS` of leapfrog of h [s]."""
+        """True if the body stays close to its rest shape over `STEPS` steps of leapfrog of h [s]."""
         far = GROWTH * np.abs(self.noise).max()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UnstableStepWarning)
@@ -73,7 +74,7 @@ class ShakenBody:
         return True
 
     def largest_step(self) -> float:
-        """Largest step with which it stays [s]; 0 if it fails at `SHORTEST` too."""
+        """Return the largest step at which the body is stable [s]; 0 if it is unstable at `SHORTEST`."""
         guess = self.body.stable_step.limit
         low, high = SHORTEST * guess, LONGEST * guess
         if not self.stays(low):

@@ -1,4 +1,4 @@
-"""Laws and their strains, by the names that points of experiments use."""
+"""Laws and their strains, as points of experiments name them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from taichi_soft.elements.laws import BondLaw
 
 
 def variants(effort: Effort) -> list[Point]:
-    """{"law": name, "strain": name or None}, those on tetrahedra first. A quick report omits the exact strain
-    by faces, whose forces are those of the virial theorem.
+    """List {"law": name, "strain": name or None}, first those on tetrahedra.
+
+    A quick report omits the exact strain by faces, because its forces equal those of the virial law.
     """
     every = [
         {"law": law.name, "strain": strain and strain.value}
@@ -28,5 +29,5 @@ def is_tetrahedral(law: LawName) -> bool:
 
 
 def label(point: Point) -> str:
-    """Label for rows of tables."""
+    """Return the label of a point for tables."""
     return str(point["law"]) + (f", {point['strain']} strain" if point["strain"] else "")

@@ -1,7 +1,7 @@
-"""Leapfrog is reversible (thesis section 3.5.2): with all velocities reversed, a body returns.
+"""Leapfrog is reversible (thesis section 3.5.2): with all velocities reversed, a body returns to its start.
 
-Between steps, a World's positions and velocities belong to one time, so a run can be reversed after any step.
-The remaining error is round-off, and information that the integrator loses.
+Between steps, positions and velocities of a World belong to the same time, so a run can be reversed after any
+step. The remaining error is round-off, and information that the integrator loses.
 """
 
 from __future__ import annotations
@@ -28,21 +28,23 @@ from taichi_soft.world.bare import bare_world
 INTEGRATORS = ("explicit_euler", "lazy_leapfrog", "leapfrog", "implicit_euler")
 MATERIAL = Material(
     young=1e5, poisson=0.3, density=1000.0, damping_ratio=0.0
-)  # undamped: damping has a direction in time
+)  # undamped, because damping is irreversible
 STRETCH, DT, SUBSTEPS = 1.1, 1 / 60, 8
 REVERSIBLE = 1e-4
-"""Distance left over the distance travelled: a few millionths for round-off, more than a hundredth for other
-integrators."""
+"""Largest remaining distance over the distance travelled of a reversible integrator. Round-off causes a few
+millionths, other integrators more than a hundredth."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: explicit integrators over 0.1 s, or all over 0.5 s."""
+    """List the points: explicit integrators over 0.1 s, or all integrators over 0.5 s."""
     steps, names = (6, INTEGRATORS[:3]) if effort is Effort.QUICK else (30, INTEGRATORS)
     return [{"integrator": name, "steps": steps} for name in names]
 
 
 def measure(point: Point) -> Numbers:
-    """Distance of a stretched cube from its start, after as many steps back as forth."""
+    """Measure the distance of a stretched cube from its start, after equal numbers of steps forwards and
+    backwards.
+    """
     cube = box(cells=(2, 2, 2))
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")
@@ -60,7 +62,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge: only leapfrog returns."""
+    """Judge whether only leapfrog returns to the start."""
     shares = {}
     for row in results.rows:
         numbers = results.one(**row.point)

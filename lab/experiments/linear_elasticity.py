@@ -1,4 +1,4 @@
-"""Linear elasticity by scikit-fem, a finite element code that shares nothing with this package."""
+"""Linear elasticity by scikit-fem, a finite element code that shares no code with this package."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class FiniteElements:
     """Finite elements on the tetrahedra of the same mesh, with linear or quadratic displacements."""
 
     def __init__(self, mesh: TetMesh, material: Material, *, quadratic: bool = False) -> None:
-        """Assemble the stiffness; `quadratic`: ten nodes per tetrahedron instead of four."""
+        """Assemble the stiffness matrix; `quadratic` elements have ten nodes instead of four."""
         from skfem import Basis, ElementTetP1, ElementTetP2, ElementVector, MeshTet
         from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -30,7 +30,7 @@ class FiniteElements:
         self._solvers: dict[bytes, Any] = {}
 
     def solve(self, load: EndLoad) -> tuple[float, Floats]:
-        """Stiffness as in `EndLoad.stiffness`, and displacements of the vertices, (n, 3) [m]."""
+        """Return the stiffness, as `EndLoad.stiffness`, and the displacements of the vertices, (n, 3) [m]."""
         held, u = self._held(load)
         pull = self._pull(load)
         free = ~held
@@ -43,12 +43,12 @@ class FiniteElements:
         return stiffness, np.asarray(u[self._basis.nodal_dofs].T)
 
     def _held(self, load: EndLoad) -> tuple[Mask, Floats]:
-        """Driven degrees of freedom, and their displacements."""
+        """Return the mask of prescribed degrees of freedom, and their displacements."""
         held, u = np.zeros(self._basis.N, bool), np.zeros(self._basis.N)
         driven, nodal = load.loading.driven, self._basis.nodal_dofs.T
         held[nodal] = driven
         u[nodal] = np.where(driven, load.loading.displacement, 0.0)
-        if self._quadratic:  # nodes at midpoints of edges with two driven ends follow these
+        if self._quadratic:  # midpoints of edges with two prescribed ends follow their ends
             first, second = self._skfem_mesh.edges
             middle = self._basis.edge_dofs.T
             held[middle] = driven[first] & driven[second]
@@ -56,7 +56,7 @@ class FiniteElements:
         return held, u
 
     def _pull(self, load: EndLoad) -> Floats:
-        """Traction on the right end as forces on degrees of freedom."""
+        """Return the forces on degrees of freedom from the traction on the right end [N]."""
         from skfem import FacetBasis, LinearForm
 
         if not load.traction.any():

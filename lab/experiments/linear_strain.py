@@ -25,23 +25,23 @@ KINDS = ("stretch", "shear")
 YOUNG = 1e6
 TET = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
 SMALL = 0.1
-"""Strain that counts as small."""
+"""Largest strain that counts as small."""
 CLOSE = 0.1
-"""Relative error that counts as close."""
+"""Largest relative error that counts as close."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: both deformations, at strains up to 100 %."""
+    """List the points: both deformations, with strains up to 100 %."""
     steps = 100 if effort is Effort.FULL else 20
     return [{"kind": kind, "steps": steps} for kind in KINDS]
 
 
 def measure(point: Point) -> Numbers:
-    """Strain from the forces on a tetrahedron, linearised and exact, and in closed form.
+    """Measure the strain from the forces on a tetrahedron, linearised and exact, and compute both exactly.
 
-    For nu = 0 the stress is E times the strain. The force on a vertex is the stress times a third of the area
-    vector of the opposite face. The result is the strain along the stretch, or its largest off-diagonal
-    entry.
+    For nu = 0, the stress is E times the strain. The force on a vertex is the stress times a third of the
+    area vector of the opposite face. The result is the strain along the stretch, or the off-diagonal entry of
+    a shear.
     """
     amounts = [(k + 1) / point["steps"] for k in range(point["steps"])]
     told = {name: [_told(point["kind"], e, name) for e in amounts] for name in ("linear", "exact")}
@@ -54,11 +54,11 @@ def measure(point: Point) -> Numbers:
 
 
 def _told(kind: str, amount: float, strain: StrainName) -> float:
-    """Strain from the forces of the library."""
+    """Return the strain that the library's forces imply."""
     x = TET.vertices @ _deformation(kind, amount).T
     forces = internal_forces(TET, Material(YOUNG, 0.0, 1000.0, damping_ratio=0.0), x, strain=strain)
     arms = x[1:] - x[0]
-    areas = np.stack([np.cross(arms[(i + 1) % 3], arms[(i + 2) % 3]) for i in range(3)])  # inwards, twice
+    areas = np.stack([np.cross(arms[(i + 1) % 3], arms[(i + 2) % 3]) for i in range(3)])  # twice the area
     stress = np.linalg.solve(-areas / 6, forces[1:]).T
     return float((stress[0, 0] if kind == "stretch" else stress[0, 1]) / YOUNG)
 
@@ -70,17 +70,20 @@ def _deformation(kind: str, amount: float) -> FloatArray:
 
 
 def _linear(kind: str, e: float) -> float:
-    """1/2 (F F^T - I), eq. 6.7."""
+    """Return the entry of the strain 1/2 (F F^T - I), eq. 6.7, along the stretch or off the diagonal."""
     return e + e**2 / 2 if kind == "stretch" else e / 2
 
 
 def _exact(kind: str, e: float) -> float:
-    """sqrt(F F^T) - I; for a shear, the root of [[1 + e^2, e], [e, 1]] by its trace and determinant 1."""
+    """Return the entry of the strain sqrt(F F^T) - I along the stretch or off the diagonal.
+
+    For a shear, the root of [[1 + e^2, e], [e, 1]] follows from its trace and its determinant 1.
+    """
     return e if kind == "stretch" else float(e / np.sqrt(4 + e**2))
 
 
 def conclude(results: Results) -> Section:
-    """Judge the error against the exact strain, and check that the library computes both."""
+    """Judge the error of the linearised strain, and check that the library computes both."""
     numbers = {kind: results.one(kind=kind) for kind in KINDS}
     amount = np.array(numbers["stretch"]["amount"])
     errors = {kind: np.array(n["linear"]) / np.array(n["exact"]) - 1 for kind, n in numbers.items()}
@@ -145,4 +148,4 @@ LINEAR_STRAIN = Experiment(
     measure,
     conclude,
 )
-"""The linearised strain."""
+"""The experiment on the linearised strain."""

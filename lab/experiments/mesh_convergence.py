@@ -1,4 +1,4 @@
-"""Errors against the resolution of the mesh (beyond the thesis)."""
+"""Errors against the mesh resolution (not in the thesis)."""
 
 from __future__ import annotations
 
@@ -25,27 +25,28 @@ LOADS = ("tension", "torsion", "bending")
 """Loads for which theory is exact up to the ends."""
 SOLID, SPRINGS = "virial", "springs"
 EXACT = 1e-3
-"""Error of tension on any mesh, of the size of the strain."""
+"""Largest error of tension on any mesh, about the size of the strain."""
 ORDERS = (1.5, 2.5)
-"""Linear tetrahedra are of second order in energy, and so in stiffness."""
+"""Range of the expected order: linear tetrahedra are of second order in energy, and therefore in
+stiffness."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """2 to 6 cells across, or to 10."""
-    counts = (6, 4, 3, 2) if effort is Effort.QUICK else (10, 8, 6, 4, 3, 2)  # fields of the first serve all
+    """List the points: each law and finite elements with 2 to 6 or 2 to 10 cells across."""
+    counts = (6, 4, 3, 2) if effort is Effort.QUICK else (10, 8, 6, 4, 3, 2)  # later ones reuse fields
     return [
         {"law": law, "strain": None, "cells": cells} for law in (SOLID, SPRINGS, LINEAR) for cells in counts
     ]
 
 
 def measure(point: Point) -> Numbers:
-    """Errors of stiffness, over theory's, by load."""
+    """Measure the relative error of the stiffness for each load."""
     numbers = stiffness_over_theory(point, LENGTH, LOADS)
     return {**numbers, **{load: numbers[load] - 1 for load in LOADS}}
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether errors fall with the square of the size of the cells."""
+    """Judge whether the errors fall with the square of the cell size."""
     order = (SOLID, SPRINGS, LINEAR).index
     ordered = sorted(results.rows, key=lambda row: (order(row.point["law"]), row.point["cells"]))
     results = Results(tuple(ordered))
@@ -92,11 +93,11 @@ def conclude(results: Results) -> Section:
         for law, by_load in errors.items():
             for load, values in by_load.items():
                 if law == LINEAR and load == "tension":
-                    continue  # exact to round-off, far below the rest
+                    continue  # exact up to round-off, far below the others
                 of_order = f", order {orders[law, load]:.2f}" if (law, load) in orders else ""
                 (line,) = axes.loglog(cells, np.abs(values), styles[law], color=colours[load], markersize=5)
                 line.set_label(f"{names.get(law, law)}, {load}{of_order}")
-                if law == LINEAR:  # rings round what lies below
+                if law == LINEAR:  # rings, so that marks below stay visible
                     line.set(markersize=11, fillstyle="none")
         axes.loglog(cells, 2.0 * np.array(cells, float) ** -2, color="0.6", linewidth=1, label="order 2")
         axes.set_xticks(cells, [str(count) for count in cells])
@@ -160,7 +161,7 @@ def _falls(errors: list[float]) -> bool:
 
 
 def _order(cells: list[int], errors: list[float]) -> float:
-    """Slope of -log error over log cells, by least squares; NaN if an error is zero."""
+    """Return the slope of -log(error) over log(cells) by least squares; NaN if an error is zero."""
     sizes = np.log(np.array(cells, float))
     with np.errstate(divide="ignore"):
         logs = np.log(np.abs(errors))
@@ -178,4 +179,4 @@ CONVERGENCE = Experiment(
     measure,
     conclude,
 )
-"""Finer meshes."""
+"""The experiment on finer meshes."""

@@ -1,7 +1,7 @@
-"""Small angles reduce stability, and so does a high Poisson's ratio (thesis section 6.6).
+"""Small dihedral angles and a high Poisson's ratio reduce stability (thesis section 6.6).
 
 A cube is degraded by flattening one inner tetrahedron or one layer of cells. Its largest stable step is
-estimated at rest, and measured with longer and longer steps.
+estimated at rest, and measured by running it with increasing steps.
 """
 
 from __future__ import annotations
@@ -31,23 +31,25 @@ from taichi_soft.world.bare import bare_world
 YOUNG, DENSITY = 1e6, 1000.0
 KINDS = ("tetrahedron", "layer")
 SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
-"""Height of the flattened part over that of the regular mesh."""
-STEPS = np.geomspace(3e-4, 9e-3, 44)  # [s], 8 % apart
+"""Height of the flattened part over its regular height."""
+STEPS = np.geomspace(3e-4, 9e-3, 44)  # lengths of substeps, 8 % apart [s]
 RUN, GROWN = 400, 100.0
-"""Substeps of a run, and growth of the kinetic energy beyond which the step is too long."""
+"""Number of substeps in a run, and growth of the kinetic energy above which the step is too long."""
 HALVED = 0.8
-"""Share of the best step below which stability counts as lost."""
+"""Fraction of the best step below which stability counts as lost."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: Poisson's ratios; the cubes share one world."""
+    """List the points: one per Poisson's ratio. The cubes of a point run in one world."""
     ratios = (0.1, 0.4) if effort is Effort.QUICK else (0.0, 0.1, 0.2, 0.3, 0.4, 0.45)
     return [{"poisson": nu} for nu in ratios]
 
 
 def spoilt_cube(kind: str, share: float) -> TetMesh:
-    """A cube of 1 m and 3 cells per side, with a tetrahedron or a layer flattened to this fraction of its
-    height.
+    """Make a cube of 1 m with 3 cells per side, with a part flattened to the fraction `share` of its height.
+
+    Args:
+        kind: "tetrahedron" or "layer".
     """
     mesh = box((1.0, 1.0, 1.0), (3, 3, 3))
     x = mesh.vertices.copy()
@@ -63,13 +65,15 @@ def spoilt_cube(kind: str, share: float) -> TetMesh:
 
 
 def cubes() -> list[tuple[str, float, TetMesh]]:
-    """Cubes of every kind and share, the regular one first."""
+    """List kind, share and mesh of all cubes, the regular one first."""
     spoilt = [(kind, share, spoilt_cube(kind, share)) for kind in KINDS for share in SHARES[1:]]
     return [("sound", 1.0, spoilt_cube("layer", 1.0)), *spoilt]
 
 
 def measure(point: Point) -> Numbers:
-    """Smallest dihedral angle, estimated largest stable step, and the steps that were stable or not."""
+    """Measure for each cube the smallest dihedral angle, the estimated largest stable step, the longest step
+    at which it was stable, and the shortest at which it was not.
+    """
     meshes = [mesh for _, _, mesh in cubes()]
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
     world = bare_world(gravity=(0, 0, 0), retries=0)
@@ -108,7 +112,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the largest stable step by the smallest angle, and by Poisson's ratio."""
+    """Judge the largest stable step against the smallest angle and against Poisson's ratio."""
     ratios = sorted(point["poisson"] for point, _ in results.where())
     by_ratio = {nu: results.one(poisson=nu) for nu in ratios}
     names = [(kind, share) for kind, share, _ in cubes()]

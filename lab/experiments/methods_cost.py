@@ -1,4 +1,4 @@
-"""Forces by faces and by the virial theorem, and their cost beside springs (thesis 6.6, 6.7)."""
+"""Forces by faces and by the virial theorem, and their cost compared with springs (thesis 6.6, 6.7)."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from taichi_soft.world.bare import bare_world
 
 LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
-SUBSTEPS, SUBSTEP = 20, 1e-5  # [s], far below every limit: the bodies just fall
+SUBSTEPS, SUBSTEP = 20, 1e-5  # length [s], far below all stability limits
 SAME = 1e-9
-"""Largest relative difference of forces that round-off explains in float64."""
+"""Largest relative difference between forces that float64 round-off explains."""
 ALIKE = 1.25
-"""Ratio of times up to which they count as alike."""
+"""Largest ratio of times that count as equal."""
 CLEARLY = 1.5
-"""Ratio of times from which one counts as clearly faster."""
+"""Smallest ratio of times of which one counts as clearly faster."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Forces of the thesis's options, or all; times on one body."""
+    """List the points: forces with the thesis's options, or with all options, and times on one mesh."""
     is_full = effort is Effort.FULL
     modes = [("linear", "tolerant")]
     if is_full:
@@ -45,12 +45,14 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Differences of forces, or seconds of a substep of each law, in turns."""
+    """Measure the differences between the forces, or the times of a substep with each law in alternation."""
     return _forces(point) if point["kind"] == "forces" else _cost(point)
 
 
 def _forces(point: Point) -> Numbers:
-    """The largest difference of both methods, over the largest force, and how many tetrahedra had flipped."""
+    """Return the largest difference between both methods over the largest force, and the number of inverted
+    tetrahedra.
+    """
     mesh, rng = cube(3, 1), np.random.default_rng(1)
     difference, flipped, looked_at = 0.0, 0, 0
     for amount in (1e-3, 0.03, 0.1, 0.3, 1.0):
@@ -79,7 +81,7 @@ def _cost(point: Point) -> Numbers:
         for law, world in worlds.items():
             start = perf_counter()
             world.step(SUBSTEPS * SUBSTEP, SUBSTEPS)
-            if turn > 1:  # two to warm up
+            if turn > 1:  # the first two warm up
                 seconds[law].append((perf_counter() - start) / SUBSTEPS)
     return {
         "seconds": seconds,
@@ -90,7 +92,7 @@ def _cost(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the ratios turn by turn, so that a slow moment of the machine slows both."""
+    """Judge the ratios of times turn by turn, so that a slow phase of the machine affects both laws."""
     forces = results.where(kind="forces")
     cost = results.one(kind="cost")
     virial = np.array(cost["seconds"]["virial"])
@@ -160,4 +162,4 @@ METHODS_COST = Experiment(
     conclude,
     is_timing=True,
 )
-"""Cost of the laws of chapter 6."""
+"""The experiment on the cost of the laws of chapter 6."""

@@ -1,7 +1,7 @@
-"""Particles of 1 kg, each on its own spring to a pinned one: u'' = -k u - b u'.
+"""Particles of 1 kg, each on a spring to a pinned particle: u'' = -k u - b u'.
 
-So the statements of chapter 3 about test equations are measured with the integrators of a world. All
-particles move along their springs, where these are linear.
+They measure statements of chapter 3 about test equations with the integrators of a world. All particles move
+along their springs, which are linear in this direction.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 LENGTH = 1.0
-"""Length of the springs [m]; displacements must be far smaller."""
+"""Length of the springs [m]; displacements must be much smaller."""
 
 SLACK = 1e-9
-"""Stiffness [N/m] of a spring that is used for its damping only: springs need one."""
+"""Stiffness of a spring that only damps [N/m]; a spring must have one."""
 
 
 def run_oscillators(
@@ -31,13 +31,15 @@ def run_oscillators(
     start: tuple[ArrayLike, ArrayLike],
     steps: int,
 ) -> tuple[Floats, Floats]:
-    """Displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m) each.
+    """Return displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m)
+    each.
 
-    Because steps are 1 s, k is (h w)^2 and b is h times the damping per mass.
+    Because steps are 1 s long, k is (h w)^2, and b is h times the damping per mass.
     Args:
         stiffness: k [N/m], (m,).
         damping: b [N s/m], (m,).
-        start: displacements and velocities, (m,) each.
+        start: initial displacements and velocities, (m,) each.
+        steps: number of steps.
     """
     k, b, u, v = (np.atleast_1d(np.asarray(rows, float)) for rows in (stiffness, damping, *start))
     count = len(k)
@@ -61,10 +63,10 @@ def run_oscillators(
 
 
 def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
-    """Largest modulus of the eigenvalues of a step of each oscillator, (m,). Above 1, the oscillation grows.
+    """Return the largest modulus of the eigenvalues of a step for each oscillator, (m,); above 1 it grows.
 
-    The eigenvalues follow from the states after two and three steps, for two different starts. The state of
-    the method must be position and velocity at the same time.
+    The eigenvalues follow from the states after two and three steps, from two different initial states. The
+    state of the integrator must be position and velocity at the same time.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     amount = np.full(len(k), 1e-2 * LENGTH)

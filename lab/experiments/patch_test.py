@@ -1,4 +1,6 @@
-"""The patch test: an irregular body under uniform strain has the uniform stress of Hooke's law."""
+"""Patch test: a law passes if an irregular body under uniform strain has the uniform stress of
+Hooke's law.
+"""
 
 from __future__ import annotations
 
@@ -24,16 +26,16 @@ from taichi_soft.meshing.arrays import FloatArray
 TETRAHEDRAL = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
 ALONG_EDGES = tuple(law for law in LAWS if law not in TETRAHEDRAL)
 YOUNG, POISSON = 1e6, 0.3
-STRAINS = (1e-4, 1e-3, 1e-2)  # the largest entry of the strain
+STRAINS = (1e-4, 1e-3, 1e-2)  # largest entry of the strain
 SMALL = 1e-3
-"""Error at the smallest strain, over the largest force, of a law that passes."""
+"""Largest error over the largest force at the smallest strain that passes."""
 FALLS = 0.02
-"""Error at the smallest strain over that at the largest: a hundredth for an error of second order in the
-strain."""
+"""Largest error at the smallest strain over that at the largest. An error of second order in the strain gives
+0.01."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: each law on one irregular mesh, or three, with random strains."""
+    """List the points: each law on one irregular mesh or on three, with random strains."""
     is_full = effort is Effort.FULL
     seeds, strains = (range(1, 4), 12) if is_full else (range(1, 2), 4)
     laws = (*TETRAHEDRAL, *(ALONG_EDGES if is_full else ALONG_EDGES[:2]))
@@ -41,10 +43,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Largest errors of the forces over random strains, for each size of strain.
+    """Measure the largest errors of the forces over random strains of each size.
 
-    `surface`: distance from the forces that the stress of Hooke's law exerts on the surface of the body at
-    rest, over the largest of these. `inside`: the largest force on an inner vertex, where it should be zero.
+    Returns: "surface", largest difference from the forces of Hooke's stress on the surface at rest, over the
+        largest of these; and "inside", largest force on an inner vertex, which should be zero.
     """
     mesh, rng = cube(3, point["seed"]), np.random.default_rng(point["seed"])
     material = Material(YOUNG, POISSON, 1000.0, damping_ratio=0.0)
@@ -69,7 +71,7 @@ def _hooke(strain: FloatArray) -> FloatArray:
 
 
 def _pull_of(vertices: FloatArray, surface: Any, stress: FloatArray) -> FloatArray:
-    """Forces of a body under this stress on its vertices: inwards, a third of each triangle's."""
+    """Return the vertex forces of a body under this stress: a third of each triangle's force, inwards."""
     a, b, c = (vertices[surface[:, i]] for i in range(3))
     traction = np.cross(b - a, c - a) / 2 @ stress
     forces = np.zeros_like(vertices)
@@ -79,7 +81,7 @@ def _pull_of(vertices: FloatArray, surface: Any, stress: FloatArray) -> FloatArr
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether the forces tend to those of Hooke's law as the strain goes to zero."""
+    """Judge whether the forces approach those of Hooke's law as the strain approaches zero."""
     worst = {}
     for law in (*TETRAHEDRAL, *ALONG_EDGES):
         rows = [numbers for _, numbers in results.where(law=law)]
@@ -134,4 +136,4 @@ def conclude(results: Results) -> Section:
 PATCH_TEST = Experiment(
     "patch-test", "The patch test", "beyond the thesis", ("patch-test",), points, measure, conclude
 )
-"""The patch test."""
+"""The experiment with the patch test."""

@@ -1,4 +1,4 @@
-"""Pictures of bodies for a section, drawn from measured positions."""
+"""Images of bodies for a section, drawn from measured positions."""
 
 from __future__ import annotations
 
@@ -34,21 +34,19 @@ def picture(
     azimuth: float = -60.0,
     elevation: float = 18.0,
 ) -> NDArray[np.uint8]:
-    """Draw bodies with a camera just far enough away to show all of them.
+    """Draw bodies with a camera that is just far enough away to show all of them.
 
     Args:
         bodies: meshes and the positions of all their vertices, (n, 3) [m], finite.
-        floor: True to draw a floor: at z = 0, as that of a `World`, or below the lowest vertex if that is
-            lower.
+        floor: True to draw a floor at z = 0, or below the lowest vertex if that is lower.
         size: width and height [pixels].
-        values: for each body a number per vertex, (n,), coloured from violet (low) to yellow (high).
-        limits: the numbers of violet and yellow; None: the smallest and the largest.
-        quantity: name of the values with the unit, such as "strain [1]"; it is written into the picture
-            together with the limits.
-        labels: one per body, below it, plain ASCII.
+        values: a number per vertex for each body, (n,), shown from violet (low) to yellow (high).
+        limits: values of violet and yellow; None for the smallest and the largest value.
+        quantity: name and unit of the values, such as "strain [1]", written into the image with the limits.
+        labels: caption below each body, plain ASCII.
         azimuth, elevation: direction of the camera, see `Camera.framing` [degrees].
-    Returns: sRGB, uint8 (height, width, 3), red first.
-    Raises: OptionError for positions that are not finite, and for values or labels of other bodies.
+    Returns: RGB (sRGB), uint8 (height, width, 3).
+    Raises: OptionError for positions that are not finite, or a wrong number of values or labels.
     """
     if not bodies:
         raise OptionError("a picture needs at least one body")
@@ -85,7 +83,7 @@ def picture(
 def _colour(
     surfaces: Sequence[Surface], values: Sequence[ArrayLike] | None, limits: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Colour each surface by its values, all on one scale. Returns the ends of the scale."""
+    """Colour the surfaces by their values on one scale. Returns: the ends of the scale."""
     if values is None:
         return 0.0, 0.0
     if len(values) != len(surfaces):
@@ -95,7 +93,7 @@ def _colour(
         for surface, numbers in zip(surfaces, values, strict=True)
     ]
     low, high = limits or (min(float(row.min()) for row in rows), max(float(row.max()) for row in rows))
-    top = high if high > low else low + max(abs(low), 1.0)  # all values are equal: all are violet
+    top = high if high > low else low + max(abs(low), 1.0)  # equal values are all violet
     for surface, row in zip(surfaces, rows, strict=True):
         surface.color = colormap(row, low, top)
     return low, high

@@ -1,4 +1,4 @@
-"""Cost of drawing the thesis's sphere 40 times a second (thesis section 6.6)."""
+"""Cost of drawing the thesis's sphere at 40 FPS (thesis section 6.6)."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from taichi_soft.render import Camera, Renderer, Surface
 from taichi_soft.world.bare import bare_world
 
 RATE = 40.0
-"""Frames per second of real time, the thesis's [Hz]."""
+"""Frames per second of real time in the thesis."""
 SUBSTEPS = 18
-"""Substeps of a frame of 1/40 s: 720 a second, about the thesis's 700."""
+"""Substeps per frame of 1/40 s: 720 per second, close to the thesis's 700."""
 SIZE = 640, 480
 HARDLY = 0.1
-"""Share of the time up to which drawing hardly affects the simulation."""
+"""Largest fraction of the time spent on drawing that hardly affects the simulation."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """The fall from 7 m, and the first bounces."""
+    """List the points: one fall from 7 m with the first bounces."""
     return [{"frames": 40 if effort is Effort.QUICK else 200}]
 
 
 def measure(point: Point) -> Numbers:
-    """Seconds of each frame: for its steps, for reading its positions, and for drawing it."""
+    """Measure the times to step, to read the positions, and to draw in each frame [s]."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = bare_world(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
@@ -60,12 +60,12 @@ def measure(point: Point) -> Numbers:
     for _ in range(point["frames"] + 1):
         step = seconds_of(lambda: world.step(1 / RATE, SUBSTEPS))
         rows.append((step, seconds_of(read), seconds_of(draw)))
-    steps, reads, draws = (list(column) for column in zip(*rows[1:], strict=True))  # the first one compiles
+    steps, reads, draws = (list(column) for column in zip(*rows[1:], strict=True))  # the first frame compiles
     return {"step": steps, "read": reads, "draw": draws, "tets": len(mesh.tets)}
 
 
 def conclude(results: Results) -> Section:
-    """Judge the share of the time that 40 frames a second leave to the simulation."""
+    """Judge the fraction of the time that remains for the simulation at 40 FPS."""
     numbers = results.one()
     step, read, draw = (float(np.median(numbers[key])) for key in ("step", "read", "draw"))
     reading, drawing = RATE * read, RATE * (read + draw)
@@ -128,4 +128,4 @@ REFRESH_RATE = Experiment(
     conclude,
     is_timing=True,
 )
-"""Drawing at 40 Hz."""
+"""The experiment on drawing at 40 FPS."""

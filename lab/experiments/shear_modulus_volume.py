@@ -1,4 +1,4 @@
-"""Effect of the shear modulus of CMPM on the volume of a deformed body (thesis chapter 5, introduction)."""
+"""Effect of CMPM's shear modulus on the volume of a deformed body (thesis chapter 5, introduction)."""
 
 from __future__ import annotations
 
@@ -22,15 +22,17 @@ from lab.experiments.experiment import (
 from lab.experiments.irregular import cube
 from taichi_soft import Material, internal_forces
 
-YOUNG, DENSITY = 3e6, 4e3  # of chapter 5
+YOUNG, DENSITY = 3e6, 4e3  # those of chapter 5 [Pa, kg/m^3]
 WAYS = {"stretched": (0.0, 0.0, 1.0), "pressed": (0.0, 0.0, -1.0), "sheared": (1.0, 0.0, 0.0)}
 AMOUNT = {"stretched": 0.2, "pressed": 0.2, "sheared": 0.4}
 LARGEST = 0.5
-"""Shear modulus over E of a material with nu = 0."""
+"""Largest shear modulus over E: that of a material with nu = 0."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Each way with several shear moduli, given over E, on one irregular mesh, or three."""
+    """List the points: each deformation with several shear moduli over E, on one irregular mesh or on
+    three.
+    """
     is_full = effort is Effort.FULL
     moduli = (0.05, 0.1, 0.2, 0.35, LARGEST) if is_full else (0.1, LARGEST)
     seeds = (1, 2, 3) if is_full else (1,)
@@ -38,7 +40,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Volume over that at rest of a cube whose ends are attached to moving plates."""
+    """Measure the volume of a cube with its ends attached to moving plates, over its rest volume."""
     mesh = cube(3, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, 0.3, DENSITY, shear_modulus=point["modulus"] * YOUNG, damping_ratio=0.0)
@@ -52,7 +54,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether a larger modulus changes the volume less, for each deformation on each mesh."""
+    """Judge whether a larger shear modulus reduces the change of volume, for each deformation and mesh."""
     changes: dict[tuple[str, int], dict[float, float]] = {}
     for point, numbers in results.where():
         curve = changes.setdefault((point["way"], point["seed"]), {})
@@ -127,4 +129,4 @@ SHEAR_MODULUS_VOLUME = Experiment(
     measure,
     conclude,
 )
-"""The shear modulus and the volume."""
+"""The experiment on shear modulus and volume."""

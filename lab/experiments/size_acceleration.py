@@ -1,4 +1,4 @@
-"""Accelerations of a body twice as large under the same deformation (thesis section 6.6)."""
+"""Accelerations of a body of twice the size under the same deformation (thesis section 6.6)."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ LAWS: tuple[LawName, ...] = ("virial", "face")
 MATERIAL = Material(1e6, 0.3, 1000.0, damping_ratio=0.0)
 SIZES = (1.0, 2.0, 4.0)
 THESIS_RATIO = 8.0
-"""Acceleration of a body over that of one twice as large."""
+"""Acceleration of a body over that of a body of twice the size, as the thesis states it."""
 TOLERANCE = 0.1
-"""Relative deviation from `THESIS_RATIO` up to which a ratio agrees."""
+"""Largest relative deviation from `THESIS_RATIO` that agrees."""
 STEP = 1e-6
-"""Step over which an acceleration is measured [s]: so short that the body hardly moves."""
+"""Step over which an acceleration is measured [s]; so short that the body hardly moves."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Laws of chapter 6, with spheres of several sizes."""
+    """List the points: laws of chapter 6, with spheres of several sizes."""
     laws = LAWS[:1] if effort is Effort.QUICK else LAWS
     return [{"law": law, "size": size} for law in laws for size in SIZES]
 
 
 def measure(point: Point) -> Numbers:
-    """Root mean squares of forces [N] and accelerations [m/s^2], and the mass [kg]."""
+    """Measure the root mean squares of forces [N] and accelerations [m/s^2], and the mass [kg]."""
     mesh = _sphere(point["size"])
     stretched = mesh.vertices * (1.1, 1.0, 0.9)
     forces = internal_forces(mesh, MATERIAL, stretched, law=point["law"])
@@ -51,7 +51,7 @@ def measure(point: Point) -> Numbers:
     body.set_motion(stretched, np.zeros_like(stretched))
     world.step(STEP, 1)
     first = np.array(body.velocities(), dtype=np.float64)
-    world.step(STEP, 1)  # leapfrog starts with half a step: the second one is whole
+    world.step(STEP, 1)  # the second step, because leapfrog's first is half a step
     accelerations = (np.array(body.velocities(), dtype=np.float64) - first) / STEP
     return {"force": _size(forces), "mass": float(body.masses.sum()), "acceleration": _size(accelerations)}
 
@@ -66,7 +66,7 @@ def _size(rows: FloatArray) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the ratio of the accelerations at twice the size."""
+    """Judge the ratio of accelerations for twice the size."""
     laws = tuple(dict.fromkeys(point["law"] for point, _ in results.where()))
     found = {law: {size: results.one(law=law, size=size) for size in SIZES} for law in laws}
     ratios = {
@@ -128,4 +128,4 @@ SIZE_ACCELERATION = Experiment(
     measure,
     conclude,
 )
-"""Accelerations over the size of a body."""
+"""The experiment on size and acceleration."""

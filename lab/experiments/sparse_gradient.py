@@ -1,6 +1,6 @@
-"""Gradients of forces by central differences, also for laws without complete gradients.
+"""Gradients of forces by central differences, also for laws without a complete analytic gradient.
 
-Many vertices are moved at once if no force depends on two of them.
+Many vertices are moved together if no force depends on two of them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 class SparseGradient:
-    """The gradient of forces.
+    """Computes gradients of forces.
 
     Args:
         reads: sparse, symmetric (n, n), non-zero if the force on one vertex depends on the position of the
@@ -29,10 +29,10 @@ class SparseGradient:
         self._step = step
 
     def at(self, forces: Callable[[Floats], Floats], positions: Floats) -> Any:
-        """df/dx of forces (n, 3) [N] with respect to positions (n, 3) [m], a sparse matrix (3n, 3n) [N/m]."""
+        """Return df/dx of forces (n, 3) [N] at positions (n, 3) [m], a sparse matrix (3n, 3n) [N/m]."""
         from scipy.sparse import csr_matrix
 
-        blocks = np.empty((len(self._touched), 3, 3))  # axis of the force, axis of the move
+        blocks = np.empty((len(self._touched), 3, 3))  # axis of the force, axis of the displacement
         for colour in range(self._colours.max() + 1):
             is_moved = self._colours == colour
             ours = is_moved[self._mover]

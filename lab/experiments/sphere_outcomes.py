@@ -1,4 +1,4 @@
-"""Outcomes of dropped spheres of many moduli, and the interval of moduli in which they stay whole."""
+"""Outcomes of dropped spheres of many moduli, and the range of moduli for which they stay intact."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from lab.experiments.experiment import Numbers
 OUTCOMES = ("collapses", "dented", "whole", "explodes")
 
 COLLAPSED = 0.5
-"""Volume over that at rest up to which a sphere counts as collapsed. The thesis has no number."""
+"""Largest volume over that at rest of a collapsed sphere. The thesis has no number."""
 
 Window = tuple[float, float, float, float]
-"""Edges as `window` gives them [Pa]."""
+"""Edges returned by `window` [Pa]."""
 
 
 def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
-    """Outcome of each sphere.
+    """Return the outcome of each sphere: "explodes", "collapses", "dented" or "whole".
 
     A sphere explodes if it becomes non-finite or doubles in extent. It is dented if more than a hundredth of
-    its tetrahedra stay inverted, and collapses if it then keeps `collapsed` of its volume or less.
+    its tetrahedra stay inverted, and collapses if its volume is then at most `collapsed` of that at rest.
     """
     ends = []
     for volume, flipped, frozen, extent in zip(
@@ -37,9 +37,11 @@ def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
 
 
 def window(numbers: Numbers, collapsed: float = COLLAPSED) -> Window:
-    """Edges, each as a bracket [Pa], of the longest unbroken row of whole spheres: the lower from the last
-    one that is neither whole nor dented to the first of the row, the upper from its last to the next that
-    explodes."""
+    """Return the edges of the longest range of moduli with whole spheres, each as a bracket [Pa].
+
+    The lower edge lies between the last modulus before the range that is neither whole nor dented, and the
+    first of the range. The upper edge lies between the last of the range and the next that explodes.
+    """
     young, ends = numbers["young"], outcomes(numbers, collapsed)
     first, last = _longest_row(end == "whole" for end in ends)
     if first > last:
@@ -52,7 +54,7 @@ def window(numbers: Numbers, collapsed: float = COLLAPSED) -> Window:
 
 
 def _longest_row(values: Iterable[bool]) -> tuple[int, int]:
-    """First and last index of the longest row of true values; the last is smaller if there is none."""
+    """Return the first and last index of the longest run of true values; last < first if there is none."""
     best, start, at = (0, -1), 0, -1
     for at, value in enumerate(values):
         if not value:

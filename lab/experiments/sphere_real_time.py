@@ -1,6 +1,6 @@
-"""Rate of the thesis's sphere on this machine (section 6.6): simulated time over real time.
+"""Real-time factor of the thesis's sphere on this machine (section 6.6): simulated time over real time.
 
-The times are those of whole frames of 1/50 s: 14 steps of 1/700 s, and reading the positions for drawing.
+Times are those of whole frames of 1/50 s: 14 steps of 1/700 s, and reading the positions for drawing.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
-"""Simulated over real time on an AMD XP 1800+ of 1.53 GHz (section 6.6), and the size of that sphere."""
+"""Real-time factor on an AMD XP 1800+ at 1.53 GHz (section 6.6), and number of tetrahedra of that sphere."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """The fall from 7 m and some bounces."""
+    """List the points: one fall from 7 m with some bounces."""
     return [{"seconds": 3.0 if effort is Effort.QUICK else 20.0}]
 
 
 def measure(point: Point) -> Numbers:
-    """Seconds of each frame."""
+    """Measure the time of each frame [s]."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = bare_world(retries=0)
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0, 0, 7.0), law="virial")
@@ -60,17 +60,17 @@ def measure(point: Point) -> Numbers:
 
 
 def real_time_factor(numbers: Numbers) -> float:
-    """Simulated over real time, for all frames together."""
+    """Return simulated time over real time of all frames."""
     return DT * len(numbers["frames"]) / float(np.sum(numbers["frames"]))
 
 
 def nanoseconds(factor: float, tets: int) -> float:
-    """Time of one tetrahedron in one step [ns]."""
+    """Return the time per tetrahedron and step [ns]."""
     return 1e9 / (factor * tets * SUBSTEPS / DT)
 
 
 def conclude(results: Results) -> Section:
-    """Compare the rate with that of the thesis; a verdict on its processor is not possible."""
+    """Compare the real-time factor with the thesis's. A verdict on its processor is not possible."""
     numbers = results.one()
     factor, tets = real_time_factor(numbers), numbers["tets"]
     here, there = nanoseconds(factor, tets), nanoseconds(THESIS_FACTOR, THESIS_TETS)

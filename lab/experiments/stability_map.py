@@ -1,7 +1,8 @@
-"""The dropped sphere over Young's modulus and Poisson's ratio (thesis section 6.6).
+"""The dropped sphere for many Young's moduli and Poisson's ratios (thesis section 6.6).
 
-All moduli of one Poisson's ratio fall side by side in one world and do not meet. The linear limit, the
-modulus whose largest stable step is the thesis's, tells how much of the upper edge is the mesh.
+Spheres of all moduli with one Poisson's ratio fall side by side in one world, without contact. The linear
+limit is the modulus whose largest stable step is the thesis's step. It shows how much of the upper edge is
+due to the mesh.
 """
 
 from __future__ import annotations
@@ -34,23 +35,27 @@ from taichi_soft.elements.laws import element_model
 from taichi_soft.world.bare import bare_world
 
 DENSITY, DAMPING, HEIGHT, VOLUME = 1000.0, 100.0, 7.0, 4.0
-DT, SUBSTEPS = 1 / 50, 14  # 700 substeps a second
+DT, SUBSTEPS = 1 / 50, 14  # 700 substeps per second
 WINDOWS = {0.1: (2e5, 3e6), 0.4: (4e5, 1e6)}
 """Young's moduli between which the thesis's sphere is stable, by Poisson's ratio [Pa] (section 6.6)."""
 LEAST, MOST = 1e5, 1e7
-"""Range of the moduli tried [Pa]."""
+"""Range of moduli to try [Pa]."""
 ROUNDING = 1.5
-"""Factor between an edge of the window and the thesis's, which has one digit: 1e6 may mean 1.5e6."""
+"""Largest factor between an edge and that of the thesis, which has one digit: 1e6 may stand for 1.5e6."""
 EQUAL = 1.1
-"""Factor up to which edges count as the same: less than from one modulus to the next."""
+"""Largest factor between edges that count as equal; it is smaller than that between two neighbouring
+moduli."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
-"""Other limits of the volume for collapse, to show how the verdict depends on it."""
+"""Alternative values of `COLLAPSED`, to show how the verdict depends on it."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Poisson's ratios of the thesis over 9 moduli; or five over 21, with all flips, and on other meshes."""
+    """List the points: the thesis's Poisson's ratios over 9 moduli, and linear limits.
+
+    A full report has five ratios over 21 moduli, all treatments of flips, and more meshes.
+    """
     meshes = MESHES[:2] if effort is Effort.QUICK else MESHES
     limits: list[Point] = [
         {"part": "limit", "mesh": mesh, "poisson": nu} for mesh in meshes for nu in WINDOWS
@@ -67,7 +72,7 @@ def _drop(mesh: str, nu: float, flips: FlipsName, moduli: int, seconds: float) -
 
 
 def sphere_mesh(name: str) -> TetMesh:
-    """4 m^3: the thesis's number of particles, or a regular mesh of 147 or 923."""
+    """Return a mesh of 4 m^3: the thesis's number of particles, or regular ones of 147 or 923."""
     if name == "thesis":
         return load_mesh(ASSETS / "sphere.npz")
     rings = {"coarse": 3, "fine": 6}[name]
@@ -75,7 +80,9 @@ def sphere_mesh(name: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Outcomes of spheres of all moduli; or the modulus for which 1/700 s is the largest stable step."""
+    """Measure the outcome of a sphere for each modulus, or the modulus for which 1/700 s is the largest
+    stable step.
+    """
     mesh, nu = sphere_mesh(point["mesh"]), point["poisson"]
     if point["part"] == "limit":
         return {"young": _linear_limit(mesh, nu), "tets": len(mesh.tets)}
@@ -111,7 +118,10 @@ def _extent(mesh: TetMesh) -> float:
 
 
 def _linear_limit(mesh: TetMesh, nu: float) -> float:
-    """The step is about proportional to E^-1/2: three corrections find the modulus to a hundredth."""
+    """Find the modulus for which 1/700 s is the largest stable step [Pa].
+
+    The step is about proportional to E^-1/2, so three corrections find the modulus to 1 %.
+    """
     young = 1e6
     for _ in range(3):
         step = stable_step(
@@ -122,7 +132,7 @@ def _linear_limit(mesh: TetMesh, nu: float) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Compare the windows with those of the thesis."""
+    """Compare the ranges of stable moduli with those of the thesis."""
     drops = results.where(part="drop")
     findings = [_window_finding(results, nu) for nu in WINDOWS] + [_collapse_finding(results)]
     limits = Table(
@@ -177,7 +187,7 @@ def conclude(results: Results) -> Section:
 
 
 def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
-    """True for the lower and for the upper edge if it is the thesis's."""
+    """True for the lower and the upper edge if it agrees with that of the thesis."""
     low, first, last, high = window(numbers, collapsed)
     thesis_low, thesis_high = WINDOWS[nu]
     return (
@@ -187,12 +197,14 @@ def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> t
 
 
 def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
-    """True if no sphere collapses or explodes between the thesis's edges."""
+    """True if no sphere between the thesis's edges collapses or explodes."""
     return all(end in ("whole", "dented") for _, end in _within(numbers, nu, collapsed))
 
 
 def _window_verdict(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> Verdict:
-    """Agrees if every sphere between the thesis's edges is whole; in part if all are whole or dented."""
+    """Return "agrees" if all spheres between the thesis's edges are whole, "in part" if some are dented, else
+    "differs".
+    """
     if not (all(_edges_agree(numbers, nu, collapsed)) and _is_calm(numbers, nu, collapsed)):
         return Verdict.DIFFERS
     is_whole = all(end == "whole" for _, end in _within(numbers, nu, collapsed))
@@ -200,14 +212,14 @@ def _window_verdict(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -
 
 
 def _within(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> list[tuple[float, str]]:
-    """Modulus [Pa] and outcome of each sphere between the thesis's edges."""
+    """List modulus [Pa] and outcome of each sphere between the thesis's edges."""
     low, high = WINDOWS[nu]
     ends = zip(numbers["young"], outcomes(numbers, collapsed), strict=True)
     return [(E, end) for E, end in ends if low <= E <= high]
 
 
 def _other_lines(numbers: Numbers, nu: float) -> str:
-    """Limits between dented and collapsed for which the verdict is the same."""
+    """Describe for which other values of `COLLAPSED` the verdict is the same."""
 
     def verdict(line: float) -> Verdict:
         return _window_verdict(numbers, nu, line)
@@ -224,7 +236,7 @@ def _other_lines(numbers: Numbers, nu: float) -> str:
 
 
 def _unhandled(results: Results, nu: float) -> str:
-    """Window of spheres with flips off."""
+    """Describe the range of whole spheres with flips off."""
     for _, numbers in results.where(part="drop", mesh="thesis", flips="off", poisson=nu):
         _, first, last, _ = window(numbers)
         gaps = (thesis / edge for thesis, edge in zip(WINDOWS[nu], (first, last), strict=True))
@@ -285,7 +297,10 @@ def _window_finding(results: Results, nu: float) -> Finding:
 
 
 def _from_the_other(results: Results, nu: float) -> str:
-    """Upper edge that the thesis's other window suggests: the ratio hardly depends on the mesh."""
+    """Describe the upper edge that the thesis's other range implies.
+
+    The ratio of both upper edges hardly depends on the mesh.
+    """
     (other,) = (each for each in WINDOWS if each != nu)
     shares = [
         results.one(part="limit", mesh=p["mesh"], poisson=nu)["young"] / n["young"]
@@ -296,12 +311,12 @@ def _from_the_other(results: Results, nu: float) -> str:
 
 
 def _edge(young: float) -> float | str:
-    """An edge for a table; "none tried" beyond the tried moduli."""
+    """Format an edge for a table; "none tried" beyond the range of moduli."""
     return "none tried" if young in (0.0, np.inf) else float(f"{young:.3g}")
 
 
 def _on_others(results: Results, nu: float) -> str:
-    """Windows of spheres of other meshes."""
+    """Describe the ranges of spheres of other meshes."""
     windows = [
         f"{p['mesh']} {window(n)[1]:.2g} to {window(n)[2]:.2g} Pa"
         for p, n in results.where(part="drop", flips="tolerant", poisson=nu)

@@ -1,7 +1,7 @@
-"""Equilibria of a body by any law, without time stepping: some coordinates are driven, forces act on the
+"""Equilibria of a body under any law, without time steps: some coordinates are prescribed, forces act on the
 others.
 
-Newton's method in float64, with the stiffness from central differences of the forces.
+Newton's method runs in float64, with the stiffness from central differences of the forces.
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ from taichi_soft.elements.laws.bonds import Ring
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
-"""Step of the differences over the shortest edge: truncation and rounding cause errors of about 1e-10 of the
-stiffness."""
+"""Step of the differences over the shortest edge. Truncation and rounding each cause a relative error of
+about 1e-10."""
 SLOW = 0.5
-"""If a step leaves more of the residual than this, the stiffness is computed again, and steps are halved."""
+"""Fraction of the residual. If a step leaves more, the stiffness is computed again and steps are halved."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
-"""First displacement, over the size of the body, above which nothing fixes it."""
+"""First displacement over the size of the body above which the body is not constrained."""
 
 
 class NoEquilibriumError(TaichiSoftError):
-    """A body has no equilibrium that can be found: its stiffness is singular, or Newton's method fails."""
+    """No equilibrium was found: the stiffness is singular, or Newton's method failed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """Loads and driven coordinates of a body.
+    """Loads and prescribed coordinates of a body.
 
     Args:
-        driven: (n, 3), coordinates that are held.
-        displacement: (n, 3) [m], where to, from rest; read where `driven`.
-        forces: (n, 3) [N], on the others.
+        driven: True for prescribed coordinates, (n, 3).
+        displacement: displacements of the driven coordinates from rest, (n, 3) [m]; other entries are
+            ignored.
+        forces: forces on the other coordinates, (n, 3) [N].
     """
 
     driven: Mask
@@ -52,12 +53,12 @@ class Loading:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """State in which the forces balance.
+    """A state in which all forces balance.
 
     Args:
-        displacement: (n, 3) from rest [m].
-        reactions: (n, 3) forces that hold the driven coordinates [N], zero elsewhere.
-        residual: largest force out of balance, over the largest force.
+        displacement: displacement from rest, (n, 3) [m].
+        reactions: forces that hold the driven coordinates, (n, 3) [N]; zero elsewhere.
+        residual: largest unbalanced force over the largest force.
     """
 
     displacement: Floats
@@ -66,12 +67,12 @@ class Equilibrium:
 
 
 class StaticBody:
-    """One mesh, material and law. The factorisation for one loading serves others with the same `driven`."""
+    """A mesh with a material and a law. Loadings with the same `driven` share one factorised stiffness."""
 
     def __init__(
         self, mesh: TetMesh, material: Material, law: LawName, strain: StrainName | None = None
     ) -> None:
-        """Start at rest."""
+        """Create the body at rest."""
         self.mesh, self.material = mesh, material
         self._law, self._strain = law, strain
         self._gradient = SparseGradient(
@@ -81,14 +82,14 @@ class StaticBody:
         self._solvers: dict[bytes, Any] = {}
 
     def forces(self, displacement: Floats) -> Floats:
-        """Internal forces, (n, 3) [N]."""
+        """Return the internal forces, (n, 3) [N]."""
         positions = self.mesh.vertices + displacement
         return np.asarray(
             internal_forces(self.mesh, self.material, positions, law=self._law, strain=self._strain)
         )
 
     def stiffness(self, displacement: Floats | None = None) -> Any:
-        """-df/dx at these positions, or at rest, a sparse matrix (3n, 3n) [N/m]."""
+        """Return -df/dx at a displacement, by default at rest: a sparse matrix (3n, 3n) [N/m]."""
         if displacement is not None:
             return -self._gradient.at(self.forces, displacement)
         if self._at_rest is None:
@@ -99,7 +100,7 @@ class StaticBody:
         """Find the equilibrium.
 
         Args:
-            tolerance: largest `Equilibrium.residual`; "best_fitting_plane" is exact to about 1e-8 only.
+            tolerance: largest `Equilibrium.residual`; the law "best_fitting_plane" reaches only about 1e-8.
         Raises: NoEquilibriumError.
         """
         free = ~loading.driven.ravel()
@@ -143,7 +144,10 @@ class StaticBody:
 
 
 def factorised(matrix: Any) -> Any:
-    """Function from right-hand sides to solutions. Raises: NoEquilibriumError for a singular matrix."""
+    """Return a function that solves for a right-hand side.
+
+    Raises: NoEquilibriumError for a singular matrix.
+    """
     from scipy.sparse.linalg import splu
 
     try:
@@ -154,14 +158,16 @@ def factorised(matrix: Any) -> Any:
 
 
 def _dependence(mesh: TetMesh, material: Material, law: LawName) -> Any:
-    """Sparsity pattern of the gradient, symmetric (n, n): forces of a vertex on positions of another."""
+    """Return the sparsity pattern, symmetric (n, n): non-zero if a vertex's force depends on the other
+    vertex.
+    """
     from scipy.sparse import coo_matrix
 
     chosen = LAWS[law]
     owners: list[NDArray[Any]] = [np.repeat(np.arange(len(mesh.tets)), 4)]
     vertices: list[NDArray[Any]] = [mesh.tets.ravel()]
     if isinstance(chosen, BondLaw) and chosen.ring not in (Ring.NONE, Ring.EXPANSION):
-        bonds = chosen.bonds(mesh, material)  # a bond reads the vertices of its ring besides its ends
+        bonds = chosen.bonds(mesh, material)  # a bond depends on its ring and its ends
         given = bonds.ring_members >= 0
         edges = np.arange(len(mesh.edges))
         owners += [len(mesh.tets) + np.repeat(edges, 2)]

@@ -1,4 +1,4 @@
-"""A plot of the stiffness of every law under several loads, over the expected one."""
+"""Plot of the stiffness of every law under several loads, over the expected stiffness."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ MARKERS = "os^DvP"
 def draw_stiffness_dots(
     figure: Any, rows: dict[str, dict[str, float]], expected: str, limits: tuple[float, float]
 ) -> None:
-    """Draw a row for each law and a mark for each load, in an empty figure.
+    """Draw one row per law with one mark per load, in an empty figure.
 
     Args:
-        rows: ratios by load, by law.
+        rows: ratio by load, for each law.
         expected: name of the value 1.
-        limits: limits of the axis; marks beyond are drawn at its ends.
+        limits: limits of the axis; marks outside are drawn at its ends.
     """
     axes = figure.add_subplot()
     loads = list(dict.fromkeys(load for ratios in rows.values() for load in ratios))

@@ -1,4 +1,4 @@
-"""The tilted plane (thesis section 4.4.3), which the thesis did not implement, under shear."""
+"""The tilted plane under shear (thesis section 4.4.3). The thesis did not implement it."""
 
 from __future__ import annotations
 
@@ -25,25 +25,27 @@ from taichi_soft import Material, TetMesh
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 LAWS = {"tilted_plane_printed": "as printed", "tilted_plane": "c = beta / pi"}
 ANGLES = (0.01, 0.05, 0.1, 0.2, 0.4)
-"""Angles of shear [rad]."""
+"""Shear angles [rad]."""
 
 SMALL = ANGLES[0]
 FOLLOWS = 0.05
-"""Relative error up to which a plane counts as following the shear."""
+"""Largest relative error of a plane that counts as following the shear."""
 
 UNEVEN = ((0.0, 40.0, 130.0, 170.0, 260.0), (0.0, 110.0, 150.0, 240.0, 265.0, 330.0))
-"""Angles of the particles of two uneven rings [degrees]."""
+"""Angles of the particles in two uneven rings [degrees]."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Both readings of eq. 4.12, on even rings of three to eight particles and two uneven ones."""
+    """List the points: both readings of eq. 4.12, on even rings of three to eight particles and two uneven
+    rings.
+    """
     sizes = (4, 6, 7) if effort is Effort.QUICK else (3, 4, 5, 6, 7, 8, 10, 12)
     rings = [f"{size} even" for size in sizes] + [f"{len(ring)} uneven" for ring in UNEVEN]
     return [{"law": law, "ring": ring} for law in LAWS for ring in rings]
 
 
 def mesh_of(ring: str) -> TetMesh:
-    """An edge in the ring of that name."""
+    """Make an edge in the ring with this name."""
     count, kind = ring.split()
     if kind == "even":
         return ringed_edge(int(count))
@@ -52,9 +54,10 @@ def mesh_of(ring: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """How far the plane turns about the axis of the shear, and across it, for each of `ANGLES` [rad].
+    """Measure the rotation of the plane about the axis of the shear, and across it, for each of `ANGLES`
+    [rad].
 
-    In a shear along the edge, lines across it turn by the angle, and the edge itself stays.
+    In a shear along the edge, lines across the edge rotate by the angle, and the edge keeps its direction.
     """
     mesh = mesh_of(point["ring"])
     found = []
@@ -67,7 +70,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the share of a small shear that the planes follow."""
+    """Judge what fraction of a small shear the planes follow."""
     rings = [point["ring"] for point, _ in results.where(law="tilted_plane")]
     share = {
         (law, ring): results.one(law=law, ring=ring)["tilt"][0] / SMALL for law in LAWS for ring in rings

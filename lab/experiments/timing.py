@@ -1,4 +1,4 @@
-"""Times of two calls in turns, so that a slow moment of the machine slows both."""
+"""Time two calls in alternation, so that a slow phase of the machine affects both."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from time import perf_counter
 
 
 def seconds_of(call: Callable[[], object]) -> float:
-    """Duration of one call [s]."""
+    """Return the duration of a call [s]."""
     start = perf_counter()
     call()
     return perf_counter() - start
@@ -16,6 +16,6 @@ def seconds_of(call: Callable[[], object]) -> float:
 def in_turns(
     one: Callable[[], object], other: Callable[[], object], repeats: int
 ) -> tuple[list[float], list[float]]:
-    """Durations of both calls [s] in turns, after one call of each to warm up."""
+    """Return the durations of both calls in alternation [s], after one call of each to warm up."""
     pairs = [(seconds_of(one), seconds_of(other)) for _ in range(repeats + 1)][1:]
     return [pair[0] for pair in pairs], [pair[1] for pair in pairs]

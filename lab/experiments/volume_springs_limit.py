@@ -1,4 +1,4 @@
-"""Largest nu with which springs that keep volume are stable (thesis section 5.2)."""
+"""Largest nu for which springs that preserve volume are stable (thesis section 5.2)."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from lab.experiments.judgement import Span
 from taichi_soft import Material, TetMesh, internal_forces
 from taichi_soft.meshing.arrays import FloatArray
 
-YOUNG, DENSITY = 3e6, 4e3  # the thesis's, which gives neither damping nor step
+YOUNG, DENSITY = 3e6, 4e3  # thesis [Pa, kg/m^3]; it gives neither damping nor step
 CELLS = 3
 STEADY = 0.1
-"""Growth rate [1/s] up to which a motion counts as steady: a tenth in a second, or round-off."""
+"""Largest growth rate of a steady motion [1/s]: 10 % per second, or round-off."""
 THESIS_LIMIT, CLOSE = 0.3, 0.05
 
 
 def points(effort: Effort) -> list[Point]:
-    """Several dampings, one of them none, on one irregular mesh, or two and a regular one."""
+    """List the points: several dampings and none, on one irregular mesh, or on two and a regular one."""
     is_full = effort is Effort.FULL
     dampings = (0.0, 30.0, 100.0, 300.0, 1000.0, 3000.0) if is_full else (0.0, 1000.0, 3000.0)
     ratios = [round(0.05 * k, 2) for k in range(10)] if is_full else [0.0, 0.1, 0.2, 0.3, 0.4]
@@ -41,9 +41,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Growth rate of the fastest growing small motion of the cube between fixed plates, for each nu [1/s].
+    """Measure the stability of a cube between fixed plates, for each nu.
 
-    `step`: largest step of leapfrog without damping, 2 over the highest frequency [s].
+    Returns: "growth", growth rate of the fastest growing small motion [1/s]; "step", largest step of leapfrog
+        without damping, 2 over the highest angular frequency [s].
     """
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
@@ -70,7 +71,7 @@ def _gradient(plates: Plates, nu: float) -> FloatArray:
 
 
 def _edge_matrix(mesh: TetMesh) -> FloatArray:
-    """Damping matrix of velocities along edges, with b = 1 (eq. 3.9), (3 n, 3 n)."""
+    """Return the damping matrix of velocities along the edges for b = 1 (eq. 3.9), (3 n, 3 n)."""
     total = np.zeros((3 * len(mesh.vertices),) * 2)
     for p, q in mesh.edges:
         n = mesh.vertices[q] - mesh.vertices[p]
@@ -181,4 +182,4 @@ VOLUME_SPRINGS_LIMIT = Experiment(
     measure,
     conclude,
 )
-"""The limit of springs that keep volume."""
+"""The experiment on the limit of springs that preserve volume."""

@@ -1,4 +1,4 @@
-"""A sheared cube of springs that keep the volume of tetrahedra (thesis figures 5.1 and 5.2)."""
+"""A sheared cube of springs that preserve the volume of tetrahedra (thesis figures 5.1 and 5.2)."""
 
 from __future__ import annotations
 
@@ -23,29 +23,31 @@ from lab.experiments.irregular import cube
 from lab.experiments.judgement import Span, judged, judged_on_meshes
 from taichi_soft import Material, internal_forces
 
-YOUNG, DENSITY = 3e6, 4e3  # the thesis's
+YOUNG, DENSITY = 3e6, 4e3  # those of the thesis [Pa, kg/m^3]
 POISSON = (0.0, 0.3)
 CELLS = 4
 REGULAR = "regular grid"
 TOPS = 0.35, 0.75
-"""Shears between which the volume must be largest, to count as a drop beyond 0.5."""
+"""Range of shears in which the volume must have its maximum, so that it drops beyond 0.5."""
 HALF = 0.5
-"""Shear past which the thesis sees the volume drop."""
+"""Shear beyond which the volume drops in the thesis."""
 FAR_BELOW = 0.7
-"""Slope over G A that counts as far below it."""
+"""Slope over G A below which a slope is far below it."""
 SLIGHT = 0.15
-"""Relative change of a force that counts as slight."""
+"""Largest relative change of a force that counts as slight."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Both nu on a regular mesh and on one irregular mesh, or four."""
+    """List the points: both nu on a regular mesh, and on one irregular mesh or on four."""
     seeds = [None, *range(1, 5 if effort is Effort.FULL else 2)]
     steps = 40 if effort is Effort.FULL else 10
     return [{"seed": seed, "poisson": nu, "steps": steps} for seed in seeds for nu in POISSON]
 
 
 def measure(point: Point) -> Numbers:
-    """Volume and forces on the top, which moves sideways by up to the height of the cube."""
+    """Measure the volume, and the forces on the top while it moves sideways by up to the height of
+    the cube.
+    """
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -67,7 +69,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the effect of nu = 0.3 on irregular meshes; the regular one shows the effect of the mesh."""
+    """Judge the effect of nu = 0.3 on irregular meshes. The regular mesh shows the effect of the mesh."""
     for seed in (None, 1):
         results.one(seed=seed, poisson=0.0)
     pairs = {
@@ -162,7 +164,7 @@ def _name(seed: int | None) -> str:
 
 
 def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
-    """Agrees or differs if nu = 0.3 does the same at a shear of 0.5 and at the end, on every mesh."""
+    """Judge whether nu = 0.3 has the same effect at a shear of 0.5 and at the end, on every mesh."""
     everywhere = [row["volume-springs-tension"] for row in meshes]
     if all(everywhere) or not any(row["tension-at-the-end"] for row in meshes):
         why = "springs along edges resist a shear by the directions of the edges, whatever nu does"
@@ -177,7 +179,7 @@ def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
 
 
 def _read(without: Numbers, with_3: Numbers) -> dict[str, Any]:
-    """Derive the numbers of one mesh from its two runs, and whether the claims hold for it."""
+    """Compare the two runs of one mesh. Returns: numbers, and whether each claim holds."""
     found: dict[str, Any] = {}
     for name, nu, n in (("0", 0.0, without), ("3", 0.3, with_3)):
         shear, volume = np.array(n["shear"]), np.array(n["volume"])
@@ -248,4 +250,4 @@ VOLUME_SPRINGS_SHEAR = Experiment(
     measure,
     conclude,
 )
-"""Figures 5.1 and 5.2."""
+"""The experiment of figures 5.1 and 5.2."""

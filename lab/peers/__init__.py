@@ -1,4 +1,4 @@
-"""One drop here, in other engines, and in a fine reference: cost and error of each."""
+"""Cost and error of one drop in taichi-soft and in other engines, compared with a fine reference."""
 
 from lab.peers.comparison import Entry, compare, missing_peers
 from lab.peers.drop import Drop

@@ -1,9 +1,9 @@
-"""The drop in Bullet (zlib licence), by PyBullet: a deformable body of stable neo-Hookean material.
+"""The drop in Bullet (zlib licence) through PyBullet: a deformable body of stable neo-Hookean material.
 
-Bullet's constants are not Lame's: 4/3 mu and lambda + 5/6 mu are Hooke's law for small strain (Smith, de Goes
-and Kim 2018, section 3.4). All vertices get the same mass, which PyBullet cannot change. The body
-floats above a floor by the collision margin, which is therefore small. The floor is a box, because above
-Bullet's plane the body floats by a tenth of a metre.
+Bullet's constants differ from Lame's: 4/3 mu and lambda + 5/6 mu give Hooke's law for small strain (Smith, de
+Goes and Kim 2018, section 3.4). All vertices have the same mass, which PyBullet cannot change. The body
+floats above the floor by the collision margin, which is therefore small. The floor is a box, because the body
+would float 0.1 m above Bullet's plane.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from lab.peers.silence import silenced
 from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 2
-"""Steps in 1 / RATE s: Bullet's default of 1/240 s."""
+"""Number of steps per 1 / RATE s, from Bullet's default step of 1/240 s."""
 
 MARGIN = 1e-3
 """Gap between body and floor [m]."""
 
 FLOOR = 5.0
-"""Half the height of the box, and a sixth of its width [m]."""
+"""Half height of the floor's box, and a sixth of its width [m]."""
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop."""
+    """Simulate the drop in Bullet."""
     with silenced():
         import pybullet
 
@@ -81,7 +81,7 @@ def _make(drop: Drop, client: int, steps: int) -> Simulation:
 
 
 def _vtk(drop: Drop) -> str:
-    """The mesh at the start of the drop as a VTK file of version 2.0."""
+    """Return the mesh at the start of the drop as the text of a VTK file, version 2.0."""
     points, tets = drop.start.tolist(), drop.mesh.tets.tolist()
     head = ["# vtk DataFile Version 2.0", "body", "ASCII", "DATASET UNSTRUCTURED_GRID"]
     rows = [" ".join(map(repr, point)) for point in points]

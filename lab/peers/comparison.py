@@ -1,4 +1,4 @@
-"""The drop in every engine that is installed, and in the reference."""
+"""Run the drop in every installed engine and in the reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OURS, REFERENCE = "taichi-soft", "reference"
 
 @dataclass(frozen=True)
 class Entry:
-    """Result of one engine, or of the reference."""
+    """Result of an engine or of the reference."""
 
     name: str
     trajectory: Trajectory
@@ -29,37 +29,38 @@ class Entry:
 
     @property
     def is_reference(self) -> bool:
-        """True for the reference of the others."""
+        """True for the result of the reference."""
         return self.name == REFERENCE
 
     @property
     def cost(self) -> float:
-        """Median time of simulating 1/60 s [s]."""
+        """Median time to simulate 1/60 s [s]."""
         return float(np.median(self.trajectory.frame_times))
 
     @property
     def squash_error(self) -> float:
-        """Relative error of the squash, positive if it is too large."""
+        """Relative error of the squash; positive if the body is squashed too much."""
         return self.outcome.squash / self.reference.squash - 1.0
 
     @property
     def bounce_error(self) -> float:
-        """Relative error of the bounce, positive if it is too high."""
+        """Relative error of the bounce; positive if the body bounces too high."""
         return self.outcome.bounce / self.reference.bounce - 1.0
 
 
 def missing_peers() -> list[str]:
-    """Packages of engines that are not installed."""
+    """List the packages of engines that are not installed."""
     return missing_packages("peers")
 
 
 def compare(
     drop: Drop | None = None, on_frame: Callable[[str, int, int], object] | None = None
 ) -> list[Entry]:
-    """Simulate the drop here, in the reference, and in every engine that is installed, in this order.
+    """Simulate the drop in taichi-soft, in the reference, and in each installed engine, in this order.
 
     Args:
-        on_frame: called with (name, frames done, total frames).
+        drop: drop to simulate; the default drop by default.
+        on_frame: called with (name, frames done, total frames) after each frame.
     """
     drop = Drop() if drop is None else drop
     there = [peer for peer in PEERS if not missing_packages("peers", peer.module)]

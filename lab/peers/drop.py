@@ -1,4 +1,4 @@
-"""The drop for every engine: mesh, elastic material, and height."""
+"""The drop that every engine simulates: mesh, elastic material, and height."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from taichi_soft import TetMesh, sphere
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.81
-"""[m/s^2]."""
+"""Gravity [m/s^2]."""
 
 
 @dataclass(frozen=True)
 class Drop:
-    """A body that falls onto a level floor at z = 0, without damping and friction.
+    """A body that falls onto a level floor at z = 0, without damping or friction.
 
-    The sphere of 1,280 tetrahedra is squashed by a sixth. Up to there the usual material laws agree, so that
-    differences between engines come from their solvers.
+    The default sphere of 1,280 tetrahedra is squashed by a sixth. Common material laws agree up to this
+    strain, so differences between engines come from their solvers.
     """
 
     mesh: TetMesh = field(default_factory=lambda: sphere(0.5, 4))
-    young: float = 1e6  # [Pa]
+    young: float = 1e6  # Young's modulus [Pa]
     poisson: float = 0.3
     density: float = 1000.0  # [kg/m^3]
-    height: float = 0.8  # of its lowest vertex above the floor [m]
-    seconds: float = 1.5  # that are simulated: past the top of the first bounce
+    height: float = 0.8  # initial height of the lowest vertex above the floor [m]
+    seconds: float = 1.5  # simulated time [s], past the top of the first bounce
 
     @property
     def start(self) -> Floats:
-        """Positions of the vertices at the start, (n, 3) [m]."""
+        """Initial positions of the vertices, (n, 3) [m]."""
         lift = self.height - float(self.mesh.vertices[:, 2].min())
         rows: Floats = self.mesh.vertices + np.array([0.0, 0.0, lift])
         return rows
@@ -46,7 +46,7 @@ class Drop:
 
     @property
     def masses(self) -> Floats:
-        """Masses of the vertices, a quarter of each adjacent tetrahedron, (n,) [kg]."""
+        """Masses of the vertices, a quarter of each adjacent tetrahedron's mass, (n,) [kg]."""
         quarters = np.repeat(self.density * self.volumes / 4.0, 4)
         masses: Floats = np.bincount(self.mesh.tets.ravel(), quarters, len(self.mesh.vertices)).astype(
             np.float64

@@ -1,7 +1,7 @@
-"""The drop in MuJoCo (Apache-2.0): a flex with a body per vertex, by St. Venant and Kirchhoff's law.
+"""The drop in MuJoCo (Apache-2.0): a flex with one body per vertex and St. Venant-Kirchhoff's law.
 
-Contact has the stiffness of the flex in MuJoCo's page on modeling. Its own flex gives all vertices the same
-mass; here each vertex has the mass of the drop.
+The contact stiffness is that of the flex in MuJoCo's documentation of modeling. A flex gives all vertices the
+same mass; here each vertex gets the mass of the drop.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from lab.peers.drop import GRAVITY, Drop
 from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 4
-"""Steps in 1 / RATE s: about 2 ms each, which is MuJoCo's default."""
+"""Number of steps per 1 / RATE s: about 2 ms each, MuJoCo's default."""
 
 MODEL = """
 <mujoco>
@@ -36,17 +36,19 @@ CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 
 def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate with the integrator that MuJoCo recommends for flexes: implicit, together with contact."""
+    """Simulate the drop with the integrator that MuJoCo recommends for flexes, which is implicit together
+    with contact.
+    """
     return _simulate(drop, "discrete", on_frame)
 
 
 def simulate_euler(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate with its explicit integrator, which is faster for soft materials."""
+    """Simulate the drop with MuJoCo's explicit integrator, which is faster for soft materials."""
     return _simulate(drop, "Euler", on_frame)
 
 
 def _simulate(drop: Drop, integrator: str, on_frame: Progress | None) -> Trajectory:
-    """Simulate without the file of warnings that MuJoCo writes into the current folder."""
+    """Simulate the drop, without the log file that MuJoCo would write into the current folder."""
     import mujoco
 
     mujoco.set_mju_user_warning(lambda _: None)
@@ -86,9 +88,9 @@ def _advance(model: Any, data: Any, steps: int) -> None:
 
 
 def _positions(model: Any, data: Any) -> NDArray[np.float64]:
-    """Positions of the vertices, recomputed: after a step MuJoCo has those before the step.
+    """Return the positions of the vertices, recomputed, because MuJoCo stores those before the step.
 
-    If MuJoCo detects instability it resets, which counts as an explosion.
+    MuJoCo resets if it detects an instability, which counts as an explosion.
     """
     import mujoco
 

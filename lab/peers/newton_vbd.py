@@ -1,7 +1,7 @@
-"""The drop in Newton (Apache-2.0) on the CPU, by vertex block descent: stable neo-Hookean material.
+"""The drop in Newton (Apache-2.0) on the CPU by vertex block descent: stable neo-Hookean material.
 
-Newton is made for GPUs. On a CPU its kernels run on one thread, and the first start compiles for a minute or
-two. Contact is a spring under each vertex: so stiff that the body sinks in by a millimetre or less.
+Newton is made for GPUs. On a CPU its kernels run on one thread, and the first start compiles for one or two
+minutes. Contact is a spring under each vertex, so stiff that the body sinks in by at most 1 mm.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from lab.peers.drop import Drop
 from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 5
-"""Steps in 1 / RATE s: 1/600 s each, as in Newton's examples of soft bodies."""
+"""Number of steps per 1 / RATE s: 1/600 s each, as in Newton's examples of soft bodies."""
 
 ITERATIONS = 10
 """Iterations of the solver, as in Newton's examples."""
 
 CONTACT, RADIUS = 1e7, 1e-3
-"""Stiffness [N/m] and radius [m] of a vertex in contact."""
+"""Stiffness of contact [N/m] and radius of a vertex [m]."""
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop."""
+    """Simulate the drop in Newton."""
     import warp
 
     warp.config.log_level = warp.LOG_WARNING
@@ -36,7 +36,7 @@ def _make(drop: Drop, steps: int) -> Simulation:
 
     step = 1 / (RATE * steps)
     lam, mu = drop.lame
-    builder = newton.ModelBuilder()  # its gravity is the drop's
+    builder = newton.ModelBuilder()  # its default gravity is that of the drop
     builder.add_ground_plane()
     builder.add_soft_mesh(
         pos=warp.vec3(0.0, 0.0, 0.0),

@@ -1,4 +1,4 @@
-"""The drop in taichi-soft with its defaults: law, integrator and substeps."""
+"""The drop in taichi-soft with the default law, integrator and substeps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_soft.world.bare import bare_world
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop."""
+    """Simulate the drop in taichi-soft."""
     material = Material(drop.young, drop.poisson, drop.density, damping=0.0, damping_ratio=0.0)
 
     def make(steps: int) -> Simulation:

@@ -1,9 +1,9 @@
-"""The drop in NumPy: float64, a textbook's law, and much shorter steps than any engine's.
+"""The reference drop in NumPy: float64, a textbook law, and much shorter steps than those of any engine.
 
-psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984) is the law of none of the engines. The
-floor is a stiff spring under each vertex, so that contact dissipates no energy: the surface of a body has no
-mass, and the energy that a vertex would lose in an impact depends on the mesh only. Steps of half the length
-and a floor four times as stiff change squash and bounce by 0.6 % at most.
+The law psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984) is that of none of the engines.
+The floor is a stiff spring under each vertex, so contact dissipates no energy. The surface of a real body has
+no mass, and the energy that a vertex would lose in an impact depends only on the mesh. With half the step and
+a floor of four times the stiffness, squash and bounce change by at most 0.6 %.
 """
 
 from __future__ import annotations
@@ -17,17 +17,20 @@ from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 Floats = NDArray[np.float64]
 
 FLOOR = 1.6e7
-"""Stiffness of the floor over the mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
+"""Stiffness of the floor per mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
 
 FRACTION = 0.05
-"""Step over the time in which sound crosses the lowest tetrahedron."""
+"""Step over the time in which sound crosses the smallest altitude of a tetrahedron."""
 
 
 class Reference:
-    """A body with Verlet's method. Tensors of tetrahedra are (3, 3, m): rows, columns, tetrahedra."""
+    """A body that steps by Verlet's method.
+
+    Tensors of tetrahedra are (3, 3, m): rows, columns, tetrahedra.
+    """
 
     def __init__(self, drop: Drop, steps: int) -> None:
-        """Prepare for `steps` steps in 1 / RATE s."""
+        """Create the body at the start of the drop; it makes `steps` steps in 1 / RATE s."""
         self.drop, self.steps, self.h = drop, steps, 1.0 / (RATE * steps)
         self.masses, self.volumes = drop.masses, drop.volumes
         self.corners = drop.mesh.tets.T  # (4, m)
@@ -45,7 +48,7 @@ class Reference:
             self.velocities += self.h / 2 * self._accelerations
 
     def energy(self) -> float:
-        """Kinetic energy, and potential energy of height, deformation and contact [J]."""
+        """Return the kinetic energy plus the potential energy of height, deformation and contact [J]."""
         (lam, mu), F = self.drop.lame, self._deformations()
         log = np.log(_cofactor(F)[1])
         shape = mu / 2 * ((F**2).sum(axis=(0, 1)) - 3.0 - 2.0 * log) + lam / 2 * log**2
@@ -54,11 +57,11 @@ class Reference:
         return float(self.volumes @ shape + self.masses @ single)
 
     def accelerations(self) -> Floats:
-        """Accelerations of the vertices, (n, 3) [m/s^2]."""
+        """Return the accelerations of the vertices, (n, 3) [m/s^2]."""
         (lam, mu), F = self.drop.lame, self._deformations()
         across, J = _cofactor(F)
         P = mu * F + (lam * np.log(J) - mu) / J * across
-        ends = -self.volumes * np.einsum("acm,bcm->abm", P, self.rest_inverse)  # of vertices 1 to 3
+        ends = -self.volumes * np.einsum("acm,bcm->abm", P, self.rest_inverse)  # forces on vertices 1 to 3
         forces = np.concatenate([-ends.sum(axis=1, keepdims=True), ends], axis=1)  # (3, 4, m)
         vertex, count = self.corners.ravel(), len(self.masses)
         total = np.stack([np.bincount(vertex, rows.ravel(), count) for rows in forces], axis=1)
@@ -72,7 +75,7 @@ class Reference:
 
 
 def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop that is the reference of the engines."""
+    """Simulate the drop as the reference for the engines."""
 
     def make(steps: int) -> Simulation:
         body = Reference(drop, steps)
@@ -84,14 +87,14 @@ def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Trajecto
 
 
 def _edges(positions: Floats, corners: NDArray[np.int32]) -> Floats:
-    """Edges from the first vertex to the others, as columns, (3, 3, m)."""
+    """Return the edges from the first vertex to the others, as columns, (3, 3, m)."""
     places = positions.T[:, corners]
     edges: Floats = places[:, 1:] - places[:, :1]
     return edges
 
 
 def _cofactor(F: Floats) -> tuple[Floats, Floats]:
-    """Cofactor of each tensor, and its determinant, (m,)."""
+    """Return the cofactor of each tensor, (3, 3, m), and its determinant, (m,)."""
     cofactor = np.empty_like(F)
     for row, column in np.ndindex(3, 3):
         i, j, k, l = (row + 1) % 3, (row + 2) % 3, (column + 1) % 3, (column + 2) % 3  # noqa: E741
@@ -106,7 +109,10 @@ def _inverse(F: Floats) -> Floats:
 
 
 def _least_altitude(drop: Drop) -> float:
-    """Least altitude of all tetrahedra [m]: the inverse of the gradient of a barycentric coordinate."""
+    """Return the smallest altitude of all tetrahedra [m].
+
+    An altitude is the inverse of the length of a barycentric coordinate's gradient.
+    """
     inverse = _inverse(_edges(drop.mesh.vertices, drop.mesh.tets.T))
     gradients = np.concatenate([-inverse.sum(axis=0, keepdims=True), inverse])
     return 1.0 / float(np.linalg.norm(gradients, axis=1).max())

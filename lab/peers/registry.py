@@ -1,4 +1,4 @@
-"""Other engines that simulate the drop."""
+"""Registry of the other engines that simulate the drop."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Peer:
     """Another engine, or one of its integrators."""
 
     name: str
-    module: str  # of Python, as in the extra `peers`
+    module: str  # Python module of the engine, as in the extra `peers`
     simulate: Callable[[Drop, Progress | None], Trajectory]
 
 

@@ -1,4 +1,4 @@
-"""Discard the output of engines written in C, which bypasses Python's streams."""
+"""Discard the output of engines written in C, which does not use Python's streams."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Context in which all output of the process is discarded."""
+    """Return a context in which all output of the process is discarded."""
     c = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""Motion of a body in a drop, and the time that its engine needs."""
+"""Record the motion of a body in a drop, and the computing time of its engine."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 RATE = 120
-"""Rate at which positions are recorded [1/s]: twice a frame, to resolve the deepest squash."""
+"""Rate at which positions are recorded [1/s]: twice per frame, to resolve the deepest squash."""
 
 FRAME = 1 / 60
-"""Time step for which the cost is reported [s]."""
+"""Simulated time whose cost is reported [s]."""
 
 FARTHEST = 3.0
-"""Distance of a vertex, over the height at the start, beyond which the body counts as exploded."""
+"""Distance of a vertex over the initial height above which the body counts as exploded."""
 
 MOST_HALVINGS = 6
-"""Largest number of times that a step is halved before an engine counts as failed."""
+"""Number of times that a step is halved before an engine counts as failed."""
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Positions of the vertices, and the time of each frame."""
+    """Positions of the vertices over time, and the computing time of each frame."""
 
-    positions: Floats  # (k, n, 3), each 1 / RATE s from the start on [m]
-    frame_times: Floats  # of stepping each FRAME [s]
-    step: float  # of the engine [s]
+    positions: Floats  # positions from the start on, 1 / RATE s apart, (k, n, 3) [m]
+    frame_times: Floats  # computing time of each FRAME [s]
+    step: float  # step of the engine [s]
 
     def at(self, time: float) -> Floats:
-        """Vertices at a time [s], (n, 3), interpolated between recorded positions; constant after the end."""
+        """Return the vertices at a time [s], (n, 3) [m], interpolated linearly; constant after the end."""
         place = min(max(time * RATE, 0.0), len(self.positions) - 1.0)
         before = min(int(place), len(self.positions) - 2)
         share = place - before
@@ -50,20 +50,20 @@ class Trajectory:
 class Simulation:
     """A body in an engine at the start of the drop."""
 
-    advance: Callable[[], None]  # by 1 / RATE s
-    positions: Callable[[], Floats]  # (n, 3) [m]
-    step: float  # [s]
+    advance: Callable[[], None]  # advances the engine by 1 / RATE s
+    positions: Callable[[], Floats]  # returns the current positions, (n, 3) [m]
+    step: float  # step of the engine [s]
 
 
 def record(
     drop: Drop, make: Callable[[int], Simulation], first: int, on_frame: Progress | None = None
 ) -> Trajectory:
-    """Simulate a drop with the longest stable step.
+    """Simulate a drop with the longest step at which the body stays intact.
 
     Args:
-        make: returns an engine that makes the given number of steps in 1 / RATE s.
-        first: number of steps that the engine's authors recommend. It is doubled until the body stays whole.
-        on_frame: called with (frames done, total frames).
+        make: function that returns an engine with this number of steps per 1 / RATE s.
+        first: number of steps that the engine's authors recommend; it is doubled after each explosion.
+        on_frame: called with (frames done, total frames) after each frame.
     Raises: StateError if no step is stable.
     """
     for doubling in range(MOST_HALVINGS + 1):
@@ -77,7 +77,7 @@ def record(
 
 
 def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Trajectory | None:
-    """Trajectory of the whole drop; None if the body explodes."""
+    """Return the trajectory of the drop; None if the body explodes."""
     frames = round(drop.seconds / FRAME)
     positions, times = [np.array(engine.positions(), dtype=np.float64)], []
     reach = FARTHEST * np.abs(drop.start).max()
@@ -88,7 +88,7 @@ def _try(drop: Drop, engine: Simulation, on_frame: Progress | None) -> Trajector
             engine.advance()
             took += perf_counter() - start
             positions.append(np.array(engine.positions(), dtype=np.float64))
-            if not np.abs(positions[-1]).max() < reach:  # written so that NaN is caught too
+            if not np.abs(positions[-1]).max() < reach:  # also catches NaN
                 return None
         times.append(took)
         if on_frame:

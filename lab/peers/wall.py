@@ -1,4 +1,4 @@
-"""The comparison as one film: a panel for each engine, with its cost and its error."""
+"""Film the comparison: one panel per engine, with its cost and its error."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ GAP = 4
 """Gap between panels [pixels]."""
 
 DARK = 24
-"""Grey value of the gaps and of empty panels, of 255."""
+"""Grey value of gaps and empty panels, 0 to 255."""
 
 REFERENCE_COLOR = (0.93, 0.92, 0.88)
 
 MARK = (200, 30, 40)
-"""Colour of the line at the height of the reference's top, of 255."""
+"""RGB colour of the line at the top of the reference, 0 to 255."""
 
 
 def film_wall(
@@ -34,14 +34,14 @@ def film_wall(
     seconds: float,
     on_frame: Progress | None = None,
 ) -> int:
-    """Film trajectories side by side, each from its beginning to its end, and return the number of frames.
+    """Film trajectories side by side, and return the number of frames.
 
     Args:
         drop: the drop of the trajectories.
         entries: results of `compare`.
-        writer: of the film.
-        seconds: length of the film: what lasts shorter is shown slowed down.
-        on_frame: called with (frames made, frames in all) after each.
+        writer: film to write to.
+        seconds: length of the film. The whole drop is shown, in slow motion if the film is longer.
+        on_frame: called with (frames made, total frames) after each frame.
     Raises: OptionError for a length out of range.
     """
     frames = as_positive(seconds, "seconds", "s") * writer.fps
@@ -59,12 +59,12 @@ def film_wall(
 
 
 def draw_wall(drop: Drop, entries: Sequence[Entry], time: float, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Frame of the film at a time of the drop [s], sRGB, uint8 (height, width, 3)."""
+    """Draw the frame of the film at a time of the drop [s]. Returns: sRGB, uint8 (height, width, 3)."""
     return _Wall(drop, entries, size, "").draw(time)
 
 
 class _Wall:
-    """Panels in rows of at most three, each with a line at the height of the reference's top."""
+    """Draws panels in rows of at most three, each with a line at the top of the reference."""
 
     def __init__(self, drop: Drop, entries: Sequence[Entry], size: tuple[int, int], pace: str) -> None:
         self.entries, self.size, self.pace = entries, size, pace
@@ -108,7 +108,7 @@ class _Wall:
         return picture
 
     def _height_of_reference(self, time: float) -> int:
-        """Row of pixels of the reference's top."""
+        """Return the row of pixels at the top of the reference."""
         reference = next(entry for entry in self.entries if entry.is_reference)
         top = [(0.0, 0.0, reference.trajectory.at(time)[:, 2].max())]
         row = self.renderer.camera.project(top, self.renderer.width, self.renderer.height)[0, 1]
@@ -116,7 +116,7 @@ class _Wall:
 
 
 def captions(entry: Entry) -> list[str]:
-    """Lines below a body: its engine, cost and error."""
+    """Return the lines of text below a body: its engine, cost and error."""
     squash = f"squashed by {entry.outcome.squash:.1%}"
     bounce = f"bounces back to {entry.outcome.bounce:.0%}"
     if entry.is_reference:
@@ -130,7 +130,7 @@ def captions(entry: Entry) -> list[str]:
 
 
 def _milliseconds(time: float) -> str:
-    """Milliseconds with at least two digits."""
+    """Format a time [s] in milliseconds, with at least two digits."""
     ms = time * 1e3
     return f"{ms:.{0 if ms >= 10 else 1 if ms >= 1 else 2}f} ms"
 

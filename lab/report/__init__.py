@@ -1,1 +1,1 @@
-"""Experiments as a page, as files of numbers, and on the terminal."""
+"""Report experiments as a page, as files of numbers, and in the terminal."""

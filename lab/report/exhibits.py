@@ -1,4 +1,4 @@
-"""Sections ready for the page: images as files, tables as text, names for files and links."""
+"""Sections prepared for the page: images as files, tables as text, file names and links."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.render.opencv import cv2
 
 LONG = 12
-"""Rows; longer tables are folded."""
+"""Largest number of rows of a table that is not folded."""
 
 WIDE = 640
-"""Pixels; wider images have a row of their own."""
+"""Width above which an image is placed in a separate row [pixels]."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """A plot or picture.
+    """A plot or image of bodies.
 
     Args:
-        path: of its file, relative to the page.
-        png: empty if a plot needs a point that failed.
-        error: the reason then.
+        path: path of the file, relative to the page.
+        png: content of the file; empty if a plot needs a point that failed.
+        error: reason for an empty `png`.
     """
 
     path: str
@@ -51,18 +51,18 @@ class Image:
 
     @property
     def is_wide(self) -> bool:
-        """True if it has a row of its own, so that its text stays readable."""
+        """True if the image is placed in a separate row, so that its text stays readable."""
         return self.width > WIDE
 
     @property
     def uri(self) -> str:
-        """The image as a data URI."""
+        """Data URI of the image."""
         return "data:image/png;base64," + base64.b64encode(self.png).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table. `right`: True for each column of numbers, which is aligned to the right."""
+    """A formatted table. `right` is True for each column of numbers, which is aligned to the right."""
 
     path: str
     title: str
@@ -73,23 +73,23 @@ class Sheet:
 
     @property
     def is_long(self) -> bool:
-        """True if it is folded."""
+        """True if the table is folded."""
         return len(self.rows) > LONG
 
     @property
     def shown(self) -> tuple[tuple[str, ...], ...]:
-        """The first rows, for a format that cannot fold."""
+        """First rows of the table, for a format that cannot fold."""
         return self.rows[:LONG]
 
     @property
     def uri(self) -> str:
-        """The CSV as a data URI."""
+        """Data URI of the CSV file."""
         return "data:text/csv;charset=utf-8;base64," + base64.b64encode(self.csv.encode()).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Exhibit:
-    """An experiment with the contents of its section."""
+    """An experiment and the prepared contents of its section."""
 
     experiment: Experiment
     section: Section
@@ -104,12 +104,15 @@ class Exhibit:
 
     @property
     def anchor(self) -> str:
-        """Anchor of its heading."""
+        """Anchor of the section's heading."""
         return "experiment-" + file_name(self.experiment.name)
 
 
 def exhibit_of(experiment: Experiment, results: Results, section: Section) -> Exhibit:
-    """Draw plots and format tables. Raises: OptionError for duplicate names or rows of a wrong length."""
+    """Draw the plots of a section and format its tables.
+
+    Raises: OptionError for duplicate names or rows of a wrong length.
+    """
     name = file_name(experiment.name)
     for kind in (section.tables, section.plots, section.pictures):
         require_distinct((each.name for each in kind), experiment.name)
@@ -128,12 +131,12 @@ def exhibit_of(experiment: Experiment, results: Results, section: Section) -> Ex
 
 
 def file_name(name: str) -> str:
-    """A name without characters that files or links do not allow."""
+    """Replace the characters of a name that files or links do not allow."""
     return re.sub(r"[^A-Za-z0-9_.]+", "-", name).strip("-.") or "unnamed"
 
 
 def require_distinct(names: Iterable[str], whose: str) -> None:
-    """Raise an OptionError if two names would have the same file."""
+    """Raise an OptionError if two names would have the same file name."""
     seen: set[str] = set()
     for name in names:
         if file_name(name).lower() in seen:
@@ -162,7 +165,7 @@ def _encoded(picture: Picture, path: str) -> Image:
 
 
 def sheet_of(table: Table, path: str) -> Sheet:
-    """A table as text. Raises: OptionError for rows of a wrong length."""
+    """Format a table as text. Raises: OptionError for rows of a wrong length."""
     for row in table.rows:
         if len(row) != len(table.columns):
             raise OptionError(

@@ -1,4 +1,4 @@
-"""All claims with their findings, and how many of them agree."""
+"""Collect all claims with their findings, and count how many agree."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Concluded = tuple[Experiment, Results, Section]
 
 NOT_MEASURED = "not measured"
 OUTCOMES = (*(verdict.value for verdict in Verdict), NOT_MEASURED)
-"""Outcomes of a claim, in words."""
+"""All outcomes of a claim, in words."""
 
 PLURAL = {"agrees": "agree", "agrees in part": "agree in part", "differs": "differ"}
-"""Outcomes of several claims, if the words differ from those of one."""
+"""Plural of each outcome that has a different form."""
 
 KINDS = {True: "claims of the thesis", False: "statements of theory"}
-"""Names of the two kinds of claims, by `Claim.is_of_thesis`."""
+"""Names of both kinds of claims, by `Claim.is_of_thesis`."""
 
 CHAPTERS = {
     "3": "Chapter 3, Computational physics",
@@ -34,7 +34,7 @@ THEORY = "Beyond the thesis: theory"
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim and all findings about it, each with its experiment."""
+    """A claim and all findings on it, each with its experiment."""
 
     key: str
     claim: Claim
@@ -42,7 +42,7 @@ class Judgement:
 
     @property
     def outcome(self) -> str:
-        """One of `OUTCOMES`. The least favourable of several findings decides."""
+        """Least favourable outcome of the findings, one of `OUTCOMES`."""
         verdicts = [finding.verdict for _, finding in self.findings]
         for verdict in (Verdict.DIFFERS, Verdict.UNKNOWN, Verdict.PARTLY, Verdict.AGREES):
             if verdict in verdicts:
@@ -51,13 +51,16 @@ class Judgement:
 
     @property
     def chapter(self) -> str:
-        """Heading of its chapter of the thesis, or that of theory."""
+        """Heading of the claim's chapter of the thesis, or the heading of theory."""
         number = re.match(r"(?:chapter|section|figure) (\d)", self.claim.source)
         return CHAPTERS.get(number.group(1), THEORY) if number else THEORY
 
 
 def judge(sections: Sequence[Concluded]) -> list[Judgement]:
-    """All claims in their order, with their findings. Raises: OptionError for a finding about no claim."""
+    """Return all claims with their findings, in order.
+
+    Raises: OptionError for a finding on an unknown claim.
+    """
     found: dict[str, list[tuple[Experiment, Finding]]] = {key: [] for key in CLAIMS}
     for experiment, _, section in sections:
         for finding in section.findings:
@@ -70,7 +73,7 @@ def judge(sections: Sequence[Concluded]) -> list[Judgement]:
 
 
 def counts(judgements: Sequence[Judgement]) -> dict[str, dict[str, int]]:
-    """Number of claims with each outcome, in the order of `OUTCOMES`, by the names in `KINDS`."""
+    """Count the claims of each kind in `KINDS` by outcome, in the order of `OUTCOMES`."""
     found = {}
     for is_of_thesis, kind in KINDS.items():
         outcomes = [each.outcome for each in judgements if each.claim.is_of_thesis is is_of_thesis]
@@ -79,5 +82,5 @@ def counts(judgements: Sequence[Judgement]) -> dict[str, dict[str, int]]:
 
 
 def in_words(outcome: str, number: int) -> str:
-    """The outcome of a number of claims: "1 agrees", "2 agree"."""
+    """Format the outcome of a number of claims: "1 agrees", "2 agree"."""
     return f"{number} {outcome if number == 1 else PLURAL.get(outcome, outcome)}"

@@ -1,4 +1,4 @@
-"""Table of every law in the checks against theory."""
+"""Table of all laws and checks against theory."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ Values = Mapping[str, float]
 
 THEORY = "theory"
 DEPTH = 1
-"""Index in `DEPTHS`: small enough for Hertz, and deep enough for the mesh."""
+"""Index in `DEPTHS` of a depth that is small enough for Hertz, and large enough for the mesh."""
 
 
 def law_table(sections: Sequence[Concluded]) -> Table | None:
-    """A row for each law, a column for each check that was made; None without any."""
+    """Return a table with a row for each law and a column for each check that was made; None without
+    checks.
+    """
     results = {experiment.name: results for experiment, results, _ in sections}
     checks: dict[str, tuple[float, Values]] = {}
     if "patch-test" in results:

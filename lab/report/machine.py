@@ -1,4 +1,4 @@
-"""Facts about the machine and the packages of a report."""
+"""Describe the machine and the packages of a report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PACKAGES = ("taichi-soft", "taichi", "numpy", "scipy", "scikit-fem")
 
 
 def machine_facts(arch: str) -> dict[str, str]:
-    """Facts to print, by name. `arch` is Taichi's name of the device."""
+    """Return facts to print, by name; `arch` is Taichi's name of the device."""
     return {
         "device": f"{arch}, one thread per process",
         "processor": f"{_processor()}, {os.cpu_count()} cores",
@@ -22,7 +22,7 @@ def machine_facts(arch: str) -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Name of the processor, if the system reports one."""
+    """Return the name of the processor; its architecture if the name is unknown."""
     information = Path("/proc/cpuinfo")
     if information.exists():
         for line in information.read_text().splitlines():

@@ -7,14 +7,14 @@ from typing import Any
 
 
 class Literal(str):
-    """Text that needs no escape: Markdown, or the path of a file."""
+    """Text that is not escaped: Markdown, or the path of a file."""
 
 
 def escaped(value: Any) -> str:
-    """A value as one line of text that Markdown prints literally, also in tables."""
+    """Convert a value to one line of text that Markdown prints literally, even in a table."""
     if isinstance(value, Literal):
         return value
     text = " ".join(str(value).split())
     text = re.sub(r"([\\`*_\[\]<>|&~$])", r"\\\1", text)
-    # At the start of a line: headings and underlines of headings, lists, numbered lists.
+    # Characters at the start of a line that begin or underline a heading, or begin a list.
     return re.sub(r"^(?=#|[-+](?:\s|$)|[-=]+$)|^(\d+)(?=[.)](?:\s|$))", lambda at: (at[1] or "") + "\\", text)

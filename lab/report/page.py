@@ -1,4 +1,4 @@
-"""The report: one self-contained page, the same in Markdown, and every number as CSV."""
+"""Write the report: one self-contained page, the same in Markdown, and all numbers as CSV."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ TEMPLATES = Path(__file__).parent / "templates"
 def write_report(
     sections: Sequence[Concluded], directory: Path, command: str, effort: Effort, facts: dict[str, str]
 ) -> Path:
-    """Write the sections in the given order.
+    """Write the report, with the sections in the given order.
 
     Args:
-        directory: folder for `report.html`, `report.md` and `verdicts.csv`, and for the folders `plots`,
-            `pictures`, `tables` and `points`. It is created if it is missing. Other files in it stay.
+        sections: experiments with their results and sections.
+        directory: folder for `report.html`, `report.md`, `verdicts.csv` and the folders `plots`, `pictures`,
+            `tables` and `points`. A missing folder is created. Other files in the folder stay.
         command: command line that repeats this report.
+        effort: extent of the report.
         facts: names and values of the machine and of versions.
     Returns: the path of `report.html`, which needs no other file.
-    Raises: OptionError without the extra `lab`, for names used twice, findings about no claim, rows or
-        pictures of a wrong shape, and a directory that cannot be written. Existing files then stay as they
-        are.
+    Raises: OptionError without the extra `lab`, for duplicate names, findings on unknown claims, rows or
+        images of a wrong shape, or a folder that cannot be written. Existing files then stay unchanged.
     """
     require_report()
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
@@ -63,7 +64,7 @@ def write_report(
 
 
 def _filled(name: str, values: dict[str, Any]) -> str:
-    """A template with its values, each escaped for the format."""
+    """Fill a template with values, each escaped for the format."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     is_html = name.endswith(".html")
@@ -85,7 +86,7 @@ def _filled(name: str, values: dict[str, Any]) -> str:
 def _data_files(
     exhibits: Sequence[Exhibit], judgements: Sequence[Judgement], sheets: Sequence[Sheet]
 ) -> dict[str, bytes]:
-    """All files except the pages, by their paths in the directory."""
+    """Return the contents of all files except the pages, by path in the folder."""
     texts = {"verdicts.csv": csv_of_judgements(judgements)} | {sheet.path: sheet.csv for sheet in sheets}
     files: dict[str, bytes] = {}
     for each in exhibits:
@@ -104,7 +105,7 @@ def _replace(directory: Path, files: dict[str, bytes]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             parts[target] = target.with_name(f".{target.name}.part")
             parts[target].write_bytes(data)
-        for target, part in parts.items():  # the pages last
+        for target, part in parts.items():  # the pages come last
             os.replace(part, target)
     except OSError as error:
         raise OptionError(f"cannot write the report to {directory}: {error.strerror or error}") from error

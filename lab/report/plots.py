@@ -1,4 +1,4 @@
-"""Plots as PNG, all in one style."""
+"""Draw plots as PNG files in one style."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import warnings
 from lab.experiments import Plot
 
 SCALE = 2
-"""Pixels of the file per pixel of the page, at 96 pixels per inch: sharp on high-resolution screens."""
+"""Pixels of the file per pixel of the page (96 per inch), for high-resolution screens."""
 
 COLOURS_OF_A_FILE = 128
-"""Enough for the anti-aliased lines and letters of a plot."""
+"""Number of colours of a file, enough for anti-aliased lines and letters."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Colours of Okabe and Ito, which colour-blind readers can distinguish; without yellow, pale on white."""
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish. Yellow is omitted, because it is pale
+on white."""
 
 STYLE = {
     "font.size": 11,
@@ -43,9 +44,9 @@ STYLE = {
 
 
 def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
-    """A plot as PNG, and its size on the page [pixels].
+    """Draw a plot. Returns: the PNG file, and its size on the page [pixels].
 
-    Raises: MissingPointError if a point that it needs is missing.
+    Raises: MissingPointError if a point that the plot needs is missing.
     """
     import matplotlib
     from cycler import cycler
@@ -57,14 +58,14 @@ def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
         matplotlib.rc_context({**STYLE, "axes.prop_cycle": cycle}),
         warnings.catch_warnings(),
     ):
-        warnings.filterwarnings("ignore", "The figure layout has changed to tight")  # it may
+        warnings.filterwarnings("ignore", "The figure layout has changed to tight")  # expected
         figure = Figure(figsize=(width / 96, height / 96), dpi=96 * SCALE, layout="constrained")
         plot.draw(figure)
         for axes in figure.axes:
             if axes.images or any(type(artist).__name__ == "QuadMesh" for artist in axes.collections):
-                axes.grid(False)  # it would lie over the map
+                axes.grid(False)  # a grid would cover the map
         if any(axes.get_aspect() != "auto" for axes in figure.axes):
-            for _ in range(2):  # the layout of axes of a fixed aspect converges with drawing
+            for _ in range(2):  # the layout of axes with a fixed aspect needs two passes
                 figure.draw_without_rendering()
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=96 * SCALE)
@@ -72,8 +73,8 @@ def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
 
 
 def _with_palette(file: io.BytesIO) -> bytes:
-    """The same image with a palette, in a third of the bytes."""
-    from PIL import Image  # which matplotlib brings with it
+    """Convert a PNG image to a palette, which takes a third of the bytes."""
+    from PIL import Image  # a dependency of matplotlib
 
     smaller = io.BytesIO()
     with Image.open(file) as image:

@@ -1,4 +1,4 @@
-"""The sweep of `drop-test`: compute and store its cells, count them by law, and print them."""
+"""The sweep of `drop-test`: compute and store its cells, count the verdicts by law, and print them."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from taichi_soft.core.types import ArchName
 from taichi_soft.meshing.delaunay import scipy_spatial
 
 TIME_LIMIT = 600.0
-"""Longest time of a cell [s]. A longer one has no result, and is retried."""
+"""Time limit of a cell [s]. A cell that exceeds it has no result and is retried."""
 
 SOFT_MACH, SOFT_SAG = 0.5, 0.1
-"""Limits above which a line names them: a body that hits the floor at its speed of sound is crushed."""
+"""Values above which a line mentions them. A body that hits the floor at its speed of sound is crushed."""
 
 COLUMNS = (
     Verdict.OK,
@@ -58,12 +58,13 @@ CRITERION = (
 def run_sweep(
     cells: Sequence[Cell], folder: Path, console: Console, *, workers: int | None, arch: ArchName
 ) -> list[Result]:
-    """Compute the cells that are not in `folder` yet, group by group, and store each at once.
+    """Compute the cells that `folder` does not contain yet, group by group, and store each result
+    immediately.
 
     Args:
-        workers: number of processes; None: one for each core.
-    Raises: OptionError before anything is computed, if scipy is needed and not installed; SweepError for
-        files that are not of a sweep, or cannot be written.
+        workers: number of processes; None for one per core.
+    Raises: OptionError before anything is computed if scipy is needed and not installed; SweepError for files
+        that do not belong to a sweep, or cannot be written.
     """
     groups = [name for name in (*GROUPS, "random wrecks") if any(cell["group"] == name for cell in cells)]
     if "foreign" in groups:
@@ -93,18 +94,18 @@ def _experiment(name: str, cells: list[Cell]) -> Experiment:
 
 
 def verdict_of(row: Result) -> Verdict:
-    """Verdict of a cell."""
+    """Return the verdict of a result."""
     return Verdict.NO_RESULT if row.numbers is None else Verdict(row.numbers["verdict"])
 
 
 def is_broken(row: Result) -> bool:
-    """True if the default law fails there, or there is no result."""
+    """True for a cell of the default law that is neither OK, too soft, too slow nor refused."""
     fine = (Verdict.OK, Verdict.TOO_SOFT, Verdict.TOO_SLOW, Verdict.REFUSED)
     return row.point["law"] is None and verdict_of(row) not in fine
 
 
 def counts_by_law(rows: Sequence[Result]) -> dict[tuple[str, str, str, str], Counter[Verdict]]:
-    """Number of cells with each verdict by group, law, flips and damping, in the order of the rows."""
+    """Count the verdicts of each group, law, flips and damping, in the order of the rows."""
     found: dict[tuple[str, str, str, str], Counter[Verdict]] = {}
     for row in rows:
         cell = row.point
@@ -114,7 +115,7 @@ def counts_by_law(rows: Sequence[Result]) -> dict[tuple[str, str, str, str], Cou
 
 
 def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
-    """Print the first failed cells of each group and verdict, and the table."""
+    """Print the first `worst` cells of each group and verdict that are not OK, and a table of counts."""
     grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for heading in ("group", "law", "flips", "damping"):
         grid.add_column(heading, no_wrap=True)
@@ -136,7 +137,9 @@ def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
 
 
 def _unwell(rows: Sequence[Result]) -> list[Result]:
-    """Cells of the default law that are not ok; without any of these, those of the other laws."""
+    """Return the cells of the default law that are not OK; those of all laws if no cell has the
+    default law.
+    """
     unwell = [row for row in rows if verdict_of(row) is not Verdict.OK]
     if any(row.point["law"] is None for row in rows):
         return [row for row in unwell if row.point["law"] is None]
@@ -144,7 +147,7 @@ def _unwell(rows: Sequence[Result]) -> list[Result]:
 
 
 def line_of(row: Result) -> str:
-    """A cell, its verdict and its reason, in one line."""
+    """Format a cell, its verdict and its reason in one line."""
     cell, numbers = row.point, row.numbers or {}
     law = " ".join(word for word in (cell["law"] or "default", cell["flips"], cell["damping"]) if word)
     reason = numbers.get("reason", row.error)
@@ -158,7 +161,7 @@ def line_of(row: Result) -> str:
 
 
 def write_page(rows: Sequence[Result], path: Path, command: str, arch: ArchName) -> None:
-    """Write the table, the cells that are not ok, and the meshes as Markdown. Raises: OSError."""
+    """Write the table of counts, the cells that are not OK and the meshes as Markdown. Raises: OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(_page(rows, command, arch)) + "\n", encoding="utf-8")
 
@@ -197,7 +200,7 @@ def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]
 
 
 def _meshes(rows: Sequence[Result]) -> list[list[str | int]]:
-    """Facts of each mesh, from its first cell."""
+    """Return the facts of each mesh, from its first cell."""
     found: dict[tuple[str, str, float], list[str | int]] = {}
     for row in rows:
         cell, numbers = row.point, row.numbers
@@ -209,7 +212,7 @@ def _meshes(rows: Sequence[Result]) -> list[list[str | int]]:
 
 
 def _table(headings: Sequence[str], words: int, rows: Sequence[Sequence[object]]) -> Iterator[str]:
-    """A Markdown table; columns after the first `words` hold numbers."""
+    """Yield the lines of a Markdown table. Columns after the first `words` columns contain numbers."""
     yield _line(headings)
     yield f"|{'---|' * words}{'---:|' * (len(headings) - words)}"
     yield from map(_line, rows)

@@ -1,4 +1,4 @@
-"""Choose experiments by name, measure their points, and conclude."""
+"""Choose experiments by name, measure their points, and draw conclusions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,10 @@ from taichi_soft.core.types import ArchName
 
 
 def choose_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Experiments in the order of the report, all of them if no name is given. Raises: OptionError."""
+    """Return the experiments with these names in the order of the report, all if no name is given.
+
+    Raises: OptionError.
+    """
     for name in names:
         if name not in EXPERIMENTS:
             raise OptionError(f"unknown experiment {name!r}: {choose_one_of(EXPERIMENTS, name)}")
@@ -48,7 +51,7 @@ def choose_experiments(names: Sequence[str]) -> list[Experiment]:
 
 
 def require_writable(folder: Path) -> None:
-    """Create `folder` and check that files can be written there. Raises: OptionError."""
+    """Create `folder` and check that files can be written into it. Raises: OptionError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -69,16 +72,16 @@ def run_experiments(
     arch: ArchName = "cpu",
     time_limit: float = TIME_LIMIT,
 ) -> list[Concluded]:
-    """Measure all points that are not in `folder` yet, and conclude.
+    """Measure all points that `folder` does not contain yet, and draw conclusions.
 
-    Each result is stored in `folder` at once, so that an interrupted report resumes. Points that failed are
+    Each result is stored in `folder` immediately, so an interrupted report can resume. Failed points are
     retried.
 
     Args:
-        console: for progress, and for the errors of single points.
-        workers: number of processes; None: one for each core.
-        time_limit: longest time of a point [s].
-    Raises: SweepError before anything is computed, for files that cannot be used.
+        console: console for progress and for errors of points.
+        workers: number of processes; None for one per core.
+        time_limit: time limit of a point [s].
+    Raises: SweepError before anything is computed if a file cannot be used.
     """
     points = {experiment.name: experiment.points(effort) for experiment in experiments}
     with ExitStack() as stack:
@@ -128,7 +131,7 @@ def _results(points: Sequence[Point], store: Store) -> Results:
 
 
 def _conclude(experiment: Experiment, results: Results) -> Concluded:
-    """Conclude. If that fails and points are missing, the claims cannot be told."""
+    """Conclude an experiment. If that fails and points are missing, all its verdicts are "cannot be told"."""
     try:
         return experiment, results, _legible(section_of(experiment, results))
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Numbers as CSV, with all their digits."""
+"""Write numbers as CSV with all digits."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from lab.report.wording import plain
 
 
 def csv_of_table(table: Table) -> str:
-    """The table as CSV."""
+    """Convert a table to CSV."""
     return _written([table.columns, *table.rows])
 
 
 def csv_of_points(results: Results) -> str:
-    """A row for each point: varied and measured values (lists as JSON), error, and computing time."""
+    """Return a CSV row for each point: varied and measured values (lists as JSON), error, and
+    computing time.
+    """
     varied = list(dict.fromkeys(name for row in results.rows for name in row.point))
     measured = list(dict.fromkeys(name for row in results.rows for name in row.numbers or {}))
     rows: list[Sequence[Any]] = [
@@ -38,7 +40,7 @@ def csv_of_points(results: Results) -> str:
 
 
 def csv_of_judgements(judgements: Iterable[Judgement]) -> str:
-    """A row for each finding, and one for each claim without a finding."""
+    """Return a CSV row for each finding, and one for each claim without a finding."""
     rows: list[Sequence[Any]] = [
         ("claim", "chapter", "source", "text", "verdict", "measured", "why", "experiment")
     ]
@@ -58,6 +60,6 @@ def _written(rows: Iterable[Sequence[Any]]) -> str:
 
 
 def _cell(value: Any) -> Any:
-    """Numbers as Python writes them, which is exact; lists and booleans as JSON."""
+    """Format a value: numbers exactly, as Python writes them; lists and booleans as JSON."""
     value = plain(value)
     return json.dumps(value, default=plain) if isinstance(value, (list, tuple, dict, bool)) else value

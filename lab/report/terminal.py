@@ -1,4 +1,4 @@
-"""Sections and verdicts on the terminal."""
+"""Print sections and verdicts in the terminal."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ COLOURS = {
     "not measured": "dim",
 }
 MOST_ROWS = 20
-"""Rows of a table that are printed; the report has all of them."""
+"""Largest number of printed rows of a table; the report has all rows."""
 
 BETWEEN, WIDEST = 3, 40
-"""Characters between two columns, and of the longest cell that is not wrapped."""
+"""Number of characters between columns, and of the longest cell that is not wrapped."""
 
 
 def print_section(console: Console, experiment: Experiment, results: Results, section: Section) -> None:
@@ -57,7 +57,7 @@ def print_section(console: Console, experiment: Experiment, results: Results, se
 
 
 def print_verdicts(console: Console, rows: Sequence[Judgement]) -> None:
-    """Print the claims with their verdicts, the names of those not measured, and how many agree."""
+    """Print the claims with their verdicts, the claims that were not measured, and the number that agree."""
     grid = Grid(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, expand=True)
     grid.add_column("verdict", no_wrap=True)
     grid.add_column("claim", ratio=1)
@@ -88,7 +88,7 @@ def _coloured(outcome: str) -> Text:
 
 
 def _print_table(console: Console, table: Table) -> None:
-    """Print a table. If it is too wide for the console, print several parts, each with the first column."""
+    """Print a table. A table that is too wide is printed in several parts, each with the first column."""
     shown = table.rows[:MOST_ROWS]
     cells = [[readable(value) for value in row] for row in shown]
     right = numeric_columns(table.rows, len(table.columns))
@@ -108,7 +108,7 @@ def _print_table(console: Console, table: Table) -> None:
 
 
 def _parts(columns: Sequence[str], cells: Sequence[Sequence[str]], width: int) -> Iterator[list[int]]:
-    """Groups of columns that fit side by side if only headings and long cells are wrapped."""
+    """Yield groups of column indices that fit side by side if only headings and long cells are wrapped."""
     needed = [
         BETWEEN
         + min(WIDEST, max(len(word) for word in [*columns[k].split(), *(row[k] for row in cells), ""]))

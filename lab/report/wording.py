@@ -1,4 +1,4 @@
-"""Numbers, points and durations as text."""
+"""Format numbers, points and durations as text."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ from lab.experiments import Point
 
 
 def plain(value: Any) -> Any:
-    """A value without NumPy's types."""
+    """Convert NumPy values to Python values."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
     return value
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> tuple[bool, ...]:
-    """True for each of `count` columns with nothing but numbers and empty cells: aligned to the right."""
+    """Return True for each of `count` columns that contains only numbers and empty cells, to align it
+    right.
+    """
     columns = [[plain(row[k]) for row in rows] for k in range(count)]
     filled = [[value for value in column if value is not None and value != ""] for column in columns]
     return tuple(bool(column) and all(_is_number(value) for value in column) for column in filled)
@@ -36,7 +38,7 @@ def _is_number(value: Any) -> bool:
 
 
 def readable(value: Any) -> str:
-    """A cell of a table: a number with four digits, yes or no for a boolean, a dash for None."""
+    """Format a cell of a table: a number with four digits, yes or no for a boolean, a dash for None."""
     value = plain(value)
     if value is None:
         return "–"
@@ -50,14 +52,14 @@ def readable(value: Any) -> str:
 
 
 def _digits(value: float) -> str:
-    """1234.5 as 1234, 123456.0 as 1.235e5."""
+    """Format a number with four digits: 1234.5 as 1234, 123456.0 as 1.235e5."""
     if 1e3 <= abs(value) < 1e5:
         return f"{value:.0f}"
     return re.sub(r"e([+-])0*(\d)", lambda power: "e" + power[1].strip("+") + power[2], f"{value:.4g}")
 
 
 def legible(text: str) -> str:
-    """A text with readable numbers: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
+    """Rewrite the numbers in a text: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
     return re.sub(r"(?<![\w.])(\d)(?:\.(\d+))?e([+-]\d+)", _plain_power, text)
 
 
@@ -69,12 +71,12 @@ def _plain_power(number: re.Match[str]) -> str:
 
 
 def point_line(point: Point) -> str:
-    """A point in one line: "law = virial, young = 1e6"."""
+    """Format a point in one line: "law = virial, young = 1e6"."""
     return ", ".join(f"{name} = {readable(value)}" for name, value in point.items())
 
 
 def duration(seconds: float) -> str:
-    """Seconds as s, min or h."""
+    """Format a duration in s, min or h."""
     if seconds < 100.0:
         return f"{seconds:.2g} s"
     if seconds < 6000.0:

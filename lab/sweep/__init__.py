@@ -1,6 +1,6 @@
-"""Compute points in processes of this machine, and store each result at once.
+"""Compute points in processes of this machine, and store each result immediately.
 
-A point and its result are plain data. This package does not interpret either.
+Points and results are plain data, which this package does not interpret.
 """
 
 from lab.sweep.progress import show_progress

@@ -1,4 +1,4 @@
-"""Progress of a sweep on the console."""
+"""Show the progress of a sweep on the console."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 LINE_EVERY = 30.0
-"""Interval between lines without a terminal [s]."""
+"""Interval between progress lines if the console is not a terminal [s]."""
 
 
 class Advance(Protocol):
-    """Callback: one more point of the group `name` is done."""
+    """Callback that reports one finished point of the group `name`."""
 
     def __call__(self, name: str) -> None: ...
 
 
 @contextmanager
 def show_progress(console: Console, total: int) -> Iterator[Advance]:
-    """Show a bar with the time left in a terminal, and a line every `LINE_EVERY` elsewhere."""
+    """Show a progress bar in a terminal; elsewhere print a line every `LINE_EVERY` seconds."""
     columns: tuple[Any, ...] = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -33,7 +33,7 @@ def show_progress(console: Console, total: int) -> Iterator[Advance]:
         *columns,
         console=console,
         disable=not console.is_terminal,
-        refresh_per_second=2,  # it is not to disturb what is timed
+        refresh_per_second=2,  # rare, to leave timings undisturbed
         speed_estimate_period=600,
     )
     with bar:

@@ -1,4 +1,4 @@
-"""Origin of results: sources, versions and device."""
+"""Describe the origin of results: sources, versions and device."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
 _ABOVE = {"report", "cli", "__main__.py"}
-"""Layers above the experiments: they show results, and cannot change them."""
+"""Layers above the experiments. They show results and cannot change them."""
 
 
 def origin(arch: str) -> dict[str, str]:
@@ -18,7 +18,7 @@ def origin(arch: str) -> dict[str, str]:
 
 
 def sources() -> list[str]:
-    """Files of the library and of the lab that results depend on, as paths within the checkout."""
+    """List the files of the library and the lab on which results depend, as paths in the checkout."""
     found = [path for folder in ("lab", "taichi_soft") for path in sorted((_ROOT / folder).rglob("*.py"))]
     names = [path.relative_to(_ROOT) for path in found]
     return [name.as_posix() for name in names if _ABOVE.isdisjoint(name.parts[1:3])]

@@ -1,4 +1,4 @@
-"""Assign points to processes."""
+"""Assign points to worker processes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from taichi_soft.core.cores import available_cores
 from taichi_soft.core.types import ArchName
 
 TIME_LIMIT = 1800.0
-"""Longest time of a point [s]."""
+"""Time limit of a point [s]."""
 
 LOOK = 0.5
-"""Interval at which time limits are checked, and Ctrl-C where it does not interrupt a wait [s]."""
+"""Interval between checks of time limits, and of Ctrl-C on systems where it does not interrupt a wait [s]."""
 
 
 def compute_all(
@@ -24,14 +24,14 @@ def compute_all(
     arch: ArchName = "cpu",
     time_limit: float = TIME_LIMIT,
 ) -> Generator[tuple[Task, Outcome], None, None]:
-    """Compute points and yield them as they are done. Those that have to run alone come last, one by one.
+    """Compute points and yield each outcome when it is ready. Points that must run alone come last.
 
-    The outcome of a point that failed has the error: an exception, a lost process, or a timeout. Closing
-    the iterator stops the computation: use `contextlib.closing`.
+    The outcome of a failed point contains its error: an exception, a lost process, or a timeout. Closing the
+    iterator stops the computation: use `contextlib.closing`.
 
     Args:
-        workers: number of processes of one thread each, started when needed; None: one for each core.
-        time_limit: longest time of a point [s].
+        workers: number of processes with one thread each, started when needed; None for one per core.
+        time_limit: time limit of a point [s].
     """
     crew = [Worker(arch, time_limit) for _ in range(workers or len(available_cores()))]
     try:
@@ -63,7 +63,7 @@ def _compute(tasks: Sequence[Task], crew: Sequence[Worker]) -> Iterator[tuple[Ta
 
 
 class Waiting:
-    """Points not yet started, by group."""
+    """Points that are not yet started, by group."""
 
     def __init__(self, tasks: Sequence[Task]) -> None:
         self._groups: dict[str, list[Task]] = {}
@@ -72,10 +72,12 @@ class Waiting:
             self._groups.setdefault(task.group, []).append(task)
 
     def take(self, known: set[str]) -> Task | None:
-        """Take the next point for a worker that has computed points of the groups `known`.
+        """Remove and return the next point for a worker; None if no point is left.
 
-        It is one of these groups, or else of one that no worker has started, or else of the group with most
-        points left. The group is added to `known`.
+        A point of a group that the worker has already computed comes first, then one of a group that no
+        worker has started, then one of the group with most points left.
+        Args:
+            known: groups that the worker has computed; the point's group is added.
         """
         left = [name for name, tasks in self._groups.items() if tasks]
         if not left:

@@ -1,4 +1,4 @@
-"""Results of points in a file, so that an interrupted sweep resumes."""
+"""Store the results of points in a file, so that an interrupted sweep can resume."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ FORMAT = "taichi-soft sweep 1"
 
 
 class SweepError(TaichiSoftError, RuntimeError):
-    """Results cannot be stored."""
+    """A file of results cannot be used."""
 
 
 class Store:
-    """Outcomes by point, in a file of JSON lines: a header with the origin, then one line for each point.
+    """Outcomes of points in a JSON-lines file: a header with the origin, then one line per point.
 
-    An incomplete last line is dropped, and its point computed again. A file of another origin is renamed.
+    An incomplete last line is dropped, and its point is computed again. A file of another origin is renamed.
 
     Args:
         origin: sources, versions and device of the results, from `sweep.origin`.
     Attributes:
-        set_aside: new path of the results of another origin, or None.
-    Raises: SweepError where the file is not one of these, which is then left as it is, or cannot be written.
+        set_aside: new path of a file with results of another origin, or None.
+    Raises: SweepError if the file has another format, in which case it stays unchanged, or cannot be written.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, str]) -> None:
@@ -45,11 +45,11 @@ class Store:
             raise self._refusal(error) from error
 
     def get(self, point: Mapping[str, Any]) -> Outcome | None:
-        """Outcome of a point; None if it was not computed yet."""
+        """Return the outcome of a point; None if it is not stored."""
         return self._outcomes.get(_key(point))
 
     def keep(self, point: Mapping[str, Any], outcome: Outcome) -> None:
-        """Store the outcome of a point in place of an earlier one. Raises: SweepError."""
+        """Store the outcome of a point, in place of an earlier one. Raises: SweepError."""
         self._outcomes[_key(point)] = outcome
         try:
             self._append({"point": point, **vars(outcome)})
@@ -65,7 +65,7 @@ class Store:
         self._file.flush()
 
     def _read(self, header: Mapping[str, Any]) -> int:
-        """Read the existing results; return the length of the part to keep [bytes]."""
+        """Read the existing results. Returns: length of the part of the file to keep [bytes]."""
         data = self.path.read_bytes()
         length = data.rfind(b"\n") + 1
         lines = data[:length].splitlines()
@@ -127,7 +127,7 @@ def _key(point: Mapping[str, Any]) -> str:
 
 
 def _checked(outcome: Outcome) -> Outcome:
-    """Return `outcome` if its values have their types. Raises: TypeError."""
+    """Return `outcome` after checking the types of its values. Raises: TypeError."""
     if not (
         isinstance(outcome.numbers, dict | None)
         and isinstance(outcome.error, str)

@@ -1,4 +1,4 @@
-"""Tasks and their outcomes."""
+"""Tasks, and the outcomes of computing them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ class Task:
     """A point to compute.
 
     Args:
-        group: points of the same group share compiled kernels, and are best computed in the same process.
-        function: function of the point that returns plain data. Other processes import it by its name.
+        group: name of the point's group. Points of a group share compiled kernels, so one process should
+            compute
+            them.
+        function: function that computes the point and returns plain data. Other processes import it by name.
         is_alone: True if nothing else may run at the same time.
     """
 
@@ -32,7 +34,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a point: numbers, or None and an error."""
+    """Outcome of a point: its numbers, or None and an error."""
 
     numbers: dict[str, Any] | None
     error: str = ""
@@ -42,10 +44,10 @@ class Outcome:
 def compute(
     arch: ArchName, function: Callable[[dict[str, Any]], dict[str, Any]], point: dict[str, Any]
 ) -> Outcome:
-    """Compute a point in this process, on one thread of the CPU or on `arch`.
+    """Compute a point in this process, on one CPU thread or on `arch`.
 
-    Results are converted to JSON and back, so that they are the same from a process and from a file.
-    Warnings are not shown: experiments deliberately do what games are warned about.
+    Results are converted to JSON and back, so that results from a process and from a file are equal. Warnings
+    are ignored, because experiments deliberately do what games are warned about.
     """
     start = time.perf_counter()
     try:
@@ -62,7 +64,7 @@ def compute(
 
 
 def _line_of(error: Exception) -> str:
-    """The error and its place, in one line."""
+    """Format an error and its place in one line."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     file = place.filename.replace("\\", "/").rpartition("/")[2]
     return f"{type(error).__name__}: {' '.join(str(error).split())} ({file}:{place.lineno})"

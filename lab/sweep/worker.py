@@ -1,4 +1,4 @@
-"""A process on this machine that computes points."""
+"""Worker processes on this machine that compute points."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from taichi_soft.core.types import ArchName
 CONTEXT = multiprocessing.get_context("spawn")
 
 START_LIMIT = 120.0
-"""Time for a new process to start Python, import this package and start Taichi [s]."""
+"""Time limit for a new process to start Python, import this package and start Taichi [s]."""
 
 END_LIMIT = 10.0
-"""Time for a process to exit, in which Taichi writes compiled kernels to its cache [s]."""
+"""Time limit for a process to exit [s]. Meanwhile Taichi writes compiled kernels to its cache."""
 
 
 class Worker:
-    """A process that computes one point at a time. If it is lost, the next point starts another one.
+    """A process that computes one point at a time. If it is lost, the next point starts another process.
 
-    `concurrent.futures` is not enough: before Python 3.14 it cannot end a process that hangs, it does not
-    report how a process died, and if its own process is killed, the others stay.
+    `concurrent.futures` is not sufficient: before Python 3.14 it cannot end a process that hangs, it does not
+    report how a process ended, and if the parent process is killed, its workers remain.
     """
 
     def __init__(self, arch: ArchName, time_limit: float) -> None:
@@ -39,25 +39,25 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """True while it computes a point."""
+        """True while the process computes a point."""
         return self._task is not None
 
     @property
     def pipe(self) -> Connection:
-        """Pipe that is readable as soon as `look` may return an outcome."""
+        """Pipe that becomes readable when `look` may return an outcome."""
         assert self._pipe is not None
         return self._pipe
 
     def begin(self, task: Task) -> None:
-        """Start to compute a point, without waiting for it."""
+        """Start to compute a point, and return immediately."""
         if self._process is None:
             self._start()
         self._task, self._began = task, time.perf_counter()
-        with suppress(OSError):  # the process is lost: `look` reports it
+        with suppress(OSError):  # `look` reports a lost process
             self.pipe.send((task.function, task.point))
 
     def look(self) -> tuple[Task, Outcome] | None:
-        """Return the point and its outcome; None while it is being computed."""
+        """Return the point and its outcome; None while it is computed."""
         task = self._task
         assert task is not None
         try:
@@ -86,7 +86,10 @@ class Worker:
             self.end()
 
     def end(self) -> str:
-        """Wait until the process exits, and return how it ended."""
+        """Wait until the process exits, and kill it after `END_LIMIT`.
+
+        Returns: a description of how it ended.
+        """
         if self._process is None:
             return ""
         self.pipe.close()
@@ -98,12 +101,12 @@ class Worker:
         return f"exit code {code}" if code is None or code >= 0 else f"killed by {signal.Signals(-code).name}"
 
     def _start(self) -> None:
-        """Start a process that ignores Ctrl-C: it ends when the pipe is closed."""
+        """Start a process that ignores Ctrl-C. It ends when the pipe is closed."""
         self._is_starting = True
         self._pipe, theirs = CONTEXT.Pipe()
         self._process = CONTEXT.Process(target=_serve, args=(theirs, self._arch), daemon=True)
         if hasattr(signal, "pthread_sigmask"):
-            resource_tracker.ensure_running()  # or it would be started below, and unblock signals
+            resource_tracker.ensure_running()  # otherwise it starts below and unblocks signals
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             self._process.start()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -113,7 +116,7 @@ class Worker:
 
 
 def _serve(pipe: Connection, arch: ArchName) -> None:
-    """Compute the points that are sent until the pipe is closed."""
+    """Compute points from the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     compute(arch, dict, {})  # starts Taichi
     with suppress(EOFError, ConnectionError):

@@ -1,4 +1,4 @@
-"""Bake a simulation into one file of meshes and their motion, for a content pipeline."""
+"""Bake a simulation into a file of meshes and their motion, for a content pipeline."""
 
 from taichi_soft.bake.baking import BakeReport, bake
 from taichi_soft.bake.room import Room

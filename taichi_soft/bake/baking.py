@@ -1,4 +1,4 @@
-"""Bake a scene into a file."""
+"""Simulate a scene and write its meshes into a file."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _format_of(path: Path) -> Format:
 
 
 def _require_place(path: Path) -> None:
-    """Raise a BakeError if the path holds something that must not be replaced."""
+    """Raise a BakeError if `path` holds something that a bake must not replace."""
     wants_folder = path.suffix.lower() == ".vat"
     if path.is_dir() and not (wants_folder and (is_vat(path) or not any(path.iterdir()))):
         raise BakeError(f"cannot write {path}: the folder is not a .vat: choose another path, or remove it")
@@ -134,7 +134,7 @@ def _require_limit(room: Room, limit: float, path: Path) -> None:
 
 @contextmanager
 def _part_folder(path: Path) -> Iterator[Path]:
-    """Make a temporary folder next to the file's path."""
+    """Return a context with a temporary folder next to `path`, which is removed at the end."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)
@@ -147,7 +147,7 @@ def _part_folder(path: Path) -> Iterator[Path]:
 
 
 def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Interpolation) -> int:
-    """Write into the folder, and move the result to `path` when it is complete. Returns: size [bytes]."""
+    """Write into the temporary folder, and move the complete result to `path`. Returns: its size [bytes]."""
     try:
         made = part / f"bake{path.suffix.lower()}"
         form.write(take, made, interpolation)
@@ -160,7 +160,7 @@ def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Inte
 
 
 def _move(made: Path, path: Path, old: Path) -> None:
-    """Move a complete result to its path. A folder keeps files of others, such as Godot's import settings."""
+    """Move a complete result to `path`. Files of others in a folder stay, such as Godot's import settings."""
     if not path.is_dir():
         made.replace(path)
         return

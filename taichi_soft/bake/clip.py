@@ -1,4 +1,4 @@
-"""Clips: meshes over time, the input of all formats."""
+"""Clips: meshes over time, the input of all bake formats."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Ints32 = NDArray[np.int32]
 
 @dataclass(eq=False)
 class Clip:
-    """One render mesh of one body, from the frame in which the body appears to the one in which it leaves.
+    """A render mesh of a body, for all frames in which the body is in the world.
 
-    A frame without motion is the same array object as the one before it.
+    If nothing moved, a frame is the same array object as the frame before it.
     """
 
-    name: str  # unique
-    triangles: Ints32  # (m, 3)
+    name: str  # unique name of the mesh
+    triangles: Ints32  # vertex indices, (m, 3)
     visual: Any  # `visual` of trimesh, or None
     first: int  # frame of the bake in which the body appears
-    positions: list[Floats32] = field(default_factory=list)  # (k, 3) each [m], z up
-    normals: list[Floats32] = field(default_factory=list)  # (k, 3) each, of unit length
+    positions: list[Floats32] = field(default_factory=list)  # one array per frame, (k, 3) [m], z up
+    normals: list[Floats32] = field(default_factory=list)  # one array per frame, (k, 3), unit vectors
 
     @property
     def vertex_count(self) -> int:
@@ -34,19 +34,19 @@ class Clip:
 
     @property
     def end(self) -> int:
-        """Frame after the last one with the body."""
+        """Number of the first frame after those that contain the body."""
         return self.first + len(self.positions)
 
     @property
     def uv(self) -> Floats | None:
-        """Texture coordinates (k, 2) from the lower left; None if the mesh has none."""
+        """Texture coordinates (k, 2) from the lower left; None if the mesh has no texture coordinates."""
         uv = getattr(self.visual, "uv", None)
         if uv is None or len(uv) != self.vertex_count:
             return None
         return np.asarray(uv, dtype=np.float64)[:, :2]
 
     def add(self, positions: Floats32, normals: Floats32) -> None:
-        """Append the next frame."""
+        """Append the positions and normals of the next frame."""
         is_same = self.positions and np.array_equal(positions, self.positions[-1])
         if is_same and np.array_equal(normals, self.normals[-1]):
             positions, normals = self.positions[-1], self.normals[-1]
@@ -58,13 +58,18 @@ class Clip:
         return self.first <= frame < self.end
 
     def at(self, frame: int) -> tuple[Floats32, Floats32]:
-        """Positions and normals at a frame; those of the nearest frame if the body is absent."""
+        """Return positions and normals at a frame of the bake; those of the nearest frame if the body is
+        absent.
+        """
         index = min(max(frame - self.first, 0), len(self.positions) - 1)
         return self.positions[index], self.normals[index]
 
     def targets(self) -> tuple[list[int], list[int]]:
-        """Return the frames whose shape differs from the first, without repeats, and the index of each
-        frame's shape in this list, -1 for the first shape."""
+        """Return the distinct shapes of the clip, except the first one.
+
+        Returns: indices of the frames in which these shapes first occur, and for each frame the index of its
+            shape in this list, -1 for the first shape.
+        """
         shapes, place, current = [], [-1], -1
         for index in range(1, len(self.positions)):
             before = index - 1

@@ -1,4 +1,4 @@
-"""Materials of clips, in the form that trimesh writes to glTF."""
+"""Materials of clips, in the form in which trimesh writes them to glTF."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
 """Default material. glTF treats a material without these values as metal."""
 
 COLORS = ((232, 107, 82), (41, 148, 158), (242, 178, 71), (102, 115, 199), (128, 178, 97), (204, 107, 153))
-"""Colours of bodies without a colour, sRGB up to 255, the same as in films."""
+"""Colours of bodies without a colour, sRGB up to 255, equal to those in films."""
 
 UNSET = (102, 102, 102)
 """The grey that trimesh assigns to a material without a colour."""
 
 
 def visual_of(clip: Clip, number: int) -> Any:
-    """Make TextureVisuals of trimesh with a glTF material: the artist's, or a default one.
+    """Make TextureVisuals of trimesh with a glTF material: that of the artist, or a default one.
 
     Args:
-        number: index of the clip, which chooses the colour of a clip without one.
+        number: index of the clip, which chooses the colour of a clip without a colour.
     """
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
@@ -41,8 +41,11 @@ def visual_of(clip: Clip, number: int) -> Any:
 
 
 def _as_pbr(material: Any) -> Any:
-    """Convert a material of an .obj to glTF: set values whose glTF defaults differ, and remove the grey that
-    trimesh assigns to materials without a colour, because it darkens the texture."""
+    """Convert a material of an .obj file to glTF.
+
+    It sets values whose glTF defaults differ, and removes the grey that trimesh assigns to materials without
+    a colour, because that grey darkens the texture.
+    """
     if not hasattr(material, "to_pbr"):
         return material
     made = material.to_pbr()

@@ -21,9 +21,9 @@ class Format(NamedTuple):
     """A format of a bake."""
 
     write: Callable[[Take, Path, Interpolation], object]
-    size: Callable[[int, int], int]  # size for (frames, vertices) [bytes]
-    needs: tuple[str, ...]  # extra, and the modules it must provide; empty if numpy is enough
-    require: Callable[[int, int], object]  # refuses (frames, vertices) that do not fit the format
+    size: Callable[[int, int], int]  # function of (frames, vertices) that returns the size [bytes]
+    needs: tuple[str, ...]  # extra and its required modules; empty if NumPy is sufficient
+    require: Callable[[int, int], object]  # raises an error for (frames, vertices) that exceed the format
 
 
 def _any(frames: int, vertices: int) -> None:
@@ -31,12 +31,12 @@ def _any(frames: int, vertices: int) -> None:
 
 
 def _floats(frames: int, vertices: int) -> int:
-    """Size of positions and normals [bytes]."""
+    """Return the size of positions and normals [bytes]."""
     return 24 * frames * vertices
 
 
 def _with_weights(frames: int, vertices: int) -> int:
-    """Size of positions, normals and a matrix of weights, frames by frames [bytes]."""
+    """Return the size of positions, normals and a matrix of weights, frames by frames [bytes]."""
     return _floats(frames + 1, vertices) + 4 * frames**2
 
 

@@ -18,12 +18,12 @@ from taichi_soft.bake.clip_materials import visual_of
 
 Interpolation = Literal["linear", "step"]
 
-FLOAT, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 5126, 34962, 34963  # OpenGL's constants
+FLOAT, ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 5126, 34962, 34963  # constants of OpenGL
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
 def write_glb(take: Take, path: Path, interpolation: Interpolation) -> None:
-    """Write meshes and their motion."""
+    """Write the meshes of a take and their motion to a .glb file."""
     file = GlbFile(take)
     motion = _Motion(file, take, interpolation.upper())
     for clip in take.clips:
@@ -33,7 +33,7 @@ def write_glb(take: Take, path: Path, interpolation: Interpolation) -> None:
 
 
 class GlbFile:
-    """The first frame of a take, to which arrays can be added."""
+    """The first frame of a take as a glTF file, to which arrays can be added."""
 
     def __init__(self, take: Take) -> None:
         import trimesh
@@ -56,7 +56,7 @@ class GlbFile:
         self._set_view_targets()
 
     def _set_view_targets(self) -> None:
-        """Set the target of each buffer view. trimesh omits it, and some importers require it."""
+        """Set the target of each buffer view, which trimesh omits and some importers require."""
         for mesh in self.content.meshes:
             (primitive,) = mesh.primitives
             kinds = {accessor: ARRAY_BUFFER for accessor in vars(primitive.attributes).values()}
@@ -65,15 +65,15 @@ class GlbFile:
                     self.content.bufferViews[self.content.accessors[accessor].bufferView].target = kind
 
     def node_of(self, clip: Clip) -> int:
-        """Index of the node of a clip."""
+        """Return the index of a clip's node."""
         return self._nodes[clip.name]
 
     def mesh_of(self, clip: Clip) -> Any:
-        """Mesh of the clip's node."""
+        """Return the mesh of a clip's node."""
         return self.content.meshes[self.content.nodes[self.node_of(clip)].mesh]
 
     def add(self, rows: NDArray[Any], *, is_bounded: bool = False, is_vertices: bool = True) -> int:
-        """Append an array to the file. Returns: the index of its accessor.
+        """Append an array to the file, and return the index of its accessor.
 
         Args:
             rows: (n,) or (n, 2 or 3), stored as float32.
@@ -104,14 +104,14 @@ class GlbFile:
         return len(self.content.accessors) - 1
 
     def save(self, path: Path) -> None:
-        """Write the file. Raises: OSError."""
+        """Write the file to `path`. Raises: OSError."""
         self.content.buffers[0].byteLength = len(self._blob)
         self.content.set_binary_blob(self._blob)
         self.content.save_binary(str(path))
 
 
 class _Motion:
-    """The animation of a file."""
+    """The animation of a glTF file."""
 
     def __init__(self, file: GlbFile, take: Take, interpolation: str) -> None:
         from pygltflib import Animation
@@ -127,7 +127,7 @@ class _Motion:
             self.file.content.animations.append(self.animation)
 
     def add(self, clip: Clip) -> None:
-        """Add the motion of a clip and the interval in which it is visible."""
+        """Add the motion of a clip, and the interval in which its body is visible."""
         shapes, place = clip.targets()
         if shapes:
             self._add_targets(clip, shapes)
@@ -153,7 +153,10 @@ class _Motion:
         mesh.extras = {"targetNames": [f"frame {clip.first + index}" for index in shapes]}
 
     def _weights(self, count: int, place: list[int]) -> int:
-        """Add an array of weights, 1 for the shape of each frame. Clips with equal weights share it."""
+        """Add an array of weights, 1 for the shape of each frame.
+
+        Returns: its accessor. Clips with equal weights share it.
+        """
         key = (count, *place)
         if key not in self.weights:
             rows = np.zeros((len(place), count), dtype=np.float32)

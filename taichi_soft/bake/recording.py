@@ -16,13 +16,13 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 STEPS_PER_SECOND = 60.0
-"""Smallest step rate of a world without an adapter [1/s], the default of `FixedStep`."""
+"""Smallest step rate of a world without an adapter [1/s]; also the default of `FixedStep`."""
 
 STEP_TOLERANCE = 1e-6
-"""Largest distance of a frame from a step [steps]: frame rates such as 29.97 are not exact."""
+"""Largest distance between a frame and a step [steps], because frame rates such as 29.97 are rounded."""
 
 FRAME_TOLERANCE = 1e-3
-"""Fraction of the last frame that may be missing: 0.3333 s at 30 frames per second are ten frames."""
+"""Largest missing fraction of the last frame: 0.3333 s at 30 FPS give ten frames."""
 
 Scene = World | EngineAdapter
 Progress = Callable[[int, int], None]
@@ -59,7 +59,8 @@ def record(
 
     Args:
         scene: a built world, or the adapter that steps it.
-        require_room: called with the number of vertices before the first frame, and after bodies were added.
+        require_room: called with the number of vertices before the first frame and when bodies are added. It
+            raises an error if they exceed the limit.
         on_frame: called with (frames made, total frames) after each frame.
     Raises: StateError for a body that is cut or torn during the recording, with the frame; MeshError if no
         body has triangles; errors of `require_room` and of steps.
@@ -80,7 +81,7 @@ def record(
 
 @dataclass
 class _Recorder:
-    """Clips during recording."""
+    """The clips of a running recording."""
 
     world: World
     fps: float
@@ -90,9 +91,9 @@ class _Recorder:
     known: set[Body] = field(default_factory=set)
 
     def take(self, frame: int) -> None:
-        """Record the current mesh of each body."""
+        """Record the current mesh of each body as a frame."""
         there = set(self.world.bodies)
-        self.known &= there  # a body that a restored state brings back starts a new clip
+        self.known &= there  # a body that returns with a restored state starts a new clip
         new = [body for body in self.world.bodies if body not in self.known]
         for body in new:
             self._begin(body, frame)
@@ -108,7 +109,7 @@ class _Recorder:
         meshes: tuple[RenderMesh, ...] = body.render_meshes
         try:
             meshes = meshes or (body.render_mesh(),)
-        except MeshError:  # without triangles, such as a rope
+        except MeshError:  # no triangles, such as a rope
             name = f"body {body.index}"
             self.left_out += [name] if name not in self.left_out else []
         for mesh in meshes:
@@ -144,5 +145,5 @@ def _repeat(call: Callable[[], object], count: int) -> None:
 
 
 def frames_in(seconds: float, fps: float) -> int:
-    """Number of frames from 0 to `seconds`, both included."""
+    """Return the number of frames from 0 to `seconds`, both included."""
     return math.floor(seconds * fps + FRAME_TOLERANCE) + 1

@@ -1,4 +1,4 @@
-"""Estimated size of a bake."""
+"""Estimate of the size of a bake."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Room:
-    """Frames, vertices and estimated size of a bake."""
+    """Number of frames and vertices, and estimated size of a bake."""
 
-    frames: int  # of the clip
-    vertices: int  # of all current meshes
-    size: int  # of positions and normals [bytes]; bodies at rest take less
+    frames: int  # number of frames of the clip
+    vertices: int  # number of vertices of all current meshes
+    size: int  # size of positions and normals [bytes]; resting bodies need less
 
     def __str__(self) -> str:
         return f"{self.frames:,} frames of {self.vertices:,} vertices, about {self.size / 1e6:,.1f} MB"

@@ -1,7 +1,7 @@
-"""Write USD: one Mesh per clip, with samples of its points and normals at each frame.
+"""Write USD: one Mesh per clip, with a sample of its points and normals at each frame.
 
-The file has texture coordinates and the colour of the material, but no texture images, which a .usdc cannot
-contain.
+The file contains texture coordinates and the colour of the material. It contains no textures, because a .usdc
+cannot embed images.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from taichi_soft.bake.clip_materials import visual_of
 
 
 def write_usd(take: Take, path: Path) -> None:
-    """Write a stage, z up, in metres, with one time code per frame."""
+    """Write the clips as a USD stage: z up, in metres, with one time code per frame."""
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.CreateNew(str(path))
@@ -37,7 +37,7 @@ def write_usd(take: Take, path: Path) -> None:
 
 
 def _identifier(name: str, taken: set[str]) -> str:
-    """Convert a name to a unique USD identifier: letters, digits and underscores."""
+    """Convert a name to a USD identifier (letters, digits, underscores) that is not in `taken`."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     plain = plain if plain[:1].isalpha() else f"_{plain}"
     each = plain

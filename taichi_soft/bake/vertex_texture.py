@@ -21,10 +21,10 @@ from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core.errors import OptionError
 
 WIDEST, TALLEST = 4096, 16384
-"""Largest texture [pixels]. Common GPUs support no more rows."""
+"""Largest width and height of a texture [pixels]. Common GPUs support no more rows."""
 
 LEVELS = 65535
-"""Quantisation steps of 16 bits."""
+"""Number of quantisation steps with 16 bits."""
 
 METADATA = "metadata.json"
 GODOT_3 = {
@@ -52,7 +52,7 @@ Floats = NDArray[np.float64]
 
 
 def fits_texture(frames: int, vertices: int) -> bool:
-    """True if a texture can hold them."""
+    """True if a texture can hold these frames and vertices."""
     return -(-vertices // WIDEST) * frames <= TALLEST
 
 
@@ -68,7 +68,7 @@ def require_pixels(frames: int, vertices: int) -> None:
 
 
 def write_vat(take: Take, folder: Path) -> None:
-    """Write the folder with images, mesh, metadata and shaders."""
+    """Write a folder with images, mesh, metadata and shaders."""
     require_pixels(take.frame_count, take.vertex_count)
     folder.mkdir()
     width = min(take.vertex_count, WIDEST)
@@ -105,12 +105,12 @@ def write_vat(take: Take, folder: Path) -> None:
 
 
 def is_vat(folder: Path) -> bool:
-    """True if `write_vat` wrote the folder."""
+    """True if `write_vat` made the folder."""
     return (folder / METADATA).is_file() and (folder / "position_high.png").is_file()
 
 
 def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
-    """Positions and normals of all vertices, y up."""
+    """Return positions and normals of all vertices in a frame, y up. Absent bodies are collapsed."""
     places, normals = [], []
     for clip in take.clips:
         position, normal = clip.at(frame)
@@ -123,7 +123,7 @@ def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
 
 
 def _gathered(clip: Clip, frame: int) -> Floats:
-    """Collapse all vertices to their centre."""
+    """Return positions that collapse all vertices of a clip to their centre in a frame."""
     rows = clip.at(frame)[0].astype(np.float64)
     return np.repeat(rows.mean(axis=0, keepdims=True), len(rows), axis=0)
 
@@ -143,14 +143,14 @@ def _mesh_facts(take: Take) -> list[dict[str, Any]]:
 
 
 def _write_mesh(take: Take, path: Path, width: int, rows: int) -> None:
-    """Write the first frame, with a second set of texture coordinates: the pixel of each vertex."""
+    """Write the first frame with a second set of texture coordinates: the pixel of each vertex."""
     file = GlbFile(take)
     start = 0
     for clip in take.clips:
         vertex = start + np.arange(clip.vertex_count)
         pixel = np.stack([(vertex % width + 0.5) / width, (vertex // width + 0.5) / rows], axis=1)
         attributes = file.mesh_of(clip).primitives[0].attributes
-        if attributes.TEXCOORD_0 is None:  # a second set needs a first one
+        if attributes.TEXCOORD_0 is None:  # a second set requires a first one
             attributes.TEXCOORD_0 = file.add(np.zeros((clip.vertex_count, 2)))
         attributes.TEXCOORD_1 = file.add(pixel)
         start += clip.vertex_count

@@ -1,4 +1,7 @@
-"""Visitors of a live world. Each receives messages, and frames at the rate that it can display."""
+"""Visitors of a live world.
+
+Each one receives messages, and frames at the rate that its browser can display.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +24,16 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.meshing.surfaces import Up
 
 UNSEEN = 2
-"""Largest number of frames in flight to a visitor. Further frames are skipped until it has shown one."""
+"""Largest number of frames in flight to a visitor. Further frames are skipped until the browser shows one."""
 
 MOST_MESSAGES = 20
-"""Largest number of messages that wait for a visitor; older messages are dropped."""
+"""Largest number of messages queued for a visitor; older messages are dropped."""
 
 _log = logging.getLogger("taichi_soft")
 
 
 class Shown(Protocol):
-    """The worlds, as far as visitors need them."""
+    """Interface of the worlds that visitors need."""
 
     panes: dict[int, Runner]
     coming: dict[int, Runner]
@@ -39,15 +42,15 @@ class Shown(Protocol):
 
 @dataclass
 class Visitor:
-    """One open page."""
+    """A visitor: one open page."""
 
     number: int
     connection: ServerConnection
     allowance: Allowance = field(default_factory=Allowance)
-    sent: int = 0  # frames
-    seen: int = 0  # number of the last frame that it has shown
+    sent: int = 0  # number of frames sent
+    seen: int = 0  # number of the last frame that the page has shown
     last: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # by pane: runner, version, number
-    messages: list[str] = field(default_factory=list)  # waiting to be sent
+    messages: list[str] = field(default_factory=list)  # queued messages
     upload: tuple[str, Up | None] | None = None  # name and upward axis of the next file
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -60,7 +63,7 @@ class Visitor:
 
 @dataclass
 class _Activity:
-    """A long task, such as compiling."""
+    """A long task that the page shows, such as compiling."""
 
     title: str
     step: str
@@ -70,7 +73,7 @@ class _Activity:
 
 
 class Audience:
-    """All visitors."""
+    """All visitors of a server."""
 
     def __init__(self) -> None:
         self.visitors: dict[int, Visitor] = {}
@@ -79,25 +82,26 @@ class Audience:
         self._status_version = 0
 
     def say(self, words: str) -> None:
-        """Send a message to all visitors."""
+        """Queue a message to all visitors."""
         _log.info("live: %s", words)
         for visitor in self.visitors.values():
             visitor.put(said=words)
 
     def refuse(self, number: int, words: str) -> None:
-        """Report a refused request to its visitor."""
+        """Report a refused request to the visitor `number`."""
         if number in self.visitors:
             self.visitors[number].put(refused=words)
 
     def wake(self) -> None:
-        """Wake the senders, because there is something new to send."""
+        """Wake the tasks that send to visitors, because there is something new to send."""
         for visitor in self.visitors.values():
             visitor.wake.set()
 
     def show_activity(self, key: str, title: str, step: str, done: int = 0, about: int = 0) -> None:
-        """Show a task until `end_activity`.
+        """Show a task on all pages until `end_activity`.
 
         Args:
+            key: key of the task; an existing task with this key is replaced.
             title: name of the task.
             step: current step of the task.
             done, about: number of finished parts, and their approximate total; 0 if unknown.
@@ -108,7 +112,7 @@ class Audience:
         self._change_status()
 
     def end_activity(self, key: str) -> None:
-        """End a task, if it exists."""
+        """End a task if it exists."""
         if self._activities.pop(key, None) is not None:
             self._change_status()
 
@@ -181,7 +185,7 @@ class Audience:
         if visitor.last.get(pane, (0, 0, 0))[:2] != identity:
             await visitor.connection.send(drawn_packet(pane, header, arrays))
         pull = runner.pulls.pop(visitor.number, None)
-        if pull is not None:  # the page measures its latency with it
+        if pull is not None:  # the page measures the latency with it
             await visitor.connection.send(json.dumps({"pull": pull}))
         visitor.last[pane] = *identity, number
         visitor.sent += 1

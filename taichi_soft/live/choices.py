@@ -1,4 +1,4 @@
-"""Run a scene's script with another law, and with capacity for bodies that visitors add."""
+"""Run a scene's script with a chosen law, and with capacity for bodies that visitors add."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROOM = 6
 """Number of bodies of each shape that visitors can add."""
 
 PALETTES: WeakKeyDictionary[World, dict[str, SoftBodyAsset]] = WeakKeyDictionary()
-"""Assets that visitors can add to a world, by name."""
+"""Assets that visitors can add, by name, for each world."""
 
 
 @contextmanager
@@ -35,14 +35,14 @@ def choices(
     has_palette: bool = False,
     meshes: Sequence[str | Path] = (),
 ) -> Iterator[None]:
-    """Give the bodies of all worlds that are made in this context another law; None keeps the scene's.
+    """Return a context in which all new worlds give their bodies another law; None keeps the scene's law.
 
     A script saved by `taichi-soft live` begins with this context.
     Args:
-        law, strain, flips: of all bodies, see `SoftBodyAsset`. A new law replaces the scene's strain and
-            flips too, because it may not support them.
+        law, strain, flips: settings of all bodies, see `SoftBodyAsset`. A new law also replaces the scene's
+            strain and flips, because it may not support them.
         has_palette: True if `World.build` reserves capacity for bodies that visitors add, see `PALETTES`.
-        meshes: surface files that visitors can add too.
+        meshes: files of surfaces that visitors can also add.
     """
     kept = {name: getattr(World, name) for name in ("add_body", "reserve", "spawn", "build")}
     changed: dict[int, tuple[SoftBodyAsset, SoftBodyAsset]] = {}
@@ -92,12 +92,12 @@ def choices(
 
 
 def palette_of(world: World) -> dict[str, SoftBodyAsset]:
-    """Assets that visitors can add, by name."""
+    """Return the assets that visitors can add to a world, by name."""
     return dict(PALETTES.get(world, {}))
 
 
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
-    """Make the shapes, about 0.5 m wide, and the bodies of mesh files, by name."""
+    """Make the assets of the shapes, about 0.5 m wide, and of the mesh files, by name."""
     shapes = (
         sphere(0.3, 3),
         box((0.5, 0.5, 0.5), (3, 3, 3)),

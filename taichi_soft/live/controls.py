@@ -26,7 +26,7 @@ class Slider:
         low, high: the range.
         is_log: True for a logarithmic scale.
         is_whole: True for integers.
-        told: cost of a change, or its limit of stability.
+        told: short text on the cost or the stability of a change.
     """
 
     name: str
@@ -63,12 +63,12 @@ PRESET_SLIDERS: dict[str, dict[str, float]] = {
     and isinstance(each.poisson, float)
     and SLIDERS["poisson"].low <= each.poisson <= SLIDERS["poisson"].high
 }
-"""Values of the material sliders for each preset within their ranges."""
+"""Values of the material sliders for each preset that fits their ranges."""
 
 
 @dataclass(frozen=True)
 class Given:
-    """Slider values and preset that visitors chose."""
+    """Slider values and preset chosen by visitors."""
 
     values: dict[str, float] = field(default_factory=dict)
     preset: str | None = None
@@ -84,18 +84,21 @@ class Given:
 
 
 def checked_value(name: Any, value: Any) -> float:
-    """Check the value of a slider. Raises: OptionError for an unknown slider or a value out of range."""
+    """Return the value of a slider after checking it.
+
+    Raises: OptionError for an unknown slider or a value out of range.
+    """
     if not isinstance(name, str) or name not in SLIDERS:
         raise OptionError(f"unknown slider {name!r}")
     slider = SLIDERS[name]
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not slider.low <= value <= slider.high:  # also refuses NaN
+    if not is_number or not slider.low <= value <= slider.high:  # also rejects NaN
         raise OptionError(f"{slider.label} must be from {slider.low:g} to {slider.high:g}, got {value!r}")
     return float(round(value)) if slider.is_whole else float(value)
 
 
 class Controls:
-    """Parameter values of a world, and those that visitors chose."""
+    """Parameters of a world: the scene's values, and the values chosen by visitors."""
 
     def __init__(self, world: World, dt: float, substeps: int | None) -> None:
         self.world, self.dt = world, dt
@@ -115,9 +118,9 @@ class Controls:
 
     @property
     def stable_substeps(self) -> int:
-        """Number of substeps that these materials need, predicted from the wave speed in each asset.
+        """Number of substeps that the chosen materials need, predicted from the wave speed in each asset.
 
-        A new estimate for each body would pause the world at each move of a slider.
+        A new estimate for each body would pause the world whenever a slider moves.
         """
         has_stable_step = context_of_world(self.world).substeps.has_stable_step
         if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):
@@ -127,7 +130,7 @@ class Controls:
         return math.ceil(max(*counts, 1.0, self.dt / SOFT_CONTACT_STEP if soft else 1.0) - 1e-9)
 
     def _factor(self, asset: SoftBodyAsset) -> float:
-        """Ratio of the asset's wave speed to its initial wave speed."""
+        """Return the asset's wave speed over its initial wave speed."""
         material = asset.material
         if not isinstance(material, Material):
             return 1.0
@@ -137,7 +140,9 @@ class Controls:
 
     @property
     def substeps(self) -> int:
-        """Substeps of a step: the visitor's value, the scene's value, or the stable number."""
+        """Substeps per step: the visitor's value, or the larger of the scene's value and the stable
+        number.
+        """
         if "substeps" in self.given:
             return int(self.given["substeps"])
         if self._own_substeps is not None:
@@ -145,7 +150,7 @@ class Controls:
         return self.stable_substeps
 
     def values(self) -> dict[str, float | None]:
-        """Value of each slider; None if bodies differ or lack the property."""
+        """Return the value of each slider; None if no body has the property."""
         settings, first = self.world.settings, self._first
         own: dict[str, float | None] = {
             "young": None if first is None else _number(first.young),
@@ -160,26 +165,26 @@ class Controls:
 
     @property
     def sliders(self) -> Given:
-        """Chosen values and preset."""
+        """Slider values and preset chosen by visitors."""
         return Given(dict(self.given), self.preset)
 
     def set_value(self, name: str, value: float) -> None:
-        """Set a checked slider value and apply it to the world."""
+        """Set a slider to a checked value and apply it to the world."""
         self.given[name] = value
         self._apply({name})
 
     def give(self, sliders: Given) -> None:
-        """Replace all chosen values. Sliders without a value return to the scene's value."""
+        """Replace all chosen values. Sliders without a new value return to the scene's value."""
         changed = {*self.given, *sliders.values}
         self.given, self.preset = dict(sliders.values), sliders.preset
         self._apply(changed)
 
     def record(self, sliders: Given) -> None:
-        """Record the values of a restored world, which already has them."""
+        """Store the values of a restored world, which already has them."""
         self.given, self.preset = dict(sliders.values), sliders.preset
 
     def _apply(self, names: set[str]) -> None:
-        """Apply slider values to the world, with one change per property."""
+        """Apply the sliders `names` to the world, with one change per property."""
         if names & set(MATERIAL):
             for body in self.world.bodies:
                 self._give_material(body)
@@ -190,14 +195,16 @@ class Controls:
             self._give_friction(self.given.get("friction"))
 
     def greet(self, body: Body) -> None:
-        """Apply the chosen values to a new body."""
+        """Apply the chosen values to a newly added body."""
         if set(MATERIAL) & set(self.given):
             self._give_material(body)
         if "friction" in self.given:
             _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
-        """Apply the material sliders to a body. Bodies made only of springs have no material: skip them."""
+        """Apply the material sliders to a body, except to bodies made only of springs, which have no
+        material.
+        """
         material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}
@@ -205,7 +212,7 @@ class Controls:
             body.set_material(replace(material, **given))
 
     def _give_friction(self, value: float | None) -> None:
-        """Set all frictions; None restores the scene's values."""
+        """Set the friction of all bodies, colliders and the floor; None restores the scene's values."""
         for body in self.world.bodies:
             _set_friction(body, body.asset.contact.friction if value is None else value)
         floor = self._own_friction if value is None else value
@@ -217,15 +224,15 @@ class Controls:
 
 
 def _set_friction(body: Body, value: float) -> None:
-    with suppress(StateError):  # contact between soft bodies is off in this world
+    with suppress(StateError):  # this world has no contact between soft bodies
         body.set_friction(value)
 
 
 def _number(constant: Any) -> float:
-    """Reduce a material constant to one number: the largest of several."""
+    """Reduce a material constant to one number: the largest value."""
     return float(constant if isinstance(constant, (int, float)) else constant.max())
 
 
 def _wave_factor(poisson: float) -> float:
-    """Ratio of the P-wave modulus to Young's modulus."""
+    """Return the P-wave modulus over Young's modulus."""
     return (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))

@@ -15,21 +15,21 @@ from taichi_soft.live.saving import FILM_FPS, film_file, packed
 from taichi_soft.live.scene import SceneSource
 
 MOST_FILES = 8
-"""Largest number of stored files; older files are dropped."""
+"""Largest number of stored files; the oldest files are dropped."""
 
 
 class Downloads:
-    """Files under unguessable names."""
+    """Files for visitors, stored under unguessable keys."""
 
     def __init__(self, audience: Audience) -> None:
         self._audience = audience
         self._files: dict[str, tuple[str, str, bytes]] = {}
-        self._filming: Runner | None = None  # the world that writes the frames of a film
+        self._filming: Runner | None = None  # the world that is writing the frames of a film
         self._is_drawing = False
         self._process: BaseProcess | None = None
 
     def file(self, key: str) -> tuple[str, str, bytes] | None:
-        """Return the kind, the name and the content of a file."""
+        """Return the MIME type, the name and the content of a file; None for an unknown key."""
         return self._files.get(key)
 
     def stop(self) -> None:
@@ -44,21 +44,21 @@ class Downloads:
             raise OptionError("a film is being rendered: wait until it is finished")
 
     def film_asked(self, runner: Runner) -> None:
-        """Record that a film was requested from a world."""
+        """Record that a film was requested from the world of `runner`."""
         self._filming = runner
 
     async def offer_scene(self, visitor: int, script: str, snapshot: bytes, source: SceneSource) -> None:
-        """Pack a scene and offer it for download."""
+        """Pack a scene and send its download link to the visitor."""
         content = await asyncio.to_thread(packed, script, snapshot, source)
         self._offer(visitor, "application/zip", "scene.zip", content)
 
     def begin_film(self, frames: str) -> bool:
-        """Record that a world has written the frames of a film. Returns: False if that failed."""
+        """Record that a world has written the frames of a film. Returns: False if it failed."""
         self._filming, self._is_drawing = None, bool(frames)
         return self._is_drawing
 
     async def draw_film(self, visitor: int, frames: str) -> None:
-        """Render a film and offer it for download."""
+        """Render a film and send its download link to the visitor."""
         self._audience.show_activity("film", "film", "drawing")
         path = f"{frames}.mp4"
         process = get_context("spawn").Process(target=film_file, args=(frames, path, FILM_FPS), daemon=True)

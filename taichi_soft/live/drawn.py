@@ -15,8 +15,8 @@ from taichi_soft.render.props import SLATE, drawn_surface, is_level
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 
 CREASE = 65.0
-"""Largest angle between adjacent triangles that is shaded smooth [degrees]: above those of an icosahedron
-(42) and of a ring with six sides (60), below that of a box (90)."""
+"""Largest angle between adjacent triangles that are shaded smooth [degrees]. It is larger than those of an
+icosahedron (42) and of a ring with six sides (60), and smaller than that of a box (90)."""
 
 
 class Drawn:
@@ -34,7 +34,7 @@ class Drawn:
 
     @property
     def is_outdated(self) -> bool:
-        """True if bodies were added, removed or cut since."""
+        """True if bodies were added, removed or cut since the meshes were made."""
         bodies = self.scene.world.bodies
         same = len(bodies) == len(self.bodies) and all(
             a is b for a, b in zip(bodies, self.bodies, strict=True)
@@ -47,7 +47,7 @@ class Drawn:
         return int(self.starts[-1])
 
     def described(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """Description for a page: a header, and arrays of triangles and colours."""
+        """Describe the meshes for a page. Returns: a header, and arrays of triangles and colours by name."""
         triangles, counts = [], []
         colors = np.empty((self.vertex_count, 3), np.uint8)
         for (body, mesh), start in zip(self.meshes, self.starts[:-1], strict=True):
@@ -78,7 +78,7 @@ class Drawn:
         return header, arrays
 
     def _colors(self, body: Body, mesh: RenderMesh) -> NDArray[np.float32]:
-        """Vertex colours, sRGB from 0 to 1; a texture is sampled at the vertices."""
+        """Return vertex colours, sRGB from 0 to 1. A texture is sampled at the vertices."""
         plain = self.scene.color(body.index)
         if not isinstance(mesh, SkinMesh):
             return np.broadcast_to(np.asarray(plain, np.float32), (mesh.vertex_count, 3))
@@ -94,10 +94,10 @@ class Drawn:
         return np.asarray(colors * texels[rows, columns], dtype=np.float32)
 
     def fill(self, frame: Frame, alpha: float, tints: NDArray[np.uint8] | None) -> None:
-        """Write all positions, interpolated to the fraction `alpha` of the last step.
+        """Write all positions into a frame, interpolated to the fraction `alpha` of the last step.
 
         Args:
-            tints: tints of all particles, body by body, or None.
+            tints: indices into the colour scale for all particles, body by body, or None.
         """
         world, at, firsts = self.scene.world, 0, {}
         for body in self.bodies:

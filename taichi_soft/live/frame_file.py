@@ -1,4 +1,4 @@
-"""The newest frame of a world in shared memory. The writer never waits for a reader."""
+"""Store the newest frame of a world in shared memory. The writer never waits for a reader."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 PLACES = 3
-"""Number of buffers: one to read, one to write, and the newest."""
+"""Number of buffers: one that is read, one that is written, and the newest."""
 
 _HEAD = np.dtype([("newest", "<i8"), ("pad", "<i8", 7)])
 _FRAME = np.dtype([("number", "<i8"), ("version", "<i8"), ("time", "<f8"), ("is_tinted", "<i8")])
 
 TRIES = 8
-"""Number of attempts to read a frame that the writer overwrites, before the reader skips it."""
+"""Number of attempts to read a frame before the reader skips it. An attempt fails if the writer overwrites
+the frame."""
 
 
 @dataclass(frozen=True)
 class Frame:
     """Positions of all bodies and colliders at one time.
 
-    `positions` (n, 3) [m] and `normals` (n, 3), float32, of all render vertices; `tints` (n,), uint8, indices
-    into a colour scale; `poses` (k, 12), float32: rotation, by rows, and position [m] of each collider.
+    For all n render vertices: `positions` (n, 3) [m] and `normals` (n, 3), float32, and `tints` (n,), uint8,
+    indices into a colour scale. For k colliders: `poses` (k, 12), float32, rotation by rows and position [m].
     """
 
     number: int
     version: int  # version of the meshes, see `Drawn`
-    time: float  # [s]
+    time: float  # world time [s]
     is_tinted: bool
     positions: NDArray[np.float32]
     normals: NDArray[np.float32]
@@ -64,10 +65,10 @@ class FrameFile:
         return int(self._newest[0])
 
     def begin(self) -> Frame:
-        """Return arrays to fill for the next frame."""
+        """Return the arrays of the next frame, to be filled before `publish`."""
         number = self.newest_number + 1
         head, frame = self._places[number % PLACES]
-        head["number"] = -1  # tells readers that the buffer is being written
+        head["number"] = -1  # marks the buffer as incomplete for readers
         return frame
 
     def publish(self, version: int, time: float, *, is_tinted: bool) -> int:

@@ -1,4 +1,7 @@
-"""Access control of a live world: this machine or holders of the token, and no page of another origin."""
+"""Access control of a live world.
+
+It admits this machine or holders of the token, and no pages of other origins.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ VIEW_KEY = "TAICHI_SOFT_VIEW_KEY"
 """Environment variable with the key that a server and the program that started it share."""
 
 EVERYWHERE = ("0.0.0.0", "::")
-"""Wildcard addresses."""
+"""Addresses that bind to all network interfaces."""
 
 PUBLIC = (
     *("/live.css", "/live.js", "/view.js", "/room.js", "/panel.js", "/slider.js", "/plot.js"),
@@ -43,10 +46,10 @@ LARGEST_TEXT = 4096
 
 @dataclass(frozen=True)
 class Guard:
-    """Checks of requests.
+    """Checks whether a request is allowed.
 
     Args:
-        host: address that the server is bound to.
+        host: address to which the server is bound.
         port: port of the server.
         token: secret in the address that visitors open; None on the loopback address.
     """
@@ -57,18 +60,19 @@ class Guard:
 
     @classmethod
     def of(cls, host: str, port: int) -> Guard:
-        """Make a guard, with a token for any address except loopback."""
+        """Make a guard. Any address except loopback gets a token."""
         return cls(host, port, None if is_loopback(host) else secrets.token_urlsafe(16))
 
     def address(self) -> str:
-        """Address for visitors to open."""
+        """Return the address for visitors to open."""
         name = socket.gethostname() if self.host in EVERYWHERE else self.host
         name = f"[{name}]" if ":" in name else name
         query = "" if self.token is None else f"?token={self.token}"
         return f"http://{name}:{self.port}/{query}"
 
     def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
-        """Return the reason to refuse a request, or None. The page's scripts need no token.
+        """Return the status and the reason of refusing a request, or None to allow it. Scripts of the page
+        need no token.
 
         A page of another origin must not connect, even if DNS resolves its name to this machine (DNS
         rebinding). So `Host` must name this server, and `Origin` must match it.
@@ -94,7 +98,7 @@ class Guard:
 def host_and_port(host: str | None) -> tuple[str, int] | None:
     """Return the name and port in a `Host` header, port 80 if it has none; None if the header is malformed.
 
-    A browser sends a bare name or address and a port. Anything else, such as `user@name`, is malformed.
+    Browsers send a name or an address, and a port. Anything else, such as `user@name`, is malformed.
     """
     found = _HOST.fullmatch(host or "")
     if found is None:
@@ -120,7 +124,7 @@ class Allowance:
         self._left, self._then = BURST, time.monotonic()
 
     def take(self) -> bool:
-        """Count a message. Returns: False if it exceeds the limit."""
+        """Use one message of the allowance. Returns: False if the visitor exceeds the limit."""
         now = time.monotonic()
         self._left = min(BURST, self._left + MESSAGES * (now - self._then))
         self._then = now

@@ -1,4 +1,4 @@
-"""States before visitors' changes, for undo."""
+"""Store the states before visitors' changes, for undo."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOST_CHANGES = 20
 """Largest number of changes that can be undone."""
 
 DRAG = 2.0
-"""Longest interval between values of one slider that count as one change [s]."""
+"""Longest interval between values of one slider that count as a single change [s]."""
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class Before:
     """State of a world before a change.
 
     Args:
-        what: name of the change on the page.
+        what: name of the change, as the page shows it.
         sliders: chosen slider values.
         snapshot: complete state; None if only the sliders can be restored.
-        held: grabs in that state.
+        held: grabs that exist in that state.
     """
 
     what: str
@@ -34,11 +34,11 @@ class Before:
 
 
 class History:
-    """The last changes."""
+    """The last changes, which can be undone."""
 
     def __init__(self) -> None:
         self._changes: deque[Before] = deque(maxlen=MOST_CHANGES)
-        self._drag_at = -math.inf  # time of the last value, if the last change is a slider's [s]
+        self._drag_at = -math.inf  # time of the last slider value [s]; -inf after other changes
 
     @property
     def last(self) -> str | None:
@@ -46,12 +46,14 @@ class History:
         return self._changes[-1].what if self._changes else None
 
     def add(self, before: Before, *, drag_at: float | None = None) -> None:
-        """Record the state before a change; `drag_at` is the time of a slider's change [s]."""
+        """Store the state before a change. For a slider, `drag_at` is the time of the change [s]."""
         self._changes.append(before)
         self._drag_at = -math.inf if drag_at is None else drag_at
 
     def goes_on(self, what: str, now: float) -> bool:
-        """True if the last change is the same slider, which is still being dragged."""
+        """True if the change `what` continues the last one, because the same slider is still being
+        dragged.
+        """
         if self.last != what or now - self._drag_at > DRAG:
             return False
         self._drag_at = now

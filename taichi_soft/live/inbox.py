@@ -1,4 +1,7 @@
-"""Queue of requests to a world. It keeps the newest request of each kind, and limits each visitor's time."""
+"""Queue of requests to a world.
+
+It keeps the newest request of each kind, and limits the time of each visitor.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +12,19 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SERVER = 0
-"""Sender number of the server. Its messages come first and are neither merged nor refused."""
+"""Sender number of the server. Its messages are served first, never merged and never refused."""
 
 MOST_WAITING = 64
-"""Largest number of waiting requests of one visitor; further requests are refused."""
+"""Largest number of queued requests of one visitor; further requests are refused."""
 
 SHARE = 0.25
-"""Largest fraction of time for the requests of all visitors together."""
+"""Largest fraction of the world's time that requests of all visitors take together."""
 
 BURST = 2.0
-"""Longest time over which a visitor's unused share accumulates [s], so that a short burst does not wait."""
+"""Longest period over which unused time of a visitor accumulates [s], so that short bursts do not wait."""
 
 LONGEST_WAIT = 1.0
-"""Longest wait of a visitor's next request after an expensive one [s]."""
+"""Longest delay of a visitor's next request after an expensive one [s]."""
 
 Message = tuple[Any, ...]
 
@@ -32,8 +35,8 @@ class _Sender:
 
     waiting: OrderedDict[tuple[Hashable, int], Message] = field(default_factory=OrderedDict)
     segment: int = 0
-    used_until: float = -math.inf  # time up to which its share is used [s]
-    turn: int = 0  # turn in which it was served last
+    used_until: float = -math.inf  # time up to which its allowed time is used [s]
+    turn: int = 0  # number of the last turn in which it was served
 
 
 class Inbox:
@@ -58,11 +61,11 @@ class Inbox:
         """Add a message.
 
         Args:
-            key: kind of the message. The message replaces a waiting one of its kind, unless a message without
+            key: kind of the message. It replaces a queued message of the same kind, unless a message without
                 a key came between them. None replaces no message.
             is_kept: accept the message even if the queue is full.
-            is_last: the sender leaves; drop its waiting messages.
-        Returns: False if too many messages of this sender wait.
+            is_last: the sender leaves; drop its queued messages.
+        Returns: False if too many messages of this sender are queued.
         """
         mine = self._senders.setdefault(sender, _Sender())
         if is_last:
@@ -77,10 +80,10 @@ class Inbox:
         return True
 
     def take(self, now: float = math.inf) -> tuple[int, Message] | None:
-        """Return the next message and its sender, or None if no message can be served now.
+        """Remove and return the sender and the message to serve next; None if there is none at this time.
 
         Args:
-            now: current time [s]; by default, time shares are ignored.
+            now: current time [s]; by default, time limits are ignored.
         """
         ready = [
             (sender != SERVER, each.turn, sender)
@@ -95,7 +98,12 @@ class Inbox:
         return sender, self._senders[sender].waiting.popitem(last=False)[1]
 
     def charge(self, sender: int, now: float, seconds: float) -> None:
-        """Charge a visitor for the time of a request, so that all visitors together keep to `SHARE`."""
+        """Charge a visitor for the time that a request took, so that all visitors together keep to `SHARE`.
+
+        Args:
+            now: current time [s].
+            seconds: duration of the request [s].
+        """
         if sender == SERVER:
             return
         mine = self._senders.setdefault(sender, _Sender())

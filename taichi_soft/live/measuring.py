@@ -1,4 +1,4 @@
-"""Measure cost and latency of a live view, with a local visitor that has no browser."""
+"""Measure the cost and the latency of a live view, with a local visitor instead of a browser."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.live.server import LiveServer
 
 COUNTS = (1, 16, 64)
-"""Numbers of spheres in the worlds."""
+"""Numbers of spheres in the measured worlds."""
 
 SECONDS = 11.0
-"""Length of a turn [s]. A world reports percentiles of its last 600 steps, which take 10 s; longer turns keep
-the steps of the previous turn out of them."""
+"""Length of a turn [s]. A world reports percentiles of its last 600 steps, which take 10 s; a longer turn
+excludes the steps of the turn before."""
 
 TURNS = 5
-"""Number of turns, each without and with a visitor."""
+"""Number of turns. Each turn measures once without and once with a visitor."""
 
 PULLS = 40
-"""Number of timed moves of the hand."""
+"""Number of timed moves of a grab."""
 
 _SCENE = """\
 from taichi_soft import Material, World, sphere
@@ -47,21 +47,24 @@ world.build()
 
 @dataclass(frozen=True)
 class LiveCost:
-    """Cost of one world. Step times are 50th and 99th percentiles without and with a visitor, medians over
-    the turns. `ratios` has the ratio of the 99th percentiles, with over without, of each turn, ascending."""
+    """Cost of the live view of one world.
+
+    Step times are 50th and 99th percentiles without and with a visitor, medians over the turns. `ratios` is
+    the 99th percentile with a visitor over that without, of each turn, ascending.
+    """
 
     spheres: int
     triangles: int
     packet: int  # size of a frame [bytes]
     pictures: float  # frames per second
-    latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to the first frame that shows it
+    latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to its first frame
     alone_ms: tuple[float, float]
     visited_ms: tuple[float, float]
     ratios: tuple[float, ...]
 
 
 def measure(on_part: Callable[[str], object]) -> list[LiveCost]:
-    """Serve worlds of several sizes to one visitor, and measure times.
+    """Serve worlds of several sizes to one visitor. Returns: the cost of each world.
 
     Args:
         on_part: called with the name of each measurement before it starts.
@@ -118,7 +121,7 @@ def _pair(numbers: np.ndarray) -> tuple[float, float]:
 
 
 def _step_times(server: LiveServer) -> tuple[float, float]:
-    """50th and 99th percentile of the last 600 step times [ms]."""
+    """Return the 50th and 99th percentile of the last 600 step times [ms]."""
     state = server.worlds.panes[0].state
     assert state is not None
     return state["step_ms"][0], state["step_ms"][1]
@@ -132,12 +135,12 @@ async def _visitor(server: LiveServer) -> AsyncIterator[_Reader]:
 
 
 class _Reader:
-    """Receives packets as a page does."""
+    """A visitor that receives packets like a page."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.pictures = self.size = self.triangles = 0
-        self.corner = np.zeros(3)  # highest of all vertices
+        self.corner = np.zeros(3)  # largest coordinates of all vertices
 
     async def listen(self, seconds: float) -> None:
         end = time.perf_counter() + seconds
@@ -167,9 +170,11 @@ class _Reader:
 
 
 async def _latency(reader: _Reader, number: int) -> float:
-    """Time from a grab that pulls up a resting body to the first frame in which it has moved [s]."""
+    """Return the time from grabbing and lifting a resting body to the first frame in which it has
+    moved [s].
+    """
     await reader.say("reset")
-    await reader.listen(0.6 + 0.013 * (number % 7))  # vary the phase between two frames
+    await reader.listen(0.6 + 0.013 * (number % 7))  # varies the phase between two frames
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])
     await reader.listen(0.1)
     rest, start = reader.corner[2], time.perf_counter()

@@ -1,4 +1,4 @@
-"""Measurements of a running world for the page: step time, speed relative to real time, energies."""
+"""Measure a running world for the page: step times, speed relative to real time, energies."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STEPS = 600
 """Number of recent steps whose percentiles are reported."""
 
 SHARE = 0.05
-"""Largest fraction of time for computing energies."""
+"""Largest fraction of time that computing energies takes."""
 
 
 class Meters:
@@ -37,13 +37,13 @@ class Meters:
         self._begun.append(time.perf_counter())
 
     def end(self, simulated: float) -> None:
-        """Record the end of the steps since `begin`, which simulated a time [s]."""
+        """Record the end of the steps since `begin`; `simulated` is the world time that passed [s]."""
         ends = [*self._begun[1:], time.perf_counter()]
         self._times.extend(end - start for start, end in zip(self._begun, ends, strict=False))
         self._simulated += simulated
 
     def values(self, now: float) -> dict[str, Any]:
-        """Return percentiles of step times [ms], simulated over real time, and energies [J]."""
+        """Return percentiles of step times [ms], simulated time over real time, and energies [J]."""
         if now >= self._energies_due:
             self._energies = self._measured_energies()
             self._energies_due = now + (time.perf_counter() - now) / SHARE

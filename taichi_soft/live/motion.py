@@ -1,4 +1,4 @@
-"""Transfer positions and velocities of all bodies to a world with another law."""
+"""Transfer positions and velocities of all bodies from one world to another with a different law."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from taichi_soft.live.controls import Controls
 
 @dataclass
 class Motion:
-    """By slot: asset name if a visitor added the body, else None; positions [m]; velocities [m/s]."""
+    """State of all bodies, by slot: asset name if a visitor added the body, else None; positions [m];
+    velocities [m/s].
+    """
 
     rows: dict[int, tuple[str | None, NDArray[Any], NDArray[Any]]] = field(default_factory=dict)
 
 
 def motion_of(controls: Controls) -> Motion:
-    """Return positions and velocities of all bodies."""
+    """Return the positions and velocities of all bodies of a world."""
     world = controls.world
     names = {id(asset): name for name, asset in palette_of(world).items()}
     rows = {
@@ -29,7 +31,7 @@ def motion_of(controls: Controls) -> Motion:
 
 
 def continue_from(controls: Controls, motion: Motion) -> None:
-    """Move all bodies to their state in another world; spawn and despawn the bodies that visitors changed."""
+    """Set all bodies to their state in another world, and spawn and despawn bodies to match it."""
     world = controls.world
     palette, bodies = palette_of(world), {body.index: body for body in world.bodies}
     for slot, (name, positions, velocities) in motion.rows.items():

@@ -1,7 +1,7 @@
-"""Binary packets for a visitor's page: meshes, and frames with positions.
+"""Pack binary messages for a visitor's page: meshes, and frames with positions.
 
 A packet begins with its kind and its pane, one byte each. Numbers are little-endian. Positions are quantised
-to 16 bits within the frame's bounding box: a box of 10 m has steps of 0.15 mm.
+to 16 bits within the frame's bounding box: in a box of 10 m, the resolution is 0.15 mm.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PICTURE = struct.Struct("<BBHIIId3f3f")
 
 
 def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
-    """Pack meshes: a JSON header that names the arrays after it."""
+    """Pack meshes: a JSON header with the names of the arrays that follow, then the arrays."""
     named = {name: [str(each.dtype), list(each.shape)] for name, each in arrays.items()}
     text = json.dumps({**header, "arrays": named}).encode()
     text += b" " * (-(8 + len(text)) % 4)
@@ -41,11 +41,14 @@ def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[An
 
 
 def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArray[np.float32], Any]:
-    """Quantise positions (n, 3) [m]. Returns: integers, lower corner and size of the bounding box [m]."""
+    """Quantise positions (n, 3) [m].
+
+    Returns: integers (n, 3), lower corner and size of the bounding box [m].
+    """
     if len(positions) == 0:
         return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)
     low, high = positions.min(axis=0), positions.max(axis=0)
-    if float((high - low).max()) > LARGEST_BOX:  # a body flew away: keep the resolution of the others
+    if float((high - low).max()) > LARGEST_BOX:  # a body flew away; keep the resolution of the others
         middle = np.median(positions, axis=0)
         positions = np.clip(positions, middle - LARGEST_BOX / 2, middle + LARGEST_BOX / 2)
         low, high = positions.min(axis=0), positions.max(axis=0)
@@ -54,12 +57,12 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """Copy a frame's packet with its number for one visitor."""
+    """Return a copy of a frame's packet with the frame number for one visitor."""
     return packet[:4] + struct.pack("<I", number & 0xFFFFFFFF) + packet[8:]
 
 
 def picture_packet(pane: int, frame: Frame) -> bytes:
-    """Pack a frame."""
+    """Pack a frame for a page."""
     rows, low, size = quantised(frame.positions)
     normals = np.zeros((len(rows), 4), np.int8)
     normals[:, :3] = np.rint(frame.normals * 127.0)

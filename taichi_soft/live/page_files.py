@@ -1,4 +1,4 @@
-"""HTTP responses: the files of the page, and headers."""
+"""HTTP responses: the files of the page, and their headers."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ PAGE = Path(__file__).parent / "page"
 
 FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:"
 """Sources that may embed a world in a frame: notebooks on this machine. A browser checks every enclosing
-page; in VS Code these are a vscode-webview: inside a vscode-file:."""
+page; VS Code encloses a vscode-webview: page in a vscode-file: page."""
 
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """All files that a page can request, by path. No other file is read from disk."""
+    """Return content type and content of every file that a page can request, by path."""
     fetch_three_js()
     found = {}
     for path in [*PAGE.iterdir(), *(PAGE / "three").iterdir()]:
@@ -31,7 +31,10 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 def response(status: HTTPStatus, kind: str, content: bytes, name: str | None = None) -> Response:
-    """Make a response; `name` makes it a download."""
+    """Make a response with content of a type.
+
+    If `name` is given, the browser downloads it under this name.
+    """
     headers = Headers()
     headers["Content-Type"] = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
     headers["Content-Length"] = str(len(content))

@@ -21,10 +21,9 @@ Heard = Callable[["Runner", tuple[Any, ...]], None]
 
 
 class Runner:
-    """A world in another process, with one thread per direction.
+    """A world in another process. One thread sends and one receives.
 
-    Neither side waits for the other: requests queue in an `Inbox`, and messages of the world are read when
-    they arrive.
+    Neither side waits for the other. Requests queue in an `Inbox`; messages of the world are read on arrival.
     """
 
     def __init__(
@@ -35,19 +34,19 @@ class Runner:
         heard: Heard,
         process: BaseProcess | None = None,
     ) -> None:
-        """Connect to a world; `process` ends with the connection."""
+        """Connect to a world. `process` is its process, or None if another program runs it."""
         self.source, self.heard, self._loop = source, heard, loop
         self._connection, self._process = connection, process
         self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
-        self._packed = 0, 0, b""  # the newest frame
-        self.pulls: dict[int, int] = {}  # by visitor: number of the hand's move that the newest frame shows
+        self._packed = 0, 0, b""  # newest frame: version, number, packet
+        self.pulls: dict[int, int] = {}  # number of the move that the newest frame shows, by visitor
         self.is_over = False
-        self.is_lost = False  # the connection is lost
-        self.is_asked = False  # the shown world was asked for its motion, for this one
-        self.is_fresh = False  # starts in its initial state, not in that of the shown world
-        self.keeps_sliders = False  # does not take the slider values of the shown world
+        self.is_lost = False  # True if the connection is lost
+        self.is_asked = False  # True after this world requested the shown world's motion
+        self.is_fresh = False  # True to start in the initial state, not the shown world's
+        self.keeps_sliders = False  # True to ignore the slider values of the shown world
         self._inbox = Inbox()
         self._changed = threading.Condition()
         for target in (self._listen, self._speak):
@@ -62,7 +61,7 @@ class Runner:
         given: Given,
         heard: Heard,
     ) -> Runner:
-        """Start a process that runs `running.run`."""
+        """Start a process that runs `running.run`, and return its runner."""
         from taichi_soft.live.running import run
 
         folder.mkdir(parents=True, exist_ok=True)
@@ -79,7 +78,7 @@ class Runner:
         Args:
             sender: number of the visitor.
             key: kind of the request, see `Inbox.put`.
-        Returns: False if too many requests of this visitor wait.
+        Returns: False if too many requests of this visitor are queued.
         """
         with self._changed:
             ends = {"is_kept": message[0] == "release", "is_last": message[0] == "leave"}
@@ -103,7 +102,7 @@ class Runner:
             self._process.kill()
 
     def end(self) -> None:
-        """Wait until the process has ended: it stores its compiled kernels at exit."""
+        """Wait until the process has ended. It stores its compiled kernels at exit."""
         self.stop()
         if self._process is None:
             return
@@ -113,7 +112,10 @@ class Runner:
             self._process.join(2.0)
 
     def newest_packet(self, pane: int) -> tuple[int, int, bytes]:
-        """The newest frame, packed once for all visitors: version (0 before the first), number and packet."""
+        """Return the version (0 before the first frame), the number and the packet of the newest frame.
+
+        A frame is packed once for all visitors.
+        """
         number = 0 if self.frames is None else self.frames.newest_number
         if self.frames is not None and number != self._packed[1]:
             frame = self.frames.newest()
@@ -142,7 +144,7 @@ class Runner:
                 message = ("ended",)
             try:
                 self._loop.call_soon_threadsafe(self._hear, message)
-            except RuntimeError:  # the server has ended
+            except RuntimeError:  # the server's loop has ended
                 return
             if message[0] == "ended":
                 return
@@ -155,7 +157,7 @@ class Runner:
             try:
                 self.frames = FrameFile(Path(path), *sizes)
             except OSError:
-                return  # a newer frame has replaced it
+                return  # newer meshes have replaced the file
             self.drawn = header, arrays
             self._packed = 0, 0, b""
         elif message[0] == "frame":

@@ -1,4 +1,4 @@
-"""Parse messages of a visitor's page into checked requests, or refuse them with a reason."""
+"""Convert messages of a visitor's page to checked requests, or refuse them with a reason."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from taichi_soft.live.guard import LARGEST_TEXT
 from taichi_soft.live.tints import QUANTITIES
 
 FARTHEST = 1e5
-"""Largest coordinate of a point or a direction [m]."""
+"""Largest coordinate of a point [m] or a direction."""
 
 SAVED = ("script", "film")
 """Files that a visitor can request."""
 
 NEWEST = ("pause", "tint", "preset", "reset", "save", "move")
-"""Requests that replace a waiting request of the same name."""
+"""Requests that replace a queued request of the same name."""
 
 
 def parse_request(text: str) -> dict[str, Any]:
-    """Parse a message into a request: `do`, `pane`, and the arguments of that request.
+    """Parse a message. Returns: a request with `do`, `pane`, and the arguments of that request.
 
     Raises: OptionError for a message that is too long, is not JSON, or has an unknown or invalid request.
     """
@@ -43,7 +43,7 @@ def parse_request(text: str) -> dict[str, Any]:
 
 
 def merge_key(request: dict[str, Any]) -> Hashable:
-    """Return the kind of a request, which replaces waiting requests of its kind, or None to keep all."""
+    """Return the kind of a request, by which it replaces a queued request; None if it replaces no request."""
     do = request["do"]
     if do == "set":
         return do, request["name"]

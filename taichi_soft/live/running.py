@@ -1,4 +1,4 @@
-"""Entry point of a live world's process: make the scene, report progress, and step it."""
+"""Entry point of a live world's process: make the scene, report progress, and step the world."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from taichi_soft.live.simulation import Simulation, words_of
 
 
 def run(connection: Connection, folder: str, source: SceneSource, given: Given) -> None:
-    """Make a scene and step it until "stop" arrives. Errors are reported, not raised.
+    """Make a scene and step it until the message "stop" arrives. Errors are reported, not raised.
 
     Incoming messages are `(sender, key, (name, *arguments))`, the arguments of `Simulation.do_NAME`.
     Outgoing: ("progress", step, kernels), ("ready", state), ("drawn", ...), ("frame", number, pulls),

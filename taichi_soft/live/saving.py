@@ -33,7 +33,9 @@ if __name__ == "__main__":
 
 
 def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int) -> str:
-    """Write a script that restores the current world from a snapshot next to it, and steps it for 1 s."""
+    """Return a script that restores the current world from a snapshot in the same folder, and steps it for 1
+    s.
+    """
     title = f'"""The scene {source.title!r}, saved by `taichi-soft live`."""\n\n'
     script = source.script(is_alone=True)
     act = "\n        if act is not None:\n            act(world)" if source.kind == "demo" else ""
@@ -41,7 +43,7 @@ def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int)
 
 
 def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
-    """Pack the script, its snapshot and the files that it names into a .zip."""
+    """Pack the script, its snapshot and the files that it names. Returns: a .zip file."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("scene.py", script)
@@ -60,7 +62,7 @@ KEPT = 10.0
 """Length of a film [s]."""
 
 MOST_KEPT = 2**28
-"""Largest size of the frames stored for a film [bytes]; with many vertices the film is shorter."""
+"""Largest size of the frames stored for a film [bytes]. With many vertices the film is shorter."""
 
 
 class Recent:
@@ -71,11 +73,11 @@ class Recent:
         self._due = 0.0
 
     def add(self, now: float, moment: float, drawn: Drawn, frame: Frame) -> None:
-        """Store a frame of world time `moment` [s], unless the last one is too recent."""
+        """Store a frame of world time `moment` [s], unless the last stored frame is too recent."""
         if now < self._due:
             return
         if self._rows and moment < self._rows[-1][0]:
-            self._rows.clear()  # the world was restored to an earlier state
+            self._rows.clear()  # the world has been restored to an earlier state
         self._rows.append((moment, drawn.version, (frame.positions.copy(), frame.poses.copy())))
         most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(drawn.vertex_count, 1)))
         while len(self._rows) > most:
@@ -87,12 +89,12 @@ class Recent:
         self._rows.clear()
 
     def rows(self) -> list[tuple[float, int, Any]]:
-        """Return the frames: time [s], version of the meshes, and positions and poses."""
+        """Return the frames in order: world time [s], version of the meshes, and positions and poses."""
         return list(self._rows)
 
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn) -> None:
-    """Write the input of `film_file`: meshes, and frames of their current version."""
+    """Write the input of `film_file`: meshes, and the frames that belong to their current version."""
     header, arrays = drawn.described()
     own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]
     if not own:

@@ -1,4 +1,4 @@
-"""Source of a live world, as a script. A saved scene is the script that ran."""
+"""The source of a live world: a script. A saved scene contains the script that ran."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class SceneSource:
     Args:
         kind: "playground" for bodies on a floor, "demo" or "script".
         name: name of the demo, or path of the script.
-        law, strain, flips: of all bodies; None keeps the scene's.
+        law, strain, flips: settings of all bodies; None keeps those of the scene.
         meshes: paths of surfaces that visitors uploaded.
     """
 
@@ -68,19 +68,19 @@ class SceneSource:
 
     @property
     def title(self) -> str:
-        """Title for visitors."""
+        """Title of the scene for visitors."""
         return Path(self.name).stem if self.name else "playground"
 
     @property
     def folder(self) -> Path:
-        """Folder of the files that the script names."""
+        """Folder that contains the files named by the script."""
         return Path(self.name).resolve().parent if self.kind == "script" else Path.cwd()
 
     def script(self, *, is_alone: bool = False) -> str:
-        """The script that makes `world`.
+        """Return the script that makes `world`.
 
         Args:
-            is_alone: True if the files that it names are in `files` next to it, as in a saved scene.
+            is_alone: True if the files that the script names are in the folder `files` next to it.
         """
         files = ", ".join(self._place(each, is_alone) for each in self.meshes)
         options = [
@@ -97,7 +97,7 @@ class SceneSource:
 
     @staticmethod
     def _place(path: str, is_alone: bool) -> str:
-        """Expression for a file's path in the script."""
+        """Return the expression for a file's path in the script."""
         return f'Path(__file__).parent / "files" / {Path(path).name!r}' if is_alone else repr(path)
 
 
@@ -113,14 +113,14 @@ class Scene:
     colors: dict[int, Color] = field(default_factory=dict)  # colours of bodies, by slot
 
     def color(self, slot: int) -> Color:
-        """Colour of the body in a slot, sRGB from 0 to 1."""
+        """Return the colour of the body in a slot, sRGB from 0 to 1."""
         return self.colors.get(slot, PALETTE[slot % len(PALETTE)])
 
 
 def made_scene(source: SceneSource) -> Scene:
-    """Run a scene's script.
+    """Run a scene's script and return the scene.
 
-    Raises: every error of the script; OptionError for a script that makes no world or several worlds.
+    Raises: every error of the script; OptionError if it makes no world or several worlds.
     """
     path = source.folder / "taichi_soft_live_scene.py"
     names: dict[str, Any] = {"__name__": "taichi_soft_live_scene", "__file__": str(path)}
@@ -146,7 +146,7 @@ def _camera_at_start(stage: Stage) -> Camera:
 
 
 def framing_of(world: World) -> Camera:
-    """Camera that sees all bodies, and the floor below them."""
+    """Return a camera that sees all bodies and the floor below them."""
     rows = np.concatenate([body.positions() for body in world.bodies] or [np.zeros((1, 3), np.float32)])
     low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)
     if world.settings.floor is not None:
@@ -164,7 +164,7 @@ def adapter_of(scene: Scene, substeps: int, before: Callable[[World], object]) -
 
 
 def found_source(text: str | None) -> SceneSource:
-    """Parse the argument of the command line: nothing, a demo, a script, or a mesh.
+    """Parse the argument of the command line: None for the playground, a demo, a script, or a mesh.
 
     Raises: OptionError for any other text.
     """

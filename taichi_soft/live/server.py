@@ -39,13 +39,13 @@ from taichi_soft.live.worlds import Worlds
 from taichi_soft.meshing.surfaces import Up, assumed_up
 
 MOST_MESHES = 8
-"""Largest number of meshes that visitors can add; a world reserves capacity for bodies of each."""
+"""Largest number of meshes that visitors can add, because a world reserves capacity for bodies of each."""
 
 BETWEEN_CHOICES = 1.0
-"""Shortest time between two choices of a law [s], because each starts a process."""
+"""Shortest time between two choices of a law [s], because each choice starts a process."""
 
 VIEWED = ("grab", "move", "release", "tint")
-"""Requests that work in a world stepped by another program."""
+"""Requests that work in a world that another program steps."""
 
 
 class LiveServer:
@@ -54,8 +54,8 @@ class LiveServer:
     Args:
         source: source of the first world.
         host: address to bind to; any address except loopback requires a token.
-        port: port; 0 takes a free one.
-        attached: connection to a world that another program steps, instead of one made from `source`.
+        port: port to listen on; 0 chooses a free one.
+        attached: connection to a world that another program steps; None to make a world from `source`.
     """
 
     def __init__(
@@ -77,12 +77,12 @@ class LiveServer:
         self._count = 0
         self._files = page_files()
         self._last_choice = -math.inf
-        self.is_reading = False  # a visitor's file is being read
+        self.is_reading = False  # True while a visitor's file is read
         self._tasks: set[asyncio.Task[None]] = set()
         self._listening: Listening | None = None
 
     async def open(self) -> str:
-        """Start to serve. Returns: the address to open. Raises: OSError if the port is in use."""
+        """Start to serve, and return the address to open. Raises: OSError if the port is in use."""
         self._listening = await serve(
             self._visit,
             self.host,
@@ -106,7 +106,7 @@ class LiveServer:
     async def close(self) -> None:
         """End all processes and connections."""
         for runner in self.worlds.coming.values():
-            runner.kill()  # a compiling process reads no messages
+            runner.kill()  # a process that compiles reads no messages
         for runner in self.worlds.panes.values():
             runner.stop()
         self.downloads.stop()
@@ -119,7 +119,7 @@ class LiveServer:
         self._folder.cleanup()
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        """Run a task in the background."""
+        """Run a coroutine in the background."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -173,7 +173,7 @@ class LiveServer:
             speaking.cancel()
 
     def _offered(self) -> dict[str, Any]:
-        """Return the data for the page's controls."""
+        """Return the data for the page's controls: sliders, laws, quantities and presets."""
         sliders = [asdict(each) for each in SLIDERS.values()]
         laws = [{"name": law.name, "about": law.summary} for law in LAWS.values()]
         offered = {
@@ -194,7 +194,7 @@ class LiveServer:
             visitor.put(refused=str(error))
 
     def obey(self, visitor: Visitor, request: dict[str, Any]) -> None:
-        """Execute a request. Raises: OptionError for a request that is refused."""
+        """Execute a visitor's request. Raises: OptionError if it is refused."""
         do, runner = request["do"], self.worlds.panes.get(request["pane"])
         if do == "seen":
             visitor.seen = max(visitor.seen, min(request["number"], visitor.sent))
@@ -231,7 +231,7 @@ class LiveServer:
         self.downloads.film_asked(runner)
 
     def _choose(self, do: str, request: dict[str, Any]) -> None:
-        """Prepare a world with another law, to replace the shown one or to stand next to it."""
+        """Prepare a world with another law, which replaces the shown world or appears next to it."""
         self._require_patience()
         chosen = {key: request[key] for key in ("law", "strain", "flips")}
         pane = 1 if do == "compare" else request["pane"]
@@ -244,7 +244,7 @@ class LiveServer:
         self._last_choice = now
 
     def _obey_for_all(self, visitor: Visitor, request: dict[str, Any]) -> None:
-        """Send a request to both worlds."""
+        """Send a request to all shown worlds."""
         do = request["do"]
         if do == "pause":
             self.worlds.paused = request["is_paused"]

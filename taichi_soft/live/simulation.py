@@ -31,34 +31,34 @@ FRAMES = 60.0
 """Largest number of frames per second."""
 
 TOLD = 5.0
-"""Reports of measurements per second."""
+"""Number of reports of measurements per second."""
 
 SHARE = 0.05
-"""Largest fraction of time for computing colours."""
+"""Largest fraction of time that computing colours takes."""
 
 MOST_HELD = 8
 """Largest number of simultaneous grabs of all visitors."""
 
 ANSWERING = 0.008
-"""Time after which the next step comes before further requests [s]: half of a frame."""
+"""Longest time for requests before the next step [s]: half a frame."""
 
 
 def words_of(error: BaseException) -> str:
-    """Return the message of an error, with its type unless it is a TaichiSoftError."""
+    """Return the message of an error, preceded by its type unless it is a TaichiSoftError."""
     text = str(error) or type(error).__name__
     return text if isinstance(error, TaichiSoftError) else f"{type(error).__name__}: {text}"
 
 
 class Simulation:
-    """One world with the grabs of its visitors."""
+    """A live world and the grabs of its visitors."""
 
     def __init__(self, connection: Connection, folder: Path, scene: Scene, source: SceneSource) -> None:
         self.connection, self.folder, self.scene, self.source = connection, folder, scene, source
         self.world = scene.world
         self.controls = Controls(self.world, scene.step.dt, scene.step.substeps)
         self.adapter: EngineAdapter = adapter_of(scene, self.controls.substeps, self._before_step)
-        self.first = b""  # initial state
-        self.is_playing, self.is_moving = False, True  # starts when it is shown
+        self.first = b""  # snapshot of the initial state
+        self.is_playing, self.is_moving = False, True  # starts to play when the server shows it
         self.hands: dict[int, Grab] = {}
         self.inbox, self.history = Inbox(), History()
         self.tints: Tints | None = None
@@ -69,11 +69,11 @@ class Simulation:
         self.frames: FrameFile
         self._due = {"frame": 0.0, "told": 0.0, "tints": 0.0}
         self._steps_seen = 0
-        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: unshown move, step
-        self._alpha: float | None = None  # set if another program steps the world
+        self._pulls: dict[int, tuple[int, int]] = {}  # move not yet shown, by visitor: number, step
+        self._alpha: float | None = None  # interpolation if another program steps the world
 
     def start(self, given: Given) -> None:
-        """Compile the kernels of all requests, and send the meshes."""
+        """Compile all kernels that requests need, and send the meshes."""
         self.world.warm_up()
         self.first = self.world.snapshot()
         self.controls.give(given)
@@ -83,7 +83,11 @@ class Simulation:
         self.connection.send(("ready", self._told()))
 
     def look(self, alpha: float) -> None:
-        """Answer requests and write a frame of a world that another program steps."""
+        """Execute requests and write a frame of a world that another program steps.
+
+        Args:
+            alpha: interpolation between the previous step (0) and the last one (1).
+        """
         self._answer()
         if self.world.step_count != self._steps_seen:
             self._steps_seen, self.is_moving = self.world.step_count, True
@@ -105,7 +109,7 @@ class Simulation:
             self.connection.poll(max(left, 0.0005) if self.is_playing else 0.02)
 
     def _answer(self) -> bool:
-        """Answer requests for a limited time. Returns: False if the server ends the world."""
+        """Execute requests for a limited time. Returns: False if the server ends the world."""
         while self.connection.poll():
             sender, key, message = self.connection.recv()
             if message[0] == "stop":
@@ -130,7 +134,7 @@ class Simulation:
             getattr(self, f"do_{name}")(*arguments)
         except Exception as error:
             self._refuse(sender, words_of(error))
-        if self.drawn.is_outdated:  # charged to this visitor
+        if self.drawn.is_outdated:  # the visitor is charged for the time
             self.describe()
         self.is_moving = True
 
@@ -139,7 +143,7 @@ class Simulation:
 
     @contextmanager
     def _undoable(self, what: str, *, is_slider: bool = False) -> Iterator[None]:
-        """Record the state before a change, unless the change fails.
+        """Return a context that records the state before a change, unless the change fails.
 
         In a scene with its own code, only sliders can be undone, because a snapshot does not contain the
         state of that code.
@@ -159,7 +163,7 @@ class Simulation:
         self.meters.begin_step()
 
     def _advance(self, seconds: float) -> None:
-        """Advance the world's time. If a step fails, the world stops and reports the reason."""
+        """Advance the world by a time [s]. If a step fails, the world stops and reports the reason."""
         before = self.world.step_count
         self.meters.begin()
         with warnings.catch_warnings(record=True) as caught:
@@ -170,13 +174,13 @@ class Simulation:
                 self.is_playing = False
                 self.connection.send(("said", f"stopped: {words_of(error)}"))
         self.meters.end((self.world.step_count - before) * self.adapter.fixed_step.dt)
-        self.is_moving = True  # also between two steps
+        self.is_moving = True  # also between two steps, by interpolation
         for each in caught:
-            # The page predicts stability from the materials of existing bodies, not of reserved ones.
+            # The page itself warns of instability, from the materials of existing bodies only.
             if not issubclass(each.category, UnstableStepWarning):
                 self.connection.send(("said", str(each.message)))
 
-    # Requests of visitors.
+    # Requests of visitors
 
     def do_set(self, name: str, value: float) -> None:
         """Set a slider."""
@@ -215,19 +219,19 @@ class Simulation:
         self._renew_adapter()
 
     def do_settle(self, is_first: bool) -> None:
-        """Clear the history. The first world of a pane will reset to its current state."""
+        """Clear the history. If `is_first`, later resets restore the current state."""
         self.history.clear()
         if is_first and not self.controls.given:
             self.first = self.world.snapshot()
 
     def do_pause(self, is_paused: bool) -> None:
-        """Pause or continue."""
+        """Pause the world or continue."""
         self.is_playing = not is_paused
-        self._pulls.clear()  # a pause must not count as latency
+        self._pulls.clear()  # latency must not include a pause
         self._due["told"] = 0.0
 
     def do_step(self) -> None:
-        """Make one step of a paused world."""
+        """Pause the world and make one step."""
         self.is_playing = False
         self.meters.begin()
         self.adapter.step()
@@ -248,7 +252,7 @@ class Simulation:
         self._renew_adapter()
 
     def do_grab(self, visitor: int, origin: list[float], direction: list[float]) -> None:
-        """Grab the first body that a ray hits."""
+        """Grab the first body that a ray hits; `origin` [m] and `direction` define the ray."""
         self.do_release(visitor)
         if len(self.hands) >= MOST_HELD:
             raise TaichiSoftError(f"{MOST_HELD} bodies are grabbed already: release one first")
@@ -257,7 +261,7 @@ class Simulation:
             self.hands[visitor] = grab
 
     def do_move(self, visitor: int, point: list[float], number: int = 0) -> None:
-        """Move a visitor's grab to a point; `number` identifies the move."""
+        """Move a visitor's grab to a point [m]; `number` identifies the move."""
         grab = self.hands.get(visitor)
         if grab is not None and grab.is_held:
             grab.move(point)
@@ -280,7 +284,7 @@ class Simulation:
             self.do_release(visitor)
 
     def do_spawn(self, name: str) -> None:
-        """Add a body of the palette above the centre of the view."""
+        """Add a body from the palette above the centre of the view."""
         palette = palette_of(self.world)
         if name not in palette:
             raise TaichiSoftError(f"unknown shape {name!r}: choose one of {', '.join(palette) or 'none'}")
@@ -309,7 +313,7 @@ class Simulation:
             self.tints.renew(self.world)
 
     def do_motion(self) -> None:
-        """Send the motion of all bodies to a world with another law."""
+        """Send the motion of all bodies to the server, for a world with another law."""
         self.connection.send(("motion", motion_of(self.controls)))
 
     def do_take_motion(self, motion: Motion) -> None:
@@ -317,14 +321,14 @@ class Simulation:
         continue_from(self.controls, motion)
 
     def do_save(self, number: int) -> None:
-        """Write the script of this world, and a snapshot."""
+        """Send the script of this world and a snapshot to the server; `number` is the visitor."""
         snapshot = self.world.snapshot()
         step = self.adapter.fixed_step
         text = saved_script(self.source, self.world.state_hash(), step.dt, self.controls.substeps)
         self.connection.send(("saved", number, text, snapshot))
 
     def do_film(self, number: int) -> None:
-        """Write the frames of the last seconds for a film."""
+        """Write the frames of the last seconds to a file for a film; `number` is the visitor."""
         path = self.folder / f"film{number}.npz"
         try:
             film_frames(path, self.recent.rows(), self.drawn)
@@ -333,10 +337,10 @@ class Simulation:
             raise
         self.connection.send(("filmed", number, str(path)))
 
-    # Output.
+    # Output
 
     def draw(self, now: float, is_moving: bool) -> None:
-        """Write a frame if one is due and something moved."""
+        """Write a frame if one is due and something moved. `now` is the current time [s]."""
         if self.drawn.is_outdated:
             self.describe()
             is_moving = True
@@ -360,13 +364,13 @@ class Simulation:
         self.is_moving = False
 
     def describe(self) -> None:
-        """Send the meshes."""
+        """Update the meshes and send them."""
         self.versions += 1
         self.drawn = Drawn(self.scene, self.versions)
         path = self.folder / f"frames{self.versions}"
         self.frames = FrameFile(path, self.drawn.vertex_count, len(self.drawn.colliders), is_new=True)
         self.recent.clear()
-        with suppress(OSError):  # on Windows a file in use cannot be removed
+        with suppress(OSError):  # Windows cannot remove a file in use
             (self.folder / f"frames{self.versions - 2}").unlink(missing_ok=True)
         if self.tints is not None:
             self.tints.renew(self.world)

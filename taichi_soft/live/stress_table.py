@@ -1,4 +1,4 @@
-"""Table and plot of the stress in all bodies, for notebooks."""
+"""Table and plot of the stress in all bodies of a world, for notebooks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_soft import StateError, TetMesh, World
 from taichi_soft.render.colors import ColorScale
 
 BARS = 24
-"""Number of bars of the plot."""
+"""Number of bars in the plot."""
 
 WIDTH, HEIGHT = 480, 120  # size of the plot [pixels]
 

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity to show: name, unit and function for the values at a body's vertices."""
+    """A quantity to show: name, unit, and a function of a body that returns the values at its vertices."""
 
     name: str
     unit: str
@@ -49,15 +49,15 @@ QUANTITIES = {
 
 
 class Tints:
-    """Values of all vertices on a scale from 0 to 255, and that scale."""
+    """Values of a quantity at all vertices, scaled to 0 to 255, and the scale."""
 
     def __init__(self, quantity: str) -> None:
         self.quantity = QUANTITIES[quantity]
-        self.high = 1.0 if quantity == "flips" else 0.0  # value at 255, in the unit
+        self.high = 1.0 if quantity == "flips" else 0.0  # value of 255, in the quantity's unit
         self.rows = np.zeros(0, np.uint8)
 
     def renew(self, world: World) -> None:
-        """Update the values. The scale grows to the largest value, and shrinks if all are much smaller."""
+        """Update the values. The scale is adjusted if it is much too large or too small for them."""
         found = [self._values(body) for body in world.bodies]
         values = np.concatenate(found) if found else np.zeros(0)
         if self.quantity.name != "flips" and len(values):
@@ -74,7 +74,7 @@ class Tints:
 
     @property
     def scale(self) -> dict[str, Any]:
-        """Scale for the page."""
+        """Colour scale for the page: quantity, unit and range."""
         return {"quantity": self.quantity.name, "unit": self.quantity.unit, "high": self.high}
 
 

@@ -17,7 +17,7 @@ from taichi_soft.meshing.surface import Surface
 from taichi_soft.meshing.surfaces import UP, Up
 
 KINDS = (".glb", ".obj", ".ply", ".stl", ".off")
-"""Self-contained formats. A .gltf could name other files on the server."""
+"""Self-contained file formats. A .gltf could refer to other files on the server."""
 
 MOST_SECONDS = 60.0
 """Time limit for making tetrahedra from a visitor's file [s]."""
@@ -28,7 +28,7 @@ MOST_TRIANGLES = 200_000
 def require_mesh(
     folder: Path, name: str, content: bytes, taken: Collection[str] = (), up: Up | None = None
 ) -> Path:
-    """Store a visitor's file in a new folder if it can be made into a body.
+    """Store a visitor's file in a new folder and return its path, if it can be made into a body.
 
     Args:
         folder: folder to create for this file.
@@ -70,7 +70,7 @@ def require_mesh(
 def _look_at(path: str, up: Up | None, connection: Connection) -> None:
     """Make a body from a file. If its upward axis is not the default of the format, write it as .glb.
 
-    Sends "" or the reason of the failure.
+    Sends an empty string on success, else the reason of the failure.
     """
     from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.live.choices import VISITOR

@@ -1,4 +1,4 @@
-"""Show a world that a notebook or a script steps live in a browser."""
+"""Show a world in a browser while a notebook or a script steps it."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ from taichi_soft.render.colors import Color
 
 
 class View:
-    """A live view of a world that this program steps. Returned by `view`.
+    """A live view, returned by `view`, of a world that this program steps.
 
-    A notebook shows it as the last expression of a cell. Any browser on this machine can open `address`.
+    A notebook shows the view if it is the last expression of a cell. Any browser on this machine can open
+    `address`.
     """
 
     def __init__(self, world: World, colors: Mapping[Body, Color], height: int) -> None:
@@ -43,7 +44,7 @@ class View:
             command = [sys.executable, "-m", "taichi_soft.live.serving", place]
             path = os.pathsep.join(each for each in sys.path if each)
             environment = {**os.environ, VIEW_KEY: key.hex(), "PYTHONPATH": path}
-            # A separate process group: interrupting a notebook's cell does not end the server.
+            # In a separate process group, interrupting a notebook's cell does not end the server.
             group: dict[str, Any] = {"start_new_session": True}
             if sys.platform == "win32":
                 group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -66,7 +67,7 @@ class View:
     def update(self, alpha: float = 1.0) -> None:
         """Show the current state and apply visitors' grabs. Call this once per frame, between steps.
 
-        It sends at most 60 frames per second, at any call rate.
+        At most 60 frames per second are sent, at any rate of calls.
         Args:
             alpha: interpolation between the previous step (0) and the last one (1).
         Raises: StateError after `close`.
@@ -93,7 +94,7 @@ class View:
         self.close()
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks."""
+        """Return HTML that notebooks display."""
         source = escape(self.address, quote=True)
         style = f"width: 100%; height: {self._height}px; border: 1px solid #8a97a5"
         return f'<iframe src="{source}" style="{style}" title="a live world of taichi-soft"></iframe>'
@@ -109,12 +110,12 @@ def view(
             world.step(1 / 60)
             window.update()
 
-    A separate process serves it, to this machine only. Visitors can turn the view, colour bodies by stress
-    and pull them.
+    A separate process serves the view, only to this machine. Visitors can rotate the camera, colour bodies by
+    stress, and pull bodies.
     Args:
         world: a built world, or its adapter.
         colors: colours of bodies, sRGB from 0 to 1.
-        height: height in a notebook [pixels].
+        height: height of the view in a notebook [pixels].
     Raises: StateError for a world that is not built; OptionError for another argument; MissingExtraError
         without the extra `live`.
     """
@@ -136,7 +137,10 @@ def _checked(colors: Mapping[Body, Color]) -> dict[Body, Color]:
 
 
 def _accepted(listener: Listener, server: subprocess.Popen[str]) -> Any:
-    """Wait for the server's connection. Raises: StateError if the server ends first."""
+    """Wait for the server to connect, and return the connection.
+
+    Raises: StateError if the server ends first.
+    """
     found: list[Any] = []
     waiting = threading.Thread(target=lambda: found.append(listener.accept()), daemon=True)
     waiting.start()

@@ -1,4 +1,4 @@
-"""Worlds that are shown or being prepared, each in its own process."""
+"""Manage the worlds that are shown or being prepared, each in its own process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from taichi_soft.live.pane import Runner
 from taichi_soft.live.scene import SceneSource
 
 MOST_BREAKDOWNS = 2
-"""Largest number of failures per minute after which a world is restarted."""
+"""Largest number of failures per minute after which a shown world is restarted."""
 
 USUAL_KERNELS = 70
 """Approximate number of kernels that a world compiles."""
@@ -28,12 +28,12 @@ OnFile = Callable[[Runner, tuple[Any, ...]], None]
 
 
 class Worlds:
-    """One world, or two side by side, and those that will replace them.
+    """The shown world, or two side by side, and the worlds that will replace them.
 
     Args:
         source: source of the first world.
         folder: folder for files that processes share.
-        audience: receives status messages.
+        audience: visitors that receive status messages.
         on_file: called with the messages "saved" and "filmed".
         is_attached: True if another program steps the world.
     """
@@ -43,7 +43,7 @@ class Worlds:
     ) -> None:
         self._source, self._folder, self._audience = source, folder, audience
         self._on_file, self._is_attached = on_file, is_attached
-        self.panes: dict[int, Runner] = {}  # shown worlds
+        self.panes: dict[int, Runner] = {}  # shown worlds, by pane
         self.coming: dict[int, Runner] = {}  # worlds being prepared, by pane
         self.paused = False
         self.tint: str | None = None  # quantity that colours the bodies
@@ -58,10 +58,10 @@ class Worlds:
     def begin(
         self, pane: int, source: SceneSource, *, is_fresh: bool = False, given: Given | None = None
     ) -> None:
-        """Prepare a world. The shown one continues until the new one is ready.
+        """Prepare a world for a pane. The shown world continues until the new one is ready.
 
         Args:
-            is_fresh: start in the initial state instead of the shown world's motion.
+            is_fresh: True to start in the initial state instead of the shown world's state.
             given: slider values; None takes those of the shown world.
         """
         if pane in self.coming:
@@ -77,19 +77,19 @@ class Worlds:
         self._audience.show_activity(f"world {pane}", described(source), "starting")
 
     def given(self) -> Given:
-        """Return the slider values that visitors chose, from the first world."""
+        """Return the slider values that visitors chose in the first world."""
         state = self.panes[0].state if 0 in self.panes else None
         return Given() if state is None else Given(dict(state["given"]), state["preset"])
 
     def source(self, pane: int) -> SceneSource:
-        """Return the source of a pane's world, preferably of the one being prepared."""
+        """Return the source of a pane's world; that of the new world if one is being prepared."""
         for runners in (self.coming, self.panes):
             if pane in runners:
                 return runners[pane].source
         return self._source
 
     def add_mesh(self, path: str) -> None:
-        """Prepare worlds with capacity for a mesh."""
+        """Prepare worlds with capacity for bodies of a mesh file."""
         for pane in sorted({0, *self.panes, *self.coming}):
             source = self.source(pane)
             self.begin(pane, replace(source, meshes=(*source.meshes, path)))
@@ -98,12 +98,15 @@ class Worlds:
         """End the second world."""
         for runners in (self.panes, self.coming):
             if 1 in runners:
-                runners.pop(1).kill()  # it may be compiling and read no messages
+                runners.pop(1).kill()  # a process that compiles reads no messages
         self._audience.end_activity("world 1")
         self._audience.wake()
 
     def reset(self, sender: int = SERVER) -> None:
-        """Reset all worlds. Worlds with their own code restart: a snapshot lacks the state of that code."""
+        """Reset all worlds.
+
+        Scenes with their own code are restarted, because a snapshot lacks the code's state.
+        """
         for pane, runner in list(self.panes.items()):
             if self.restarts(pane):
                 self.begin(pane, runner.source, is_fresh=True, given=self.given().at_reset())
@@ -111,7 +114,7 @@ class Worlds:
                 runner.send("reset", sender=sender, key="reset")
 
     def restarts(self, pane: int) -> bool:
-        """True if a reset restarts the world of this pane."""
+        """True if a reset restarts the world of a pane."""
         runner = self.panes.get(pane)
         return runner is not None and bool((runner.state or {}).get("restarts"))
 
@@ -128,7 +131,7 @@ class Worlds:
         return lambda runner, message: self.hear(pane, runner, message)
 
     def hear(self, pane: int, runner: Runner, message: tuple[Any, ...]) -> None:
-        """Handle a message of a world."""
+        """Handle a message from a world."""
         name, *rest = message
         is_shown, is_coming = self.panes.get(pane) is runner, self.coming.get(pane) is runner
         if runner.is_over or not (is_shown or is_coming):
@@ -163,7 +166,7 @@ class Worlds:
         self._audience.show_activity(f"world {pane}", described(runner.source), step, kernels, about)
 
     def _switch(self, pane: int, runner: Runner) -> None:
-        """Show a world that is ready, with the motion of the one before."""
+        """Show a world that is ready. It continues the motion of the world that it replaces."""
         before = self.panes.get(pane)
         goes_on = before is not None and not before.is_lost and not runner.is_fresh
         if before is not None and goes_on and before.send("motion"):
@@ -198,12 +201,12 @@ class Worlds:
         self._audience.wake()
 
     def _settle(self, first: Runner | None = None) -> None:
-        """Clear all histories, so that an undo acts equally in both worlds."""
+        """Clear the histories of all worlds, so that an undo affects both in the same way."""
         for runner in self.panes.values():
             runner.send("settle", runner is first)
 
     def _fail(self, pane: int, runner: Runner, words: str) -> None:
-        """Drop a world that failed while being prepared; restart one that failed while it was shown."""
+        """Drop a world that failed during preparation; restart one that failed while it was shown."""
         runner.stop()
         runner.is_lost = True
         if self.coming.get(pane) is runner:
@@ -215,7 +218,7 @@ class Worlds:
                 self._audience.set_trouble(words)
                 _log.warning("live: %s", words)
             return
-        if pane in self.coming:  # that one is shown as soon as it is ready
+        if pane in self.coming:  # the coming world replaces the failed one
             if self.coming[pane].is_asked:
                 self._show(pane, self.coming[pane])
             return
@@ -233,7 +236,7 @@ class Worlds:
 
 
 def described(source: SceneSource) -> str:
-    """Return the title of a scene, with the law that was chosen."""
+    """Return the title of a scene, followed by the chosen law."""
     choices = [f"{key} {value}" for key, value in (("law", source.law), ("strain", source.strain)) if value]
     choices += [f"flips {source.flips}"] if source.flips else []
     return ", ".join([source.title, *choices])

@@ -18,17 +18,18 @@ from taichi_soft.render.take import Take, skins_of
 from taichi_soft.render.texture import Texture
 
 _RECENT = 25
-"""Number of recent frames whose median step time is shown."""
+"""Number of recent frames whose median step time is displayed."""
 
 LABEL_DISTANCE = 1.2
 """Distance from the centre of a body to its label, in half widths of the body at rest."""
 
 
 def speed_of(times: Sequence[float], fps: float) -> str:
-    """Format the median speed of the last frames; the median ignores single outliers.
+    """Format the median speed of the last frames. The median ignores single outliers.
 
     Args:
-        times: step time of each frame [s]. The first frame makes no step and is skipped.
+        times: step time of each frame [s]. The first frame makes no step and is ignored.
+        fps: frames per second of world time.
     """
     recent = times[1:][-_RECENT:]
     if not recent:
@@ -59,11 +60,11 @@ class Artist:
         )
         self.times: list[float] = []
         self._spent = 0.0
-        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and topology version
-        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; holds the image so that ids stay unique
+        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces by actor and topology version
+        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; storing the image keeps its id unique
 
     def draw(self) -> NDArray[np.uint8]:
-        """Draw the current state of the take, without text."""
+        """Draw the current state of the take without text. Returns: sRGB, uint8 (height, width, 3)."""
         start = time.perf_counter()
         take = self.take
         surfaces = take.scenery.at(take.adapter.alpha).copy()
@@ -84,7 +85,10 @@ class Artist:
         return picture
 
     def finish(self, pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-        """Average the subframes of a frame and draw the text on it. A single subframe is changed in place."""
+        """Average the subframes of a frame, draw the text on the result, and return it.
+
+        A single subframe is changed in place.
+        """
         start = time.perf_counter()
         picture = mean_picture(pictures)
         stage = self.take.stage
@@ -107,7 +111,10 @@ class Artist:
         return picture
 
     def _surfaces_of(self, actor: Actor) -> list[Surface]:
-        """Return the actor's skins, or its surface if it has none. A cut makes new surfaces."""
+        """Return the surfaces of an actor's skins, or of its body if it has no skin.
+
+        A cut makes new surfaces.
+        """
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:
             skins = [self._skin_surface(mesh, actor) for mesh in skins_of(actor)]
@@ -115,7 +122,7 @@ class Artist:
         return self._surfaces[key]
 
     def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
-        """Make the surface of a skin, in the colours and texture of its mesh if it has any."""
+        """Make the surface of a skin, with the colours and the texture of its mesh if it has them."""
         picture, texture = texture_picture(mesh.visual, mesh.vertex_count), None
         if picture is not None:
             if id(picture) not in self._textures:

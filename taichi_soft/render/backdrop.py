@@ -1,4 +1,4 @@
-"""Sky and floor behind the bodies."""
+"""Sky and floor behind bodies."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Backdrop(Choice):
     DAY = "day"  # pale checks under a blue sky
     DUSK = "dusk"  # sand under an evening sky
     MEADOW = "meadow"  # green checks under a clear sky
-    PAPER = "paper"  # a roll of white paper, without a horizon
-    STUDIO = "studio"  # a dark floor before a dark wall
+    PAPER = "paper"  # white paper without a horizon
+    STUDIO = "studio"  # a dark floor in front of a dark wall
 
 
 BackdropName: TypeAlias = Literal["day", "dusk", "meadow", "paper", "studio"]
@@ -25,7 +25,7 @@ BackdropName: TypeAlias = Literal["day", "dusk", "meadow", "paper", "studio"]
 
 @dataclass(frozen=True)
 class BackdropColors:
-    """Colours of a backdrop, linear light.
+    """Colours of a backdrop, in linear light.
 
     Args:
         horizon, zenith: ends of the sky's gradient.

@@ -1,6 +1,6 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Paint sky and floor, once per camera, and convert linear light to pixels."""
+"""Paint sky and floor once per camera, and convert linear light to pixels."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
@@ -10,20 +10,23 @@ from taichi_soft.render.tone import WHITE
 
 @ti.func
 def smoothstep(low, high, x):
-    """0 below `low`, 1 above `high`, smooth between."""
+    """Return 0 below `low`, 1 above `high`, and a smooth transition between."""
     s = ti.math.clamp((x - low) / (high - low), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 @ti.func
 def pixel_ray(rays: ti.template(), u, v):
-    """Direction through a pixel [m per m of depth], not of unit length; `rays` is (3, 3), columns u, v, 1."""
+    """Return the direction through a pixel [m per m of depth], not of unit length.
+
+    `rays` is (3, 3) and maps (u, v, 1) to the direction.
+    """
     return ti.Vector([rays[k, 0] * u + rays[k, 1] * v + rays[k, 2] for k in ti.static(range(3))])
 
 
 @ti.func
 def check_average(x, width):
-    """Integral mean of a square wave of period 2 (+1 on [0, 1), -1 on [1, 2)) over `width` about x."""
+    """Return the mean over `width` about x of a square wave: +1 on [0, 1), -1 on [1, 2), period 2."""
     low, high = (x - 0.5 * width) * 0.5, (x + 0.5 * width) * 0.5
     low_wave = ti.abs(low - ti.floor(low) - 0.5)
     high_wave = ti.abs(high - ti.floor(high) - 0.5)
@@ -32,7 +35,7 @@ def check_average(x, width):
 
 @ti.func
 def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
-    """Store linear light as sRGB; `encode` is `tone.encode_table`."""
+    """Store linear light as sRGB; `encode` is the result of `tone.encode_table`."""
     # Ordered dithering below one step of brightness prevents banding in smooth gradients.
     grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
     for k in ti.static(range(3)):
@@ -61,25 +64,25 @@ def paint_backdrop(
     """Paint sky and floor without shadows.
 
     Args:
-        rays: see `pixel_ray`.
-        target: the checks fade with the distance from it [m].
+        rays: directions of pixels, see `pixel_ray`.
+        eye: position of the camera [m].
+        target: point from which the checks fade with distance [m].
         check: edge of a check [m].
         fade: distance at which the floor has faded into the sky [m].
         horizon, zenith, bright, dark: see `BackdropColors`.
-        out: (height, width, 4), linear light and the floor's share of it.
+        out: (height, width, 4), linear light and the weight of the floor in it.
         plain: (height, width, 3), the same light as sRGB.
     """
     for y, x in ti.ndrange(out.shape[0], out.shape[1]):
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
-        # Brightest at the horizon, darker upwards. Below the horizon, where the floor has faded, it stays
-        # bright.
+        # The sky is brightest at the horizon, and equally bright below it, where the floor has faded.
         color = horizon + (zenith - horizon) * smoothstep(-0.05, 0.65, ti.sqrt(ti.max(up, 0.0)))
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
         if has_floor != 0 and depth > 0.0 and eye.z > floor:
             at = eye + depth * ray
-            # Size of the pixel on the floor along x and y, to average the checks over it.
+            # Average the checks over the pixel's size on the floor along x and y.
             right = pixel_ray(rays, x + 1.5, y + 0.5)
             below = pixel_ray(rays, x + 0.5, y + 1.5)
             steep = ti.min(ray.z, -1e-6)
@@ -88,7 +91,7 @@ def paint_backdrop(
             wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
             wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
-            # Fade checks near the size of a pixel, which would shimmer.
+            # Fade checks of about a pixel's size, which would shimmer.
             wave *= 1.0 - smoothstep(0.15, 0.7, ti.max(wide_x, wide_y))
             tiles = dark + (bright - dark) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade

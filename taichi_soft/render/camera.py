@@ -18,7 +18,7 @@ Point = tuple[float, float, float]
 NEAREST = 1e-3
 # Largest elevation of a camera that frames a box [degrees].
 STEEP = 89.0
-# Sine of the smallest angle between the line of sight and `up` that still defines an upright image.
+# Sine of the smallest angle between the line of sight and `up` that defines an upright image.
 STEEPEST = 1e-4
 
 
@@ -40,7 +40,7 @@ class Camera:
     target: Point = (0.0, 0.0, 0.0)
     up: Point = (0.0, 0.0, 1.0)
     fov_degrees: float = 40.0
-    distance: float = field(init=False, repr=False)  # from the eye to the target [m]
+    distance: float = field(init=False, repr=False)  # distance from the eye to the target [m]
 
     def __post_init__(self) -> None:
         for name in ("eye", "target", "up"):
@@ -126,7 +126,7 @@ class Camera:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """Unit vectors right, down and forward of the image, the rows of a (3, 3)."""
+        """Unit vectors right, down and forward of the image, as rows, (3, 3)."""
         forward = (np.array(self.target) - self.eye) / self.distance
         right = np.cross(forward, self.up)
         right /= np.linalg.norm(right)
@@ -138,9 +138,10 @@ class Camera:
         return NEAREST * self.distance
 
     def matrix(self, width: int, height: int) -> NDArray[np.float64]:
-        """Matrix (3, 4) from (x, y, z, 1) to (u d, v d, d): pixel u right, pixel v down, and depth d [m].
+        """Return the matrix (3, 4) that maps (x, y, z, 1) to (u d, v d, d).
 
-        The first pixel covers u and v from 0 to 1.
+        u is the pixel to the right, v the pixel down, and d the depth [m]. The first pixel covers u and v
+        from 0 to 1.
         Args:
             width, height: size of the image [pixels].
         """
@@ -152,7 +153,7 @@ class Camera:
         return matrix
 
     def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
-        """Project points into an image: pixel right, pixel down and depth [m], (n, 3).
+        """Project points into an image. Returns: pixel right, pixel down and depth [m], (n, 3).
 
         Args:
             points: (n, 3) [m].

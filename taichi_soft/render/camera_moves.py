@@ -1,4 +1,4 @@
-"""Cameras that move during a film: around a point, or with a body."""
+"""Cameras that move during a film: around a point or with a body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BoxOf = Callable[[Body], NDArray[np.float64]]
 """Function that returns the bounding box of a body as it is drawn, (2, 3) [m]."""
 
 LOOSE = 0.35
-"""Largest distance of a followed body from the centre of the image [half of the shorter side]."""
+"""Largest distance of a followed body from the image's centre [half of the shorter side]."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Follow:
         self._target = np.zeros(3)
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Return the camera at a time. A time before the last one restarts the smoothing.
+        """Return the camera at a time. A time before that of the last call restarts the smoothing.
 
         Args:
             time: world time [s].

@@ -36,10 +36,10 @@ RAMP: tuple[Color, ...] = (
 """Colours of a `ColorScale` at equal steps, sRGB from 0 to 1."""
 
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0))
-"""Prefixes of units, largest first. A prefix is used from ten of its units on."""
+"""Prefixes of units, largest first. A prefix is used for values from ten of its units on."""
 
 FLIPPED: Color = (0.93, 0.10, 0.42)
-"""Colour of inverted tetrahedra, sRGB from 0 to 1; it is not in `PALETTE`."""
+"""Colour of inverted tetrahedra, sRGB from 0 to 1, which `PALETTE` does not contain."""
 
 
 def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
@@ -52,7 +52,7 @@ def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
     Raises: OptionError for values that are not finite or an empty range.
     """
     place = _places(values, low, high) * 255.0
-    # OpenCV's table has 256 colours: interpolate between them.
+    # OpenCV's table has only 256 colours, so interpolate between them.
     table = cv2.applyColorMap(np.arange(256, dtype=np.uint8).reshape(-1, 1), cv2.COLORMAP_VIRIDIS)
     rgb = table[:, 0, ::-1].astype(np.float32) / 255.0
     channels = [np.interp(place, np.arange(256), rgb[:, k]) for k in range(3)]
@@ -104,18 +104,18 @@ class ColorScale:
         return np.stack(channels, axis=1).astype(np.float32)
 
     def ticks(self) -> tuple[str, str]:
-        """Labels of both ends, the upper one with its unit: ("0", "200 kPa")."""
+        """Return the labels of both ends, the upper one with its unit: ("0", "200 kPa")."""
         largest = max(abs(self.low), abs(self.high))
         prefix, factor = next(each for each in PREFIXES if largest >= 10 * each[1] or each is PREFIXES[-1])
         return f"{self.low / factor:.4g}", f"{self.high / factor:.4g} {prefix}{self.unit}"
 
 
 def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED) -> NDArray[np.float32]:
-    """Colour the vertices that are flagged, for example those of inverted tetrahedra.
+    """Return vertex colours that mark flagged vertices, for example those of inverted tetrahedra.
 
     Args:
-        flagged: (n,) of bool.
-        color, marked: sRGB of vertices without and with a flag.
+        flagged: True for vertices to mark, (n,).
+        color, marked: sRGB of vertices without and with a flag, (3,).
     Returns: sRGB from 0 to 1, float32 (n, 3).
     Raises: OptionError for wrong shapes or colours.
     """

@@ -1,4 +1,4 @@
-"""Film formats: how to write each and how to count its frames."""
+"""Film formats: write a film in each format and count its frames."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from taichi_soft.render.opencv import cv2
 
 Frame = NDArray[np.uint8]
 Found = tuple[int, set[tuple[int, int]]]
-"""Number of frames, and their sizes (width, height)."""
+"""Number of frames, and the set of their sizes (width, height)."""
 
 # Colour tags that players read; the first filter converts the frames to match them.
 COLORS = (
@@ -33,15 +33,15 @@ CODECS = {
     ),
 }
 LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
-# One palette for the whole film, and ordered dithering: pixels that do not move stay equal, so later frames
-# compress well and do not flicker.
+# With one palette per film and ordered dithering, pixels that do not move stay equal: later frames compress
+# well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # frames per second; delays count in 1/100 s, and viewers slow down frames of one
+GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers slow down the next one, 100
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Keep OpenCV from writing its own messages."""
+    """Return a context in which OpenCV prints no messages."""
     before = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -51,7 +51,7 @@ def quiet() -> Iterator[None]:
 
 
 class Container(ABC):
-    """A film that is being written to its own folder."""
+    """A film being written into a temporary folder."""
 
     @abstractmethod
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
@@ -60,7 +60,7 @@ class Container(ABC):
     @property
     @abstractmethod
     def files(self) -> list[Path]:
-        """Finished files to move to the film's path: one file, or one image per frame."""
+        """List the finished files to move to the film's path: one file, or one image per frame."""
 
     @abstractmethod
     def write(self, frame: Frame) -> None:
@@ -80,7 +80,7 @@ class Container(ABC):
 
 
 class Stream(Container):
-    """.mp4 of H.264 and .webm of VP9."""
+    """A film in .mp4 (H.264) or .webm (VP9)."""
 
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
         self._path, self._list = folder / f"film{suffix}", folder / "list"
@@ -104,7 +104,7 @@ class Stream(Container):
 
 
 class Gif(Stream):
-    """.gif. Frames are stored losslessly on disk until the palette is known."""
+    """A film in .gif. Frames are stored losslessly on disk until the palette is known."""
 
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
         if fps > GIF_FASTEST:
@@ -124,7 +124,7 @@ class Gif(Stream):
 
 
 class Pictures(Container):
-    """.png: one file per frame."""
+    """Numbered .png images, one per frame."""
 
     def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
         self._folder = folder
@@ -143,7 +143,7 @@ class Pictures(Container):
         self._files.append(name)
 
     def finish(self) -> None:
-        """Do nothing: every frame was complete when written."""
+        """Do nothing, because every image is complete when it is written."""
 
     def measure(self) -> Found:
         sizes = []
@@ -155,11 +155,11 @@ class Pictures(Container):
         return len(sizes), set(sizes)
 
     def abandon(self) -> None:
-        """Do nothing: no file is open."""
+        """Do nothing, because no file is open."""
 
 
 def _frames_of(fps: float, size: tuple[int, int]) -> list[str]:
-    """Arguments that describe the raw frames in ffmpeg's pipe."""
+    """Return the ffmpeg arguments that describe the raw frames in its pipe."""
     rate = Fraction(fps).limit_denominator(100_000)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     return [*raw, "-r", f"{rate.numerator}/{rate.denominator}", "-i", "pipe:0"]

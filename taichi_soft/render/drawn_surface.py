@@ -1,4 +1,4 @@
-"""Surface to draw: triangles whose vertices move and may have colours."""
+"""A surface to draw: triangles with moving vertices and colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
-# Larger coordinates [m] come from an explosion, and their products overflow in float32.
+# Larger coordinates [m] result from an explosion, and their products overflow in float32.
 FARTHEST = 1e7
 
 
@@ -21,12 +21,13 @@ class Surface:
     """Triangles over the vertices of a body. Set `positions`, and `color` if it changes, before each frame.
 
     Args:
-        positions: (n, 3), all vertices of the body, inner ones too [m]. Edges between triangles that now meet
-            at more than 60 degrees stay sharp; all others are shaded smooth.
-        triangles: (m, 3) vertex indices, counterclockwise seen from outside. Only a cloth is drawn from both
+        positions: positions of all vertices of the body, including inner ones, (n, 3) [m]. Edges between
+            triangles that meet at more than 60 degrees here stay sharp; all others are shaded smooth.
+        triangles: vertex indices, (m, 3), counterclockwise seen from outside. Only a cloth is drawn from both
             sides. Shadows assume a closed surface.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
-        normals: (n, 3), unit normals for shading instead; set them with the positions before each frame.
+        normals: unit normals for shading, (n, 3), instead of computed ones; set them with the positions
+            before each frame.
         texture: texture, multiplied by `color`; use white to leave it unchanged.
         uv: (n, 2), texture coordinates of the vertices: (0, 0) at the lower left, (1, 1) at the upper right;
             the texture repeats.
@@ -62,12 +63,12 @@ class Surface:
         if self.look is Look.CLOTH:
             corners, codes = _both_sides(corners)
         self.looks = codes
-        # Only vertices on the surface are projected and lit; vertices on sharp edges once per side.
+        # Only vertices on the surface are projected and lit; one on a sharp edge is duplicated per side.
         if normals is None:
             self._used, self.triangles = split_at_creases(first, corners, DEFAULT_CREASE)
         else:
             self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
-            if self.look is Look.CLOTH:  # its back has separate vertices, with opposite normals
+            if self.look is Look.CLOTH:  # its back has separate vertices with opposite normals
                 self._used = np.tile(self._used, 2)
                 self.triangles[codes == CLOTH_BACK] += self.vertex_count
         self.positions = first
@@ -104,10 +105,9 @@ class Surface:
 
     @property
     def positions(self) -> NDArray[np.float32]:
-        """Positions of the vertices on the surface, float32 (k, 3) [m]; vertices on sharp edges once per
-        side.
+        """Positions of the vertices on the surface, float32 (k, 3) [m], once per side of a sharp edge.
 
-        Set it to all n vertices of the body, (n, 3).
+        Assign the positions of all n vertices of the body, (n, 3).
         """
         return self._positions
 
@@ -117,7 +117,7 @@ class Surface:
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
             raise OptionError(f"positions must have shape ({self.vertex_count}, 3), got {rows.shape}")
         outer = rows[self._used].astype(np.float32)
-        if not np.abs(outer).max() < FARTHEST:  # also refuses NaN
+        if not np.abs(outer).max() < FARTHEST:  # also rejects NaN
             bad = int(np.argmin((np.abs(outer) < FARTHEST).all(axis=1)))
             raise OptionError(
                 f"vertex {self._used[bad]} is at {outer[bad].tolist()}: positions must be finite and below "
@@ -127,7 +127,7 @@ class Surface:
 
     @property
     def normals(self) -> NDArray[np.float32] | None:
-        """Shading normals of `positions`, float32 (k, 3), or None. Set them as (n, 3)."""
+        """Shading normals at `positions`, float32 (k, 3), or None. Assign normals of all vertices, (n, 3)."""
         return self._normals
 
     @normals.setter
@@ -138,7 +138,7 @@ class Surface:
 
     @property
     def color(self) -> NDArray[np.float32]:
-        """Colour of `positions` in linear light, float32 (k, 3). Set it as sRGB, (3,) or (n, 3)."""
+        """Colours at `positions` in linear light, float32 (k, 3). Assign sRGB colours, (3,) or (n, 3)."""
         return self._color
 
     @color.setter
@@ -155,9 +155,9 @@ class Surface:
 
 
 def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
-    """List the triangles of a sheet, fronts first and then backs, with their codes.
+    """Return the front and then the back triangles of a sheet, and their look codes.
 
-    A triangle that the sheet has twice, once per side, is used once.
+    If a sheet contains a triangle twice, once per side, it is used once.
     """
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     front = triangles[np.sort(first)]

@@ -1,4 +1,4 @@
-"""Run ffmpeg in a separate process, which contains its crashes and its licence."""
+"""Run ffmpeg in a separate process, which isolates its crashes and its licence."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUIET = ("-hide_banner", "-nostdin", "-nostats", "-v", "error", "-y")
 
 
 def find_ffmpeg() -> str:
-    """Path of ffmpeg: $IMAGEIO_FFMPEG_EXE, or the one in the package imageio-ffmpeg.
+    """Return the path of ffmpeg: $IMAGEIO_FFMPEG_EXE, or that in the package imageio-ffmpeg.
 
     Raises: MissingExtraError without that package; VideoError if it has no ffmpeg for this system.
     """
@@ -75,7 +75,7 @@ class Ffmpeg:
     def finish(self) -> None:
         """Close the pipe and wait for ffmpeg to end. Raises: VideoError if it failed."""
         try:
-            with contextlib.suppress(OSError):  # it has already ended: check its exit code below
+            with contextlib.suppress(OSError):  # ffmpeg has already ended; its exit code is checked below
                 self._process.communicate()
             if self._process.returncode != 0:
                 raise VideoError(f"ffmpeg failed: {self._complaint()}")
@@ -90,7 +90,7 @@ class Ffmpeg:
         self._complaints.close()
 
     def _complaint(self) -> str:
-        """Last line of ffmpeg's error output."""
+        """Return the last line of ffmpeg's error output."""
         self._complaints.seek(0)
         lines = self._complaints.read().decode(errors="replace").split("\n")
         said = [line.strip() for line in lines if line.strip()]
@@ -98,7 +98,7 @@ class Ffmpeg:
 
 
 def run_ffmpeg(arguments: Sequence[str | Path]) -> None:
-    """Run ffmpeg on files. Raises: as `Ffmpeg`."""
+    """Run ffmpeg with these arguments until it ends. Raises: as `Ffmpeg`."""
     Ffmpeg(arguments).finish()
 
 

@@ -1,4 +1,4 @@
-"""Film a world: step it as a game loop does, draw each frame and time the steps."""
+"""Film a world: step it as a game loop does, draw each frame, and time the steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class FilmReport:
     Kernels that only `Stage.act` calls compile at their first call, which counts as step time.
     """
 
-    path: Path | None  # of the film; None if nothing was written
+    path: Path | None  # path of the film; None if nothing was written
     frames: int  # number of frames
     fps: float  # frames per second
     simulated: float  # world time that passed [s]
@@ -45,13 +45,13 @@ class FilmReport:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated time over the time spent on steps; 0 if there are too few frames."""
+        """Simulated time over the time spent on steps; 0 with too few frames."""
         if len(self.step_times) == 0:
             return 0.0
         return float(len(self.step_times) / (self.fps * self.slow) / self.step_times.sum())
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks: the film and its figures."""
+        """Return HTML for notebooks: the film and its figures."""
         figures = {
             "film": f"{self.frames} frames, {self.frames / self.fps:.1f} s",
             "simulated": f"{self.simulated:.2f} s",
@@ -97,7 +97,7 @@ def film(
     if not (on_frame is None or callable(on_frame)):
         raise OptionError(f"on_frame must be a function (frames made, total frames), got {on_frame!r}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
-    rate = as_positive(fps, "fps", "1/s") * as_number(slow, "slow", 1.0, 1000.0)  # per second of the world
+    rate = as_positive(fps, "fps", "1/s") * as_number(slow, "slow", 1.0, 1000.0)  # per second of world time
     shots = as_count(blur, "blur", 1, 64)
     frames = length * rate
     if frames > LARGEST_COUNT:

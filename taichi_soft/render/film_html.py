@@ -1,4 +1,4 @@
-"""Show a film in a notebook: HTML with the file embedded, and a table of measurements below."""
+"""Show a film in a notebook: HTML with the embedded file and a table of measurements."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from html import escape
 from pathlib import Path
 
 MIME_TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
-"""MIME types of the films that a browser plays."""
+"""MIME types of the film formats that browsers play."""
 
 LARGEST = 10_000_000
-"""Largest film that is embedded [bytes]: a notebook is saved with its embedded files."""
+"""Largest size of an embedded film [bytes], because a notebook is saved with its embedded files."""
 
 
 def film_html(path: Path | None, figures: Mapping[str, str]) -> str:
-    """HTML of the film and a table.
+    """Return the HTML of a film and a table of figures.
 
     Args:
         path: path of the film; None if nothing was written.
-        figures: formatted values, by name.
+        figures: formatted values by name.
     """
     rows = "".join(
         f'<tr><th scope="row" style="text-align: left">{escape(name)}</th><td>{escape(value)}</td></tr>'
@@ -29,7 +29,7 @@ def film_html(path: Path | None, figures: Mapping[str, str]) -> str:
 
 
 def _shown(path: Path) -> str:
-    """HTML of the film, or the reason why it is not shown."""
+    """Return the HTML of the film, or the reason why it is not shown."""
     name = escape(str(path), quote=True)
     mime = MIME_TYPES.get(path.suffix.lower())
     if mime is None:

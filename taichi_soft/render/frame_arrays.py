@@ -16,12 +16,12 @@ from taichi_soft.render.texture import SceneTextures
 
 @dataclass(frozen=True)
 class SceneArrays:
-    """Vertices and triangles of every surface, one after the other.
+    """Vertices and triangles of all surfaces, concatenated.
 
     Attributes:
-        positions, normals, colors: float32 (n, 3), [m], unit length, linear light.
-        triangles: int32 (m, 3), outward counterclockwise.
-        looks: int32 (m,), codes of the triangles, see `look`.
+        positions, normals, colors: float32 (n, 3): [m], unit vectors, linear light.
+        triangles: vertex indices, int32 (m, 3), counterclockwise seen from outside.
+        looks: codes of the triangles, int32 (m,), see `look`.
         textures: textures of all surfaces.
     """
 

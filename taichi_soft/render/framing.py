@@ -20,7 +20,7 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 MARGIN = 1.06
-"""Size of the view relative to the bodies."""
+"""Size of the view relative to the box of the bodies."""
 
 DIRECTIONS = 72
 """Number of directions from which an orbiting camera must see all bodies."""
@@ -47,7 +47,7 @@ def framed(
     """
     width = as_number(aspect, "aspect", 0.05, 20.0)
     if orbit is not None:
-        Orbit(Camera((1.0, 0.0, 0.0)), orbit)  # refuses a wrong period now
+        Orbit(Camera((1.0, 0.0, 0.0)), orbit)  # raises an error for a wrong period
     low, high = _box_of_run(make_stage(), seconds)
     stage = make_stage()
     assert isinstance(stage.camera, Camera)
@@ -64,12 +64,12 @@ def framed(
 
 
 def _no_box(body: Body) -> Floats:
-    """Placeholder for cameras that do not use the box."""
+    """Return a placeholder for cameras that do not use the box of a body."""
     raise AssertionError(body)
 
 
 def _box_of_run(stage: Stage, seconds: float | None) -> tuple[Floats, Floats]:
-    """Bounding box of the stage's bodies over the whole run [m]."""
+    """Run the stage. Returns: the bounding box of its bodies over the whole run [m]."""
     if not isinstance(stage.camera, Camera):
         raise OptionError(f"stage.camera must be a fixed Camera, got {type(stage.camera).__name__}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")

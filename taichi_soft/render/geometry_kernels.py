@@ -1,25 +1,26 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Compute smooth normals and project triangles into an image.
+"""Compute smooth normals, and project triangles into an image.
 
-A triangle with homogeneous corners v0, v1, v2 = (u d, v d, d) covers the pixel (u, v) where the three
+A triangle has the homogeneous corners v0, v1, v2 = (u d, v d, d). It covers the pixel (u, v) if the three
 numbers E_i . (u, v, 1) are positive, where E_i is the cross product of the two other corners. This also holds
-for corners behind the camera, so no clipping is needed. An orthographic projection has d = 1.
+for corners behind the camera, so no clipping is needed. In an orthographic projection, d = 1.
 """
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render.kernel_types import TILE, int_rows, ints, matrix, row_vec3, rows
 
 PLANE = 12
-"""Numbers per triangle: three edges and the depth, each a, b, c of a u + b v + c."""
+"""Numbers per triangle: three edges and the depth, each with a, b and c of a u + b v + c."""
 
 OVERLAP = 0.01
-"""Growth of each triangle [pixels]; larger than the rounding of its edges, so that no seams appear."""
+"""Distance by which each triangle is enlarged [pixels]. It exceeds the rounding of edges, to prevent
+seams."""
 
 
 @ti.kernel
 def compute_normals(positions: rows, triangles: int_rows, normals: rows):
-    """Smooth unit normals of the vertices, each triangle weighted by its area."""
+    """Compute smooth unit normals of the vertices. Each triangle is weighted by its area."""
     ti.loop_config(serialize=True)
     for v in range(positions.shape[0]):
         for k in ti.static(range(3)):
@@ -54,14 +55,14 @@ def project_triangles(
     boxes: int_rows,
     tile_begin: ints,
 ) -> ti.i32:
-    """Compute edges, depth and pixel box of each triangle, and the number of triangles per tile.
+    """Compute edges, depth and pixel box of each triangle, and count the triangles per tile.
 
     Args:
         to_picture: maps (x, y, z, 1) to (u d, v d, d, q d); the largest q is visible.
-        near: smallest d that is drawn.
+        near: smallest d to draw.
         planes: out (m, 12), the edges scaled to add up to one at the image's depth plane.
-        boxes: out (m, 4), first and last pixel right, first and last pixel down; empty where the triangle
-            faces away (its corners run clockwise in an image whose v points down) or is not visible.
+        boxes: out (m, 4), first and last pixel right, first and last pixel down. The box is empty if the
+            triangle faces away (its corners run clockwise in an image whose v points down) or is not visible.
         tile_begin: out, running sum of the triangles in tiles 0 to i - 1, row by row.
     Returns: the number of entries of all tiles.
     """
@@ -81,7 +82,7 @@ def project_triangles(
         v2 = ti.Vector([corners[2, 0], corners[2, 1], corners[2, 2]])
         normal = (v1 - v0).cross(v2 - v0)
         determinant = normal.dot(v0)
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # fits an integer
+        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # converts to an integer without overflow
         for i in range(3):
             j = (i + 1) % 3
             d, e = corners[i, 2], corners[j, 2]
@@ -89,7 +90,7 @@ def project_triangles(
                 u, v = corners[i, 0] / d, corners[i, 1] / d
                 low_u, high_u = ti.min(low_u, u), ti.max(high_u, u)
                 low_v, high_v = ti.min(low_v, v), ti.max(high_v, v)
-            if (d >= near) != (e >= near):  # the edge crosses the near plane: the box ends there
+            if (d >= near) != (e >= near):  # the box ends where the edge crosses the near plane
                 s = (near - d) / (e - d)
                 u = (corners[i, 0] + s * (corners[j, 0] - corners[i, 0])) / near
                 v = (corners[i, 1] + s * (corners[j, 1] - corners[i, 1])) / near

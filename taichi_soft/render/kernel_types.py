@@ -5,7 +5,7 @@
 from taichi_soft.core.runtime import ti
 
 TILE = 32
-"""Edge of a tile [pixels]. Smaller tiles repeat triangles, larger ones balance badly between threads."""
+"""Edge of a tile [pixels]. Smaller tiles repeat triangles; larger tiles balance the threads badly."""
 
 vec3 = ti.types.vector(3, ti.f32)
 matrix = ti.types.matrix(4, 4, ti.f32)
@@ -20,11 +20,11 @@ picture = ti.types.ndarray(dtype=ti.u8, ndim=3)
 
 @ti.func
 def row_vec2(array: ti.template(), i):
-    """Row i of an (n, 2) array as a vector."""
+    """Return row i of an (n, 2) array as a vector."""
     return ti.Vector([array[i, 0], array[i, 1]])
 
 
 @ti.func
 def row_vec3(array: ti.template(), i):
-    """Row i of an (n, 3) array as a vector."""
+    """Return row i of an (n, 3) array as a vector."""
     return ti.Vector([array[i, 0], array[i, 1], array[i, 2]])

@@ -1,27 +1,27 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Shade a point: look up its shadows and compute the light that it reflects to the eye."""
+"""Shade a point: look up its shadows, and compute the light that it reflects to the eye."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
 from taichi_soft.render.look import CLOTH_BACK, JELLY, MATTE
 
 COARSE = 4.0
-"""Texels of the sun's map per texel of the far-shadow maps, along one axis."""
+"""Texels of the sun's shadow map per texel of the far-shadow maps, along one axis."""
 
 FAINTEST = 0.002
-"""Shadow strength below which a shadow is not drawn."""
+"""Shadow strength below which no shadow is drawn."""
 
 SOFT_TAPS = 8
-"""Width of the box filter for shadows on bodies [texels of the shadow map]."""
+"""Width of the box filter for shadows on bodies [texels]."""
 
 LIFT = 0.7
-"""Shadow bias along the normal, and again towards the sun [texels]."""
+"""Shadow bias [texels]: offset of look-ups along the normal, and again towards the sun."""
 
 
 @ti.func
 def bilinear(map: ti.template(), size, u, v):
-    """Value of a (size, size) map at texel coordinates (u, v), 0 outside."""
+    """Interpolate a (size, size) map at texel coordinates (u, v); it is 0 outside."""
     value = 0.0
     x, y = u - 0.5, v - 0.5
     if x > 0.0 and y > 0.0 and x < size - 1.0 and y < size - 1.0:
@@ -35,7 +35,9 @@ def bilinear(map: ti.template(), size, u, v):
 
 @ti.func
 def light_place(light: ti.template(), p):
-    """Project a point to texel coordinates and height towards the light [m]; `light` has rows u, v, -, q."""
+    """Return a point's texel coordinates and its height towards the light [m]; `light` has rows u, v,
+    -, q.
+    """
     row = [
         light[k, 0] * p.x + light[k, 1] * p.y + light[k, 2] * p.z + light[k, 3] for k in ti.static((0, 1, 3))
     ]
@@ -44,9 +46,9 @@ def light_place(light: ti.template(), p):
 
 @ti.func
 def box_average(depth: ti.template(), size, left, top, fu, fv, height):
-    """Fraction of a box of the shadow map that is unoccluded above `height`.
+    """Return the fraction of a box of the shadow map that is not occluded above `height`.
 
-    The box starts at (fu, fv) inside the texel (left, top).
+    The box begins at (fu, fv) inside the texel (left, top).
     """
     lit = 0.0
     for j in range(SOFT_TAPS + 1):
@@ -59,7 +61,7 @@ def box_average(depth: ti.template(), size, left, top, fu, fv, height):
 
 @ti.func
 def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
-    """Fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the shadow map.
+    """Return the fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the map.
 
     The map holds back faces, so that a body does not shadow its own lit side; `LIFT` handles the rim of that
     side.
@@ -70,7 +72,7 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
     fu, fv = u - left, v - top
     lit = 1.0
     if left >= 0 and top >= 0 and left + SOFT_TAPS < size and top + SOFT_TAPS < size:
-        # Sample nine texels first: if they agree, so do the texels between them.
+        # Sample nine texels first. If they agree, the texels between them agree too.
         open_texels = 0
         for j in range(3):
             for i in range(3):
@@ -93,7 +95,7 @@ def floor_shadow(
     contact_place: ti.template(),
     contact: ti.template(),
 ):
-    """Fraction of light that a point of the floor loses to shadows, per colour."""
+    """Return the fraction of light that a point of the floor loses to shadows, per colour."""
     lack = ti.Vector([0.0, 0.0, 0.0])
     place = light_place(light, at)
     u, v = place.x / COARSE, place.y / COARSE
@@ -110,13 +112,13 @@ def floor_shadow(
 
 @ti.func
 def fifth_power(x):
-    """Fifth power of x, Schlick's rise of reflection towards grazing angles."""
+    """Return x^5: Schlick's increase of reflection towards grazing angles."""
     return x * x * x * x * x
 
 
 @ti.func
 def mirrored(normal, view, sun, doublings: ti.template()):
-    """Specular highlight of the key light, 0 to 1; more doublings make it sharper."""
+    """Return the specular highlight of the key light, 0 to 1. More doublings make it sharper."""
     half = sun + view
     shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
     for _ in ti.static(range(doublings)):
@@ -126,10 +128,10 @@ def mirrored(normal, view, sun, doublings: ti.template()):
 
 @ti.func
 def surroundings(normal, sun, above):
-    """Ambient and fill light on a surface of albedo 1.
+    """Return the ambient and fill light on a surface of albedo 1.
 
     Args:
-        above: height, from 0 on the floor to 1 well above it, where the underside is lit.
+        above: 0 on the floor, 1 well above it, where the underside is lit.
     """
     upward = 0.5 + 0.5 * normal.z
     below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
@@ -141,9 +143,9 @@ def surroundings(normal, sun, above):
 
 @ti.func
 def dimmed(light, color, openness):
-    """Ambient light at a point that sees only the fraction `openness` of its surroundings.
+    """Return the ambient light at a point that sees only the fraction `openness` of its surroundings.
 
-    Occluders count as about as bright as the surface itself, so that bright bodies do not look dirty at
+    Occluders are assumed to be about as bright as the surface, so that bright bodies do not look dirty at
     contacts.
     """
     return light * (openness / (1.0 - 0.55 * (1.0 - openness) * color))
@@ -151,14 +153,17 @@ def dimmed(light, color, openness):
 
 @ti.func
 def smooth_rise(x):
-    """0 at 0 and below, 1 from 0.4 on, smooth between."""
+    """Return 0 up to x = 0, 1 from x = 0.4, and a smooth transition between."""
     s = ti.math.clamp(2.5 * x, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 @ti.func
 def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
-    """Shade rubber. The three materials take the arguments of `glow` and its intermediate results."""
+    """Return the light of rubber.
+
+    The arguments of all three materials are those of `glow` and its intermediate results.
+    """
     total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
     total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
     return total + lighting.HORIZON * (lighting.RIM * fifth_power(rim) * (0.5 + 0.5 * normal.z) * openness)
@@ -166,7 +171,7 @@ def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
 
 @ti.func
 def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
-    """Shade jelly: subsurface scattering, and transmitted light from behind."""
+    """Return the light of jelly: subsurface scattering, and light transmitted from behind."""
     facing = normal.dot(sun)
     # Thick parts have deeper colours than the rim.
     inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
@@ -185,13 +190,13 @@ def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
 
 @ti.func
 def cloth_glow(look, color, normal, sun, around, key, rim, openness):
-    """Shade cloth, which transmits some light from its other side."""
+    """Return the light of cloth, which transmits some light from its other side."""
     own = color
     if look == CLOTH_BACK:
         own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
     facing = normal.dot(sun)
     straight, tint = facing, own
-    if facing < 0.0:  # transmitted light passes more threads and takes more of their colour
+    if facing < 0.0:  # transmitted light passes more threads, which colours it more
         straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
     total = tint * (key * straight) + own * dimmed(around, own, openness)
     return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)
@@ -199,15 +204,15 @@ def cloth_glow(look, color, normal, sun, around, key, rim, openness):
 
 @ti.func
 def glow(look, color, normal, view, sun, lit, above, openness, behind):
-    """Light that a point of a body sends to the eye.
+    """Return the light that a point of a body sends to the eye.
 
     Args:
-        look: a code of `look`.
+        look: look code, see `look`.
         color: albedo.
-        normal, view, sun: unit vectors out of the body, to the eye and to the key light.
-        lit: fraction of key light that reaches its lit side.
+        normal, view, sun: unit vectors out of the body, to the eye, and to the key light.
+        lit: fraction of the key light that reaches the lit side.
         above: see `surroundings`.
-        openness: fraction of its surroundings that it sees, 0 to 1.
+        openness: fraction of its surroundings that the point sees, 0 to 1.
         behind: light from behind a transparent body.
     """
     around = surroundings(normal, sun, above)

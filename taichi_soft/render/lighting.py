@@ -19,8 +19,8 @@ FLOOR_LIGHT = vec3(0.33, 0.295, 0.25)
 # Matte: peak specular reflection of the key, and of the sky at grazing angles.
 HIGHLIGHT = 0.10
 RIM = 0.09
-# Jelly: the same, wrap of light around the edge of the lit side, light kept in shadow, light transmitted to
-# the far side.
+# Jelly: peak specular reflection as for matte, light that wraps around the edge of the lit side, light that
+# remains in shadow, light transmitted to the far side.
 JELLY_HIGHLIGHT = 0.65
 JELLY_RIM = 0.55
 JELLY_WRAP = 0.55
@@ -29,20 +29,20 @@ JELLY_THROUGH = 0.42
 # Transparency of a jelly at normal incidence, and the refraction offset of its background [image heights].
 JELLY_CLEAR = 0.60
 JELLY_BEND = 0.09
-# Cloth: sheen at grazing angles, transmission, and the share of unbleached thread in the colour of its back.
+# Cloth: sheen at grazing angles, transmission, and the weight of unbleached thread in the colour of its back.
 CLOTH_SHEEN = 0.22
 CLOTH_THROUGH = 0.42
 CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
-HORIZON = vec3(0.93, 0.94, 0.95)  # colour that a rim reflects
+HORIZON = vec3(0.93, 0.94, 0.95)  # colour that rims reflect
 POOL = 0.14  # extra brightness of the floor at the camera's target
 
 # Direction to the key: over the camera's left shoulder. The fill comes from the right.
 SUN_ELEVATION = np.radians(52.0)
-SUN_AZIMUTH = np.radians(62.0)  # from the direction target to eye, positive to the left of the image
+SUN_AZIMUTH = np.radians(62.0)  # from the direction target to eye; positive is left in the image
 
-# Fraction of light that the floor keeps in the key's full shadow: the sky's share.
+# Fraction of light that the floor keeps in full shadow of the key, which is the light of the sky.
 SHADED = vec3(0.36, 0.40, 0.47)
 # Fraction of the remaining light that the floor keeps directly under a touching body.
 CONTACT = 0.35

@@ -18,7 +18,7 @@ class Look(Choice):
 LookName: TypeAlias = Literal["matte", "jelly", "cloth"]
 
 MATTE, JELLY, CLOTH, CLOTH_BACK = range(4)
-"""Codes of looks in kernels; a cloth has two sides."""
+"""Look codes in kernels; cloth has one for each side."""
 
 CODES = {Look.MATTE: MATTE, Look.JELLY: JELLY, Look.CLOTH: CLOTH}
-"""Code of a surface's front."""
+"""Look code of a surface's front, by look."""

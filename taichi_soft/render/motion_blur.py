@@ -10,20 +10,23 @@ from numpy.typing import NDArray
 from taichi_soft.render.colors import to_linear, to_srgb
 
 SHUTTER = 0.5
-"""Fraction of a frame during which the shutter is open, as usual for film cameras."""
+"""Fraction of a frame during which the shutter is open, the usual value of film cameras."""
 
 _LIGHT = to_linear(np.arange(256, dtype=np.float32) / 255.0)
 
 
 def shutter_times(pictures: int) -> list[float]:
-    """Intervals between the subframes of a frame [frames]. The last subframe ends the frame."""
+    """Return the intervals before each subframe of a frame [frames]. The last subframe ends the frame."""
     if pictures == 1:
         return [1.0]
     return [1.0 - SHUTTER] + [SHUTTER / (pictures - 1)] * (pictures - 1)
 
 
 def mean_picture(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Average sRGB images, uint8 (height, width, 3), in linear light. A single image is returned as is."""
+    """Average sRGB images, uint8 (height, width, 3), in linear light.
+
+    A single image is returned unchanged.
+    """
     if len(pictures) == 1:
         return pictures[0]
     total: NDArray[np.float32] = _LIGHT[pictures[0]]

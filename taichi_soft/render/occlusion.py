@@ -18,16 +18,16 @@ REACH = 0.06
 class Occlusion:
     """Ambient occlusion at half resolution; buffers are allocated once.
 
-    Surfaces outside the image, or hidden in it, do not occlude.
+    Surfaces that are outside the image or hidden do not occlude.
 
     Attributes:
         depth: float32 (height / 2, width / 2), 1 / depth of the visible surface [1/m].
-        hidden: float32 of the same shape, occluded fraction of the surroundings, 0 to 1. Only tiles with
-            triangles are up to date.
+        hidden: float32 of the same shape, occluded fraction of the surroundings, 0 to 1. It is valid only
+            in tiles with triangles.
     """
 
     def __init__(self, raster: Raster, reach: float) -> None:
-        """`reach`: radius of occlusion [m]."""
+        """Allocate the buffers; `reach` is the radius of occlusion [m]."""
         self._raster, self._reach = raster, reach
         shape = (raster.height + 1) // 2, (raster.width + 1) // 2
         self.depth: Floats = np.zeros(shape, dtype=np.float32)

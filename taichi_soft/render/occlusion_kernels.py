@@ -2,8 +2,8 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Kernels for screen-space ambient occlusion, at half the image's width and height.
 
-A plane in space has q = 1 / depth = a u + b v + c over the image, so q alone gives the height of a point
-above the plane of a triangle.
+On a plane in space, q = 1 / depth is linear over the image: a u + b v + c. So q alone gives the height of a
+point above the plane of a triangle.
 """
 
 import numpy as np
@@ -17,32 +17,34 @@ HALF = TILE // 2
 """Number of occlusion points along the edge of a tile."""
 
 TAPS = 10
-"""Depth samples around a point."""
+"""Number of depth samples around a point."""
 
 TURNS = 4
-"""Each point of a block of TURNS by TURNS rotates its taps by another angle; the block is then averaged."""
+"""Edge of a block [points]. Each point of a block rotates its taps by another angle, and the block is then
+averaged."""
 
 WIDEST = 64.0
-"""Largest distance of a tap [points]."""
+"""Largest distance of a tap from its point [points]."""
 
 BIAS = 0.12
-"""Sine of the angle above a triangle below which nothing occludes: curved surfaces have flat triangles."""
+"""Sine of the angle above a triangle's plane below which nothing occludes, because curved surfaces consist of
+flat triangles."""
 
 STRENGTH = 10.0
-"""Strength of the occlusion, which never reaches black."""
+"""Strength of the occlusion, which never makes a surface black."""
 
 ALIKE = 0.03
 """Relative difference of depth above which two points belong to different surfaces."""
 
 
 def spiral_taps() -> NDArray[np.float32]:
-    """Offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
+    """Return offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
-    Each point of a block has one contiguous spiral of taps, denser inside.
+    Each point of a block has one contiguous spiral of taps, which is denser inside.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
-    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # the golden angle
+    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # rotates by the golden angle
     radius = (k + 0.6) / TAPS
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     return places.reshape(-1, 2).astype(np.float32)
@@ -59,7 +61,7 @@ def gather_depth(
     depth: reals,
     out: rows,
 ):
-    """Gather q of the first sample of every second pixel, and of the floor in tiles without triangles.
+    """Store q of the first sample of every second pixel, and q of the floor in tiles without triangles.
 
     Args:
         backdrop: a, b, c of the floor's plane.
@@ -93,7 +95,7 @@ def hidden_share(
     focal,
     taps: ti.template(),
 ):
-    """Occluded fraction of the surroundings of point (i, j) on a triangle.
+    """Return the occluded fraction of the surroundings of point (i, j) on a triangle.
 
     Args:
         rays: (3, 3), maps (u, v, 1) to the direction through a pixel; `lens` is its inverse.
@@ -103,7 +105,7 @@ def hidden_share(
     """
     u, v = 2.0 * i + 0.5 + offset_u, 2.0 * j + 0.5 + offset_v
     q = plane.dot(ti.Vector([u, v, 1.0]))
-    here = pixel_ray(rays, u, v) / q  # from the eye [m]
+    here = pixel_ray(rays, u, v) / q  # position relative to the eye [m]
     # Normal n of the triangle in space, with n . here = 1.
     normal = ti.Vector(
         [lens[0, k] * plane.x + lens[1, k] * plane.y + lens[2, k] * plane.z for k in ti.static(range(3))]
@@ -123,7 +125,7 @@ def hidden_share(
                 offset = pixel_ray(rays, u_there, v_there) / q_there - here
                 far2 = offset.dot(offset)
                 near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-                # The added thousandth of the reach keeps round-off from occluding a pixel by itself.
+                # The added thousandth of the reach prevents self-occlusion from round-off.
                 total += ti.max(above / ti.sqrt(far2 + 1e-6 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 
@@ -194,7 +196,7 @@ def spread_hidden(width: ti.i32, tile_begin: ints, q_map: rows, hidden: rows, ou
 
 @ti.func
 def openness_at(q_map: ti.template(), hidden: ti.template(), x, y, q):
-    """Unoccluded fraction of the surroundings at pixel (x, y), 0 to 1, interpolated from half resolution.
+    """Interpolate the unoccluded fraction of the surroundings at pixel (x, y), 0 to 1, from half resolution.
 
     Args:
         q: 1 / depth of the surface at the pixel.

@@ -18,12 +18,12 @@ Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 LINE = 1 / 26  # height of a line of text [shorter side of the image]
-CAPTION = 0.8  # line height of captions [LINE]; an image may have many
-SMALLEST_LINE = 13.0  # pixels; smaller letters are illegible
+CAPTION = 0.8  # line height of captions [LINE], small because an image can have many
+SMALLEST_LINE = 13.0  # smallest height of a line [pixels]; smaller letters are illegible
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
-GAP = 0.45  # between lines, and around the text [line heights]
-INDENT = " " * 5  # space for a swatch before a line
-BAR = 12  # blanks between the ends of a colour bar
+GAP = 0.45  # space between lines and around the text [line heights]
+INDENT = " " * 5  # space for a colour swatch before a line
+BAR = 12  # number of blanks between the labels of a colour bar
 PANEL, OPACITY, INK = (22, 26, 34), 0.70, (245, 247, 250)
 
 
@@ -56,7 +56,7 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
 def draw_legend(
     picture: Picture, entries: Sequence[tuple[Color, str]], *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """Draw lines of text as `draw_text` does, each after a swatch of its colour.
+    """Draw lines of text like `draw_text`, each after a swatch of its colour. Returns: the image.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
@@ -81,7 +81,7 @@ def draw_legend(
 def draw_color_scale(
     picture: Picture, scale: ColorScale, *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """Draw a colour bar with the quantity and the range of a scale.
+    """Draw a colour bar with the quantity and the range of a scale. Returns: the image.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
@@ -176,7 +176,7 @@ def _stroke(line: float) -> int:
 
 
 def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> float:
-    """Largest line height at which all lines fit, at most the default."""
+    """Return the largest line height at which all lines fit, at most the default [pixels]."""
     line = max(LINE * side, SMALLEST_LINE)
     while line > 2.0:
         _, wide, high = _panel_size(lines, line)
@@ -187,7 +187,7 @@ def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> 
 
 
 def _panel_size(lines: Sequence[str], line: float) -> tuple[int, int, int]:
-    """Padding, width and height of a panel [pixels]."""
+    """Return padding, width and height of a panel [pixels]."""
     pad = round(GAP * line) + 1
     wide = max(_width(text, line) for text in lines) + 2 * pad
     return pad, wide, round(len(lines) * line + (len(lines) - 1) * GAP * line) + 2 * pad
@@ -205,7 +205,7 @@ def _draw_panel(
 
 
 def _baseline(top: int, row: int, line: float) -> int:
-    """Baseline of a line of text below `top` [pixels]."""
+    """Return the baseline of line `row` below `top` [pixels]."""
     return round(top + row * line * (1.0 + GAP) + 0.86 * line)
 
 

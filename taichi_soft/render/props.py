@@ -27,8 +27,8 @@ class Prop:
     """A solid object drawn at a collider or a frame, such as a hand or a hook.
 
     Args:
-        surface: triangles in the axes of `place`, see `surface()` of shapes.
-        place: collider or frame that it moves with.
+        surface: vertices and triangles in the axes of `place`, as `surface()` of a shape returns them.
+        place: collider or frame with which the prop moves.
         color: sRGB from 0 to 1.
     """
 
@@ -40,13 +40,13 @@ class Prop:
 class Scenery:
     """Surfaces of all colliders of a world except its floor, and of further props.
 
-    They are interpolated between the last two steps, as bodies are: call `remember` before each step.
+    They are interpolated between the last two steps, like bodies. Call `remember` before each step.
     """
 
     def __init__(
         self, world: World, props: Sequence[Prop] = (), colors: Mapping[Collider, Color] | None = None
     ) -> None:
-        """`colors`: sRGB from 0 to 1 of highlighted colliders."""
+        """Make the surfaces; `colors` are those of highlighted colliders, sRGB from 0 to 1."""
         given = colors or {}
         seen = [
             Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)
@@ -57,7 +57,7 @@ class Scenery:
         self.remember()
 
     def remember(self) -> None:
-        """Store all poses, before a step."""
+        """Store the poses of all colliders and props before a step."""
         self._before = [_pose(prop) for prop in self._props]
 
     def at(self, alpha: float) -> list[Surface]:
@@ -70,19 +70,19 @@ class Scenery:
 
 
 def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position and quaternion."""
+    """Return the position and the quaternion of a prop."""
     return np.array(prop.place.position, dtype=np.float64), quaternion_of(
         np.array(prop.place.rotation, dtype=np.float64)
     )
 
 
 def is_level(collider: Collider) -> bool:
-    """True for a level plane, such as the floor, which the renderer draws itself."""
+    """True for a horizontal plane, such as the floor, which the renderer draws itself."""
     return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
 
 
 def drawn_surface(shape: Shape) -> Triangles:
-    """Return the surface of a shape; ground gets sides down to its lowest point."""
+    """Return vertices and triangles of a shape. A height field gets sides down to its lowest point."""
     vertices, triangles = shape.surface()
     if not isinstance(shape, HeightFieldShape):
         return vertices, triangles

@@ -12,14 +12,14 @@ from taichi_soft.render.kernel_types import TILE, int_rows, ints, reals, rows, v
 
 @ti.func
 def row_limits(slope, inv_slope, start, low, high):
-    """Subinterval of [low, high] where slope x + start >= 0."""
+    """Return the subinterval of [low, high] in which slope x + start >= 0."""
     x = -start * inv_slope
     return ti.max(low, ti.select(slope >= 0.0, x, low)), ti.min(high, ti.select(slope < 0.0, x, high))
 
 
 @ti.func
 def inverse(slope):
-    """1 / slope; a slope of 0 counts as a tiny positive one."""
+    """Return 1 / slope; a slope of 0 counts as a tiny positive one."""
     return 1.0 / ti.select(ti.abs(slope) < 1e-20, 1e-20, slope)
 
 
@@ -45,7 +45,7 @@ def rasterize(
         samples: (s, 2), positions inside a pixel, from its centre [pixels].
         backdrop: a, b, c of the plane q = a u + b v + c that hides everything behind it.
         nearest: largest q that is drawn.
-        clear_all: 0 does not clear tiles without triangles.
+        clear_all: 1 to clear tiles without triangles too, 0 to skip them.
         tile_next: scratch, one entry per tile.
         tile_triangles: scratch, at least as long as the result of `project_triangles`.
         depth: out, q of sample s of pixel p = v width + u at p * s_count + s; the largest is the nearest.
@@ -82,7 +82,7 @@ def rasterize(
             a1, b1, c1 = planes[t, 3], planes[t, 4], planes[t, 5]
             a2, b2, c2 = planes[t, 6], planes[t, 7], planes[t, 8]
             aq, bq, cq = planes[t, 9], planes[t, 10], planes[t, 11]
-            # If the corner of a pixel nearest the inside of an edge is outside it, so are all its samples.
+            # If the innermost corner of a pixel is outside an edge, all its samples are outside.
             m0 = c0 + 0.5 * (ti.abs(a0) + ti.abs(b0) + a0 + b0)
             m1 = c1 + 0.5 * (ti.abs(a1) + ti.abs(b1) + a1 + b1)
             m2 = c2 + 0.5 * (ti.abs(a2) + ti.abs(b2) + a2 + b2)

@@ -29,12 +29,12 @@ from taichi_soft.world.world import World, context_of_world
 class ReplayReport:
     """Result of a replay."""
 
-    world: World  # in its final state
+    world: World  # replayed world in its final state
     steps: int  # number of replayed steps
     first_difference: int | None  # step count of the first state that differs from the recording, or None
-    failures: tuple[Failure, ...]  # of bodies that are frozen at the end
+    failures: tuple[Failure, ...]  # failures of bodies that are frozen at the end
     picture: Path | None
-    hash: str  # of the last state, as web pages and the C library print it
+    hash: str  # hash of the last state, as web pages and the C library print it
 
 
 def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayReport:
@@ -79,12 +79,12 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
 
 
 def _is_state(world: World, expected: str) -> bool:
-    """True if the state has that hash: World's own, or the one that pages print."""
+    """True if the state has this hash: that of `World`, or that printed by web pages."""
     return expected in (world.state_hash(), world.bodies_hash())
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
-    """Build a world of the same structure. Returns: the world, and its assets and shapes by digest."""
+    """Build a world of the recorded structure. Returns: the world, and its assets and shapes by digest."""
     shapes: dict[str, Any] = {name: from_plain(data) for name, data in made_of["shapes"].items()}
     assets = {name: _asset(options) for name, options in made_of["assets"].items()}
     world = World(**made_of["world"])
@@ -107,7 +107,7 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
-    """Repeat a recorded call. Refuses calls that a recorder does not store."""
+    """Repeat a recorded call. Raises an error for calls that a recorder does not store."""
     handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
     if handle is None or not is_recorded(handle, name):
         raise SnapshotError(f"{name!r} of handle {serial} is not a call that recordings contain")
@@ -127,7 +127,7 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
 
 
 def _step(world: World, seconds: float, substeps: int | None, expected: str, pushes: list[Any]) -> str:
-    """Repeat a step. Returns: the recorded hash of the state."""
+    """Repeat a step. Returns: the hash of the state, in the form of the recorded hash."""
     rows = []
     for serial, data in pushes:
         body = handles_of(world).find(serial, Body)
@@ -136,13 +136,13 @@ def _step(world: World, seconds: float, substeps: int | None, expected: str, pus
         rows.append((body, from_plain(data)))
     accelerate_bodies(rows)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # the report lists failures
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the report lists the failures
         world.step(seconds, substeps)
     return expected
 
 
 def _draw(world: World, failures: tuple[Failure, ...], path: Path) -> None:
-    """Draw the world, with the failed parts marked."""
+    """Draw the world with the failed parts marked, and write the image."""
     broken = {failure.body: failure for failure in failures}
     surfaces = []
     for body in world.bodies:

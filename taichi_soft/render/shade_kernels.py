@@ -26,7 +26,7 @@ from taichi_soft.render.texture_funcs import texture_light
 
 @ti.func
 def corner_weights(planes: ti.template(), t, u, v):
-    """Perspective-correct barycentric weights of triangle t at (u, v)."""
+    """Return the perspective-correct barycentric weights of triangle t at (u, v)."""
     w = ti.Vector(
         [planes[t, 3 * i] * u + planes[t, 3 * i + 1] * v + planes[t, 3 * i + 2] for i in ti.static(range(3))]
     )
@@ -46,7 +46,7 @@ def interpolate(vertex_rows: ti.template(), triangles: ti.template(), t, weights
 
 @ti.func
 def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.template(), t, u, v):
-    """Texture coordinates of the plane of triangle t at (u, v), also outside the triangle."""
+    """Return the texture coordinates of the plane of triangle t at (u, v), also outside the triangle."""
     weights = corner_weights(planes, t, u, v)
     a, b, c = (
         row_vec2(uvs, triangles[t, 0]),
@@ -58,7 +58,9 @@ def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.te
 
 @ti.func
 def seen_through(opaque: ti.template(), light_of_byte: ti.template(), rays: ti.template(), normal, x, y):
-    """Light of the image behind pixel (x, y), offset by the refraction at a surface with this normal."""
+    """Return the light of the image behind pixel (x, y), displaced by the refraction at a surface with this
+    normal.
+    """
     size = ti.Vector([opaque.shape[1], opaque.shape[0]])
     right = ti.Vector([rays[k, 0] for k in ti.static(range(3))]).normalized()
     down = ti.Vector([rays[k, 1] for k in ti.static(range(3))]).normalized()
@@ -107,12 +109,13 @@ def shade(
     encode: reals,
     out: picture,
 ):
-    """Shade the image: average the light of each pixel's samples, as sRGB.
+    """Shade the image: average the light of each pixel's samples, and store it as sRGB.
 
     Args:
-        reach: height [m] up to which the floor darkens what is above it.
+        reach: height above the floor up to which the floor darkens surfaces [m].
         light, texel, light_depth: the sun's shadow map, see `shadows.ShadowMaps`.
-        near_shadow, far_shadow, far_height, contact, contact_place: the floor's shadows, see there.
+        near_shadow, far_shadow, far_height, contact, contact_place: shadows of the floor, see
+            `shadows.ShadowMaps`.
         looks: codes of the triangles, see `look`.
         q_map, hidden: see `occlusion.Occlusion`.
         uvs, first_level, texels, levels: see `texture.SceneTextures`; a texture is multiplied by the vertex
@@ -162,7 +165,7 @@ def shade(
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
                             look = looks[t]
-                            # The key may shine on the other side of a cloth.
+                            # The key can light the other side of a cloth.
                             outward = n
                             if look >= CLOTH and n.dot(sun) < 0.0:
                                 outward = -n

@@ -1,4 +1,4 @@
-"""Shadow maps of a frame: seen from the sun, and from the floor upwards."""
+"""Shadow maps of a frame, seen from the sun, and from the floor upwards."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from taichi_soft.render.raster import CENTER, Raster
 COARSE = int(COARSE_TEXELS)
 SIZE = 384  # texels per side of the sun's shadow map
 CONTACT_SIZE = 192  # texels per side of the contact map, seen from the floor
-# In units of the scene's size: blur of a shadow cast from just above the floor, and of one cast from
-# `FAR_HEIGHT` or more; blur and fade height of contact shadows.
+# [size of the scene]: blur of shadows of occluders just above the floor and at `FAR_HEIGHT` or higher; that
+# height; blur and fade height of contact shadows.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
 SUNK = 0.05  # surfaces deeper than this below the floor cast no shadow on it [size of the scene]
-# Bodies farther from the camera's target than this many camera distances cast no shadow, so that a body that
-# flies away does not stretch the map.
+# Largest distance from the camera's target at which bodies cast shadows [camera distance]. A body that flies
+# away must not stretch the map.
 WITHIN = 3.0
 
 Floats = NDArray[np.float32]
@@ -48,7 +48,7 @@ class ShadowMaps:
     """
 
     def __init__(self, camera: Camera, floor: float | None, scale: float) -> None:
-        """`scale`: size of the scene [m], the unit of blur and fade heights."""
+        """Allocate the maps; `scale` is the size of the scene [m], the unit of blur and fade heights."""
         self._floor, self._scale = floor, scale
         outward = np.subtract(camera.eye, camera.target)
         azimuth = math.atan2(outward[1], outward[0]) - SUN_AZIMUTH
@@ -68,11 +68,11 @@ class ShadowMaps:
 
     @property
     def depth(self) -> Floats:
-        """Depth map of the sun, see the class."""
+        """Depth map of the sun, see `ShadowMaps`."""
         return self._raster.depth
 
     def update(self, scene: SceneArrays, camera: Camera) -> None:
-        """Draw the maps of a scene."""
+        """Compute the maps of a scene."""
         away = np.abs(scene.positions - np.array(camera.target)).max(axis=1)
         bodies = scene.positions[away < WITHIN * camera.distance]
         if len(bodies) == 0 or scene.is_empty:
@@ -88,7 +88,7 @@ class ShadowMaps:
 
     def _spread_sun(self, floor: float) -> None:
         """Blur the sun's map to get the floor's shadows."""
-        # Point where the light ray of each row of texels meets the floor: the floor is level along a row.
+        # Each row of texels meets the floor in one line, because the floor is level along a row.
         down = (np.arange(0.5, SIZE)[:, None] - self.matrix[1, 3]) * self.texel
         height = self._raster.depth.reshape(SIZE, SIZE) - (floor - down * self._axes[1, 2]) / self.sun[2]
         height *= self.sun[2] / (FAR_HEIGHT * self._scale)
@@ -101,7 +101,7 @@ class ShadowMaps:
         self.far_shadow, self.far_height = _blurred(share, blur), _blurred(high, blur)
 
     def _spread_contact(self, floor: float, scene: SceneArrays, bodies: Floats) -> None:
-        """Find the height of the lowest surface above each texel of the floor."""
+        """Compute the contact shadow from the height of the lowest surface above each texel of the floor."""
         blur = CONTACT_BLUR * self._scale
         matrix, texel = _fit(np.diag([1.0, 1.0, -1.0]), bodies, CONTACT_SIZE, blur)
         self._contact_raster.draw(scene, matrix, None)
@@ -112,7 +112,9 @@ class ShadowMaps:
 
     @property
     def extents(self) -> list[tuple[Floats, NDArray[np.bool_]]]:
-        """Regions of the floor that may be dark: pairs of a matrix to texels and the mask of dark texels."""
+        """Return the regions of the floor that may be dark: pairs of a matrix to texels and a mask of dark
+        texels.
+        """
         coarse = (self.matrix / np.array([[COARSE], [COARSE], [1.0], [1.0]])).astype(np.float32)
         return [(coarse, self.far_shadow > FAINTEST), (self.contact_matrix, self.contact > FAINTEST)]
 
@@ -120,10 +122,11 @@ class ShadowMaps:
 def _fit(
     axes: NDArray[np.float64], points: NDArray[np.floating], size: int, blur: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Matrix (4, 4) that fits points into a (size, size) map seen against the last axis, and its texel [m].
+    """Return the matrix (4, 4) of a (size, size) map that contains points, and the edge of a texel [m].
 
-    Texel sizes change in steps and texels are fixed in the world, so that shadows do not crawl while a body
-    moves. The map leaves a border of width `blur` around the points.
+    The line of sight is opposite to the last of `axes`. Texel sizes change in steps and texels are fixed in
+    the world, so that shadows do not crawl while a body moves. The map leaves a border of width
+    `blur` around the points.
     """
     seen = points @ axes[:2].T.astype(np.float32)
     low, high = seen.min(axis=0) - 3.0 * blur, seen.max(axis=0) + 3.0 * blur

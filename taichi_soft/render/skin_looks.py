@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 Floats32 = NDArray[np.float32]
 
 UNSET = np.full(3, 102 / 255, dtype=np.float32)
-"""The grey that trimesh assigns to a material without a colour."""
+"""Grey that trimesh assigns to a material without a colour, sRGB from 0 to 1."""
 
 
 def texture_picture(visual: Any, count: int) -> Any:
-    """Return the mesh's texture as an image of Pillow, or None.
+    """Return the texture of a mesh as a Pillow image, or None if it has none.
 
     Args:
         visual: `visual` of a trimesh mesh, or None.
-        count: number of vertices. Each needs texture coordinates.
+        count: number of vertices, each of which must have texture coordinates.
     """
     if getattr(visual, "kind", None) != "texture":
         return None
@@ -51,7 +51,7 @@ def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
 
 
 def _as_colors(values: Any) -> Floats32:
-    """Scale integers up to 255 to the range 0 to 1; floats are already in it."""
+    """Scale integer colours to the range 0 to 1; floats already have this range."""
     array = np.asarray(values)
     scale = 255.0 if array.dtype.kind in "iu" else 1.0
     return np.asarray(np.clip(array.astype(np.float32) / scale, 0.0, 1.0), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The content of a film: a world, its bodies and their looks, and the camera."""
+"""The content of a film: a world, its bodies and their looks, and a camera."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from taichi_soft.world.world import World
 Paint = Callable[[Body], NDArray[np.float32]]
 
 FIT_MARGIN = 1.3
-"""Size of the default view relative to the bodies."""
+"""Size of the default view relative to the box of the bodies."""
 
 
 @dataclass
 class Actor:
-    """A body of a stage, and its appearance.
+    """A body of a stage and its appearance.
 
         Actor(body, (0.9, 0.3, 0.2), look="jelly", label="25 kPa")
 
@@ -36,7 +36,7 @@ class Actor:
     texture of its file if it has any.
     """
 
-    body: Body  # of a built world
+    body: Body  # body of a built world
     color: Color = PALETTE[0]  # sRGB from 0 to 1; the first colour of `PALETTE` by default
     paint: Paint | None = None  # function that returns colours (n, 3) of all vertices, instead of `color`
     label: str = ""  # caption on the floor in front of the body, plain ASCII

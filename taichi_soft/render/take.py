@@ -22,7 +22,7 @@ class Take:
 
     Attributes:
         adapter: adapter that steps the world.
-        positions, normals: of each actor, float32 (n, 3); skins have separate normals.
+        positions, normals: arrays of each actor, float32 (n, 3); normals are filled only for skins.
         times: time to step and read each frame [s].
     """
 
@@ -40,7 +40,7 @@ class Take:
             self.stage.act(world)
 
     def play(self, seconds: float) -> None:
-        """Advance by a world time [s], 0 to stay, and read all positions."""
+        """Advance by a world time [s], which can be 0, and read all positions."""
         start = time.perf_counter()
         if seconds > 0.0:
             self.adapter.advance(seconds)
@@ -78,10 +78,10 @@ class Take:
 
 
 def skins_of(actor: Actor) -> tuple[SkinMesh, ...]:
-    """Skins that are drawn instead of the body's surface, unless the actor has `paint`."""
+    """Return the skins to draw instead of the body's surface; none if the actor has `paint`."""
     return () if actor.paint else actor.body.render_meshes
 
 
 def _vertex_count(actor: Actor) -> int:
-    """Number of vertices that are drawn of an actor."""
+    """Return the number of vertices that are drawn for an actor."""
     return sum(mesh.vertex_count for mesh in skins_of(actor)) or actor.body.vertex_count

@@ -16,7 +16,8 @@ LARGEST = 16384
 """Largest edge of a texture [pixels]."""
 
 LEVEL = 4
-"""Numbers per mip level: first texel, width, height, and number of smaller levels that follow."""
+"""Numbers per mip level: index of the first texel, width, height, and number of smaller levels that
+follow."""
 
 
 class Texture:
@@ -54,7 +55,10 @@ class Texture:
 
 
 def _halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Average two by two pixels in linear light; an odd last row or column counts twice."""
+    """Halve an image by averaging two by two pixels in linear light.
+
+    An odd last row or column counts twice.
+    """
     height, width = picture.shape[:2]
     padded = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
     light = to_linear(padded.astype(np.float32) / 255.0)
@@ -85,7 +89,7 @@ class SceneTextures:
         vertex_counts: Sequence[int],
         triangle_counts: Sequence[int],
     ) -> SceneTextures:
-        """Collect the textures; a texture that several surfaces share is stored once."""
+        """Collect the textures of surfaces. A texture used by several surfaces is stored once."""
         uv = [
             np.zeros((n, 2), dtype=np.float32) if own is None else own
             for own, n in zip(uvs, vertex_counts, strict=True)

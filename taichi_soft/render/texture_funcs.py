@@ -1,19 +1,22 @@
 # mypy: ignore-errors
 # (Taichi's argument annotations are values, which a type checker cannot read.)
-"""Sample textures."""
+"""Sample textures in kernels."""
 
 from taichi_soft.core.runtime import ti
 
 
 @ti.func
 def texel_light(texels: ti.template(), decode: ti.template(), i):
-    """Linear light of texel i."""
+    """Return the linear light of texel i."""
     return ti.Vector([decode[ti.i32(texels[i, k])] for k in ti.static(range(3))])
 
 
 @ti.func
 def level_light(texels: ti.template(), levels: ti.template(), decode: ti.template(), level, uv):
-    """Linear light at `uv` in one mip level, bilinear between texel centres; the texture repeats."""
+    """Return the linear light at `uv` in one mip level, bilinear between texel centres.
+
+    The texture repeats.
+    """
     start, width, height = levels[level, 0], levels[level, 1], levels[level, 2]
     x = (uv.x - ti.floor(uv.x)) * width - 0.5
     y = (1.0 - (uv.y - ti.floor(uv.y))) * height - 0.5
@@ -21,7 +24,7 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
     across, down = x - ti.floor(x), y - ti.floor(y)
     total = ti.Vector([0.0, 0.0, 0.0])
     for j, i in ti.static(ti.ndrange(2, 2)):
-        # The remainder is in range for any number, even NaN.
+        # The remainder is a valid index for any number, even NaN.
         at = start + (top + j) % height * width + (left + i) % width
         share = (across if i else 1.0 - across) * (down if j else 1.0 - down)
         total += share * texel_light(texels, decode, at)

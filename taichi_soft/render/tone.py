@@ -10,7 +10,7 @@ from taichi_soft.render.colors import to_srgb
 Floats = NDArray[np.float32]
 
 WHITE = 4.0
-"""Linear light that an image shows as full white."""
+"""Linear light that an image shows as pure white."""
 
 TOE = 0.010
 """Linear light around which dark tones are deepened."""
@@ -19,11 +19,11 @@ KNEE = 0.55
 """Linear light above which bright tones are compressed; colours between toe and knee are unchanged."""
 
 STEPS = 4096
-"""Length of the table that kernels read."""
+"""Length of the table for kernels."""
 
 
 def tone_map(light: NDArray[np.floating]) -> Floats:
-    """Map linear light of a scene to linear light of a screen, 0 to 1; 0 stays black, `WHITE` becomes white.
+    """Map linear light of a scene to linear light of a screen, 0 to 1. 0 maps to 0, `WHITE` maps to 1.
 
     Args:
         light: array of any shape, clamped to 0 and `WHITE`.
@@ -34,19 +34,22 @@ def tone_map(light: NDArray[np.floating]) -> Floats:
 
 
 def _shoulder(x: NDArray[np.float64] | np.float64) -> NDArray[np.float64]:
-    """Linear up to the knee, then a smooth exponential shoulder."""
+    """Return x up to the knee, and a smooth exponential shoulder above it."""
     room = 1.0 - KNEE
     return np.where(x < KNEE, x, 1.0 - room * np.exp(-np.maximum(x - KNEE, 0.0) / room))
 
 
 def encode_table() -> Floats:
-    """Table of sRGB, 0 to 255, of light from 0 to `WHITE` in `STEPS` even steps of its square root, because
-    the eye distinguishes dark tones better than bright ones."""
+    """Return a table of sRGB, 0 to 255, for `STEPS` values of light from 0 to `WHITE`.
+
+    The square roots of these values are evenly spaced, because the eye distinguishes dark tones better than
+    bright ones.
+    """
     return np.asarray(255.0 * to_srgb(tone_map(_table_light())), dtype=np.float32)
 
 
 def light_table() -> Floats:
-    """Table of linear light of sRGB 0 to 255, (256,): the inverse of `encode_table`."""
+    """Return the linear light for sRGB 0 to 255, (256,): the inverse of `encode_table`."""
     return np.asarray(np.interp(np.arange(256), encode_table(), _table_light()), dtype=np.float32)
 
 

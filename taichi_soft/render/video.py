@@ -1,4 +1,4 @@
-"""Write films and check them."""
+"""Write films and verify them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class VideoWriter:
         self.size = as_count(size[0], "width", 2, 16384), as_count(size[1], "height", 2, 16384)
         if CONTAINERS[suffix] is Stream and (self.size[0] % 2 or self.size[1] % 2):
             raise VideoError(f"a {suffix} film needs an even width and height, got {size[0]} x {size[1]}")
-        self.count = 0  # frames written
+        self.count = 0  # number of frames written
         self._closed = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -81,13 +81,13 @@ class VideoWriter:
             raise VideoError(f"frame {self.count} must be uint8 of shape {wanted}, got {what}")
         try:
             self._container.write(frame)
-        except BaseException:  # the film may contain half of the frame
+        except BaseException:  # the film may contain an incomplete frame
             self._give_up()
             raise
         self.count += 1
 
     def close(self) -> None:
-        """Complete the film, check it and move it to `path`. Further calls do nothing.
+        """Complete the film, verify it and move it to `path`. Further calls do nothing.
 
         Raises: VideoError if there is no frame or a frame is missing. Then no file is left behind.
         """
@@ -123,7 +123,7 @@ class VideoWriter:
             self._give_up()
 
     def _give_up(self) -> None:
-        """Discard unfinished files. Further calls do nothing."""
+        """Discard the unfinished files. Further calls do nothing."""
         if not self._closed:
             self._closed = True
             self._container.abandon()

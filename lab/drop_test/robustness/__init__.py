@@ -1,4 +1,4 @@
-"""Single bodies, dropped or strongly deformed, with many meshes, materials and steps."""
+"""Drop or strongly deform single bodies with many meshes, materials and step lengths."""
 
 from lab.drop_test.robustness.cell_run import run_cell
 from lab.drop_test.robustness.cells import GROUPS, choose_cells, law_variants

@@ -1,4 +1,4 @@
-"""Run one cell: build it from its values and defaults only, drop or release it, and judge it."""
+"""Run one cell of the sweep: build the body, drop or release it, and judge the result."""
 
 from __future__ import annotations
 
@@ -20,32 +20,33 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 DROP, DROP_TIME = 2.0, 2.5
-"""Height [m] and time [s]: a fall of 0.64 s, an impact, and a second fall."""
+"""Height of the drop [m] and simulated time [s]: a fall of 0.64 s, an impact, and a second fall."""
 
 RECOVERY_TIME, CALM_TIME = 10.0, 0.5
-"""Time within which all inverted tetrahedra must recover, and time for which they must stay so [s]."""
+"""Time within which all inverted tetrahedra must recover, and time for which none may invert again [s]."""
 
 REST_SPEED, LONGEST_REST = 1e-4, 60.0
-"""Speed at rest, in sizes per second (root mean square over mass). Without gravity, a body must reach it
-within `REST_CROSSINGS` times the time in which waves cross it, or within the second [s]."""
+"""Largest speed at rest (root mean square weighted by mass) [sizes of the body per second], and time limit
+[s]. After the recovery, gravity is off, and the body must come to rest within this limit and within
+`REST_CROSSINGS` crossings of a wave."""
 
 REST_CROSSINGS = 60.0
 
 MOST_WORK = 2e9
-"""Tetrahedra times substeps of a cell, at most, about half a minute: larger cells count as too slow as
-well."""
+"""Largest number of tetrahedra times substeps of a cell, about 30 s of computing. Larger cells count as too
+slow."""
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
-    """Return verdict and reason of a cell, and facts of its mesh and its step. Plain data."""
+    """Run a cell. Returns: plain data with the verdict, its reason, and facts of the mesh and the step."""
     mesh = cell_mesh(cell["mesh"], cell["scale"])
     squared_sound = cell["young"] / cell["density"]
     facts = {
         "tets": len(mesh.tets),
         "min_dihedral": float(mesh.quality.min_dihedral.min()),  # [degrees]
-        "substeps": None,  # of 1/60 s
-        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # of the impact
-        "sag": GRAVITY_EARTH * float(np.ptp(mesh.vertices, axis=0).max()) / squared_sound,  # in its size
+        "substeps": None,  # number of substeps per 1/60 s
+        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # impact speed over the speed of sound
+        "sag": GRAVITY_EARTH * float(np.ptp(mesh.vertices, axis=0).max()) / squared_sound,  # [body sizes]
     }
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -71,13 +72,13 @@ def run_cell(cell: Cell) -> dict[str, Any]:
 
 @lru_cache(maxsize=128)
 def cell_mesh(name: str, scale: float) -> TetMesh:
-    """Return a mesh by its name, scaled."""
+    """Return the mesh with this name, scaled."""
     mesh = MESHES[name]()
     return mesh if scale == 1.0 else TetMesh(mesh.vertices * scale, mesh.tets)
 
 
 def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
-    """Build a world with nothing but the body, high above the floor."""
+    """Build a world that contains only the body, above the floor."""
     damping = DAMPINGS[cell["damping"]](mesh, cell)
     material = Material(cell["young"], cell["poisson"], cell["density"], **damping)
     named = {option: cell[option] for option in ("law", "flips") if cell[option] is not None}
@@ -89,7 +90,7 @@ def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
 
 
 def _too_slow(cell: Cell, world: World, body: Body) -> str | None:
-    """Return the reason if the cell is too slow to be tried, else None."""
+    """Return the reason why the cell is too slow to run, or None."""
     substeps = world.stable_substeps(1 / 60)
     if substeps > MOST_SUBSTEPS:
         return f"{substeps} substeps for 1/60 s ({body.stable_step.stiffest})"
@@ -104,7 +105,7 @@ def _steps(cell: Cell) -> int:
 
 
 def _try(cell: Cell, world: World, body: Body) -> Ending:
-    """Place the body at its start, run it, and measure the end."""
+    """Place the body at its start, run it, and return the measurements at the end."""
     x = body.mesh.vertices
     rest = x - (x.min(axis=0) + x.max(axis=0)) / 2
     size = float(np.ptp(rest, axis=0).max())
@@ -123,24 +124,23 @@ def _try(cell: Cell, world: World, body: Body) -> Ending:
 
 @dataclass
 class _Run:
-    """A running trial."""
+    """A run of one cell."""
 
     world: World
     body: Body
     rest: np.ndarray[Any, np.dtype[np.float64]]
-    size: float  # [m]
-    dt: float  # [s]
+    size: float  # longest edge of the body's bounding box [m]
+    dt: float  # length of a step [s]
 
     def fall(self, steps: int) -> None:
-        """Let the body fall and bounce."""
+        """Simulate the fall for a number of steps."""
         for _ in range(steps):
             if self.body.is_frozen:
                 return
             self.world.step(self.dt)
 
     def recover(self, steps: int, crossing: float) -> None:
-        """Step until no tetrahedron is inverted, then without gravity and with damping until the body is at
-        rest.
+        """Step until no tetrahedron is inverted, then without gravity and with damping until the body rests.
 
         Args:
             crossing: time in which a wave crosses the body once [s].
@@ -169,7 +169,11 @@ class _Run:
         return float(np.sqrt(masses @ (velocities**2).sum(axis=1) / masses.sum()))
 
     def ending(self, fastest: float) -> Ending:
-        """Return the measurements to judge; `fastest` is infinite for a body that was strongly deformed."""
+        """Return the measurements.
+
+        Args:
+            fastest: largest speed of the fall [m/s]; infinite after a strong deformation.
+        """
         body = self.body
         now = body.positions().astype(np.float64)
         is_finite = bool(np.isfinite(now).all())

@@ -1,4 +1,4 @@
-"""The cells of the sweep: groups of bodies, times laws, times dampings. A cell is plain data."""
+"""Cells of the sweep: all combinations of body, law and damping. A cell is plain data."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from taichi_soft.core.types import FlipsName, LawName
 from taichi_soft.elements.laws import LAWS, EnergyLaw, StressLaw
 
 Cell = dict[str, Any]
-"""group, name, mesh, scale, young, poisson, density, dt, wreck, seed; law and flips (None: the defaults), and
-damping, a name in `DAMPINGS`."""
+"""Keys: group, name, mesh, scale, young, poisson, density, dt, wreck (a name in `WRECKS`, or None), seed; law
+and flips (None for the defaults), and damping, a name in `DAMPINGS`."""
 
 MESHES: dict[str, Callable[[], TetMesh]] = {**OWN_MESHES, **FOREIGN_MESHES}
 
@@ -42,7 +42,7 @@ AXES: dict[str, tuple[float, ...]] = {
     "scale": (0.01, 0.1, 1.0, 10.0),
     "dt": (1 / 30, 1 / 60, 1 / 120),
 }
-"""Values of the group `cells`. Its meshes are about 1 m large at scale 1."""
+"""Values that the group `cells` combines. Its meshes are about 1 m wide at scale 1."""
 
 CELL_COUNT = 153
 CELL_MESHES = ("sphere 4", "beam 3", "cylinder 3", "torus 2")
@@ -55,15 +55,15 @@ DAMPINGS: dict[str, Callable[[TetMesh, Cell], dict[str, float]]] = {
         "damping_ratio": 0.0,
     },
 }
-"""Further arguments of `Material`."""
+"""Functions that return the damping arguments of `Material`, by name."""
 
 WRECKED_MESHES = ("box 2", "box 4", "slab 2", "sphere 2", "sphere 4")
 WRECKED_SEEDS = range(3)
 
 
 def law_variants() -> list[tuple[str | None, str | None]]:
-    """Pairs of law and flips: the defaults first, then each law on tetrahedra with each treatment that it
-    has.
+    """List pairs of law and flips: the defaults (None, None), then each law on tetrahedra with each flips
+    that it supports.
     """
     laws = [law for law in LAWS.values() if isinstance(law, StressLaw | EnergyLaw)]
     return [(None, None), *((law.name, flips.value) for law in laws for flips in law.flips)]
@@ -78,15 +78,15 @@ def choose_cells(
     count: int | None = None,
     wrecks: int = 0,
 ) -> list[Cell]:
-    """Choose cells by groups and laws.
+    """Choose cells by group, law and damping.
 
     Args:
-        groups: names in `GROUPS`; None: all.
-        law: name of a law, or "default" for default law and flips; None: all.
-        flips: treatment of flips, for `law` or all laws that have it; None: all.
-        damping: a name in `DAMPINGS`; None: the default damping for the default law, and all for named laws.
-        count: size of a sample of each group; a larger sample contains the smaller ones. None: all.
-        wrecks: number of random ones to add, to `wrecked` or as a separate group.
+        groups: names in `GROUPS`; None for all.
+        law: name of a law, or "default" for the default law and flips; None for all.
+        flips: treatment of inverted tetrahedra; None for all that each law supports.
+        damping: a name in `DAMPINGS`; None for "default" with the default law, and all with named laws.
+        count: size of a random sample of each group; larger samples contain smaller ones. None for all.
+        wrecks: number of random deformed bodies to add if `groups` is None or contains "wrecked".
     Raises: OptionError for unknown names.
     """
     for name in groups or []:
@@ -122,7 +122,7 @@ def _require_known(option: str, name: str, known: Any) -> None:
 
 
 def _sample(total: int, count: int) -> list[int]:
-    """Choose `count` of `total` numbers at random, always the same; larger samples contain smaller ones."""
+    """Choose `count` of `total` indices at random, with a fixed seed. Larger samples contain smaller ones."""
     return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 
@@ -137,7 +137,9 @@ def _foreign() -> Iterator[Cell]:
 
 
 def _grid() -> Iterator[Cell]:
-    """Yield each pair of axes with the rest at their defaults, then random cells of the full grid."""
+    """Yield all combinations of two axes with the others at their defaults, then random cells of the full
+    grid.
+    """
     names = list(AXES)
     usual = tuple(USUAL[name] for name in names)
     chosen = {
@@ -166,8 +168,9 @@ def _wrecked() -> Iterator[Cell]:
 
 
 def random_wreck(number: int) -> Cell:
-    """Return a strongly deformed box or sphere of random size and material, stiff enough to bear its own
-    weight.
+    """Return the cell of a strongly deformed body of random size and material.
+
+    The body is stiff enough to bear its own weight.
     """
     rng = np.random.default_rng([number, 22])
     mesh, wreck = str(rng.choice(WRECKED_MESHES)), str(rng.choice(list(WRECKS)))
@@ -190,4 +193,4 @@ GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {
     "cells": _grid,
     "wrecked": _wrecked,
 }
-"""Groups of bodies by name, without law, flips and damping."""
+"""Functions that yield the cells of each group, by name. These cells have no law, flips or damping yet."""

@@ -1,4 +1,4 @@
-"""Meshes as users bring them: slivers, gradings, plates, rods and letters, from seeded random points."""
+"""Meshes as users bring them, from seeded random points: with slivers, graded, plates, rods and letters."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ Loops = tuple[tuple[tuple[float, float], ...], ...]
 """Outlines (x, y) of a flat figure, filled by the even-odd rule."""
 
 FLATTEST_OUTSIDE = 0.002
-"""Volume over longest edge cubed (0.118 if regular), below which tetrahedra at the surface are removed, as
-meshers do. Inside they stay."""
+"""Volume over the cube of the longest edge (0.118 for a regular tetrahedron), below which tetrahedra at the
+surface are removed, as meshers do. Flat tetrahedra inside the body stay."""
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:
-    """Choose from (n, d) candidates, in random order, those that keep their spacing (n,) from all chosen
-    before.
+    """Choose points at a minimum distance from each other, in random order.
+
+    Args:
+        candidates: (n, d) points to choose from [m].
+        spacing: smallest distance of each candidate from all points chosen before it, (n,) or one number [m].
     """
     order = rng.permutation(len(candidates))
     points, gaps = candidates[order], np.broadcast_to(spacing, len(candidates))[order]
@@ -53,7 +56,7 @@ def delaunay_body(points: Floats) -> TetMesh:
 
 
 def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
-    """Mesh random points in a ball, at least `spacing` diameters apart."""
+    """Mesh random points in a ball, at least `spacing` times its diameter apart."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(-0.5, 0.5, (8 * count, 3))
     points = points[np.linalg.norm(points, axis=1) < 0.5][:count]
@@ -61,7 +64,7 @@ def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
 
 
 def box_cloud(size: tuple[float, float, float], count: int, seed: int, spacing: float = 0.0) -> TetMesh:
-    """Mesh random points in a box, including its corners, at least `spacing` [m] apart."""
+    """Mesh the corners of a box and random points inside it, at least `spacing` [m] apart."""
     rng = np.random.default_rng(seed)
     corners = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)], dtype=np.float64)
     points = np.concatenate([corners, rng.uniform(size=(count, 3))]) * size
@@ -69,8 +72,9 @@ def box_cloud(size: tuple[float, float, float], count: int, seed: int, spacing: 
 
 
 def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
-    """Mesh even points on a sphere and a few random ones inside, like a mesher that cannot refine the
-    surface.
+    """Mesh evenly spread points on a sphere and a few random points inside.
+
+    The result resembles that of a mesher that cannot refine the surface.
     """
     rng = np.random.default_rng(seed)
     k = np.arange(count) + 0.5
@@ -82,9 +86,10 @@ def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
 
 
 def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh:
-    """Mesh a cubic lattice with each point moved by up to `jitter` cells.
+    """Mesh a cubic lattice with each point moved at random by up to `jitter` cells along each axis.
 
-    Four neighbours lie almost in a plane and on a circle, and Delaunay joins many of them to a sliver.
+    The corners of a cell's face lie almost in a plane and on a circle, so Delaunay's rule joins many of them
+    into slivers.
     """
     rng = np.random.default_rng(seed)
     points = np.indices((cells + 1,) * 3).reshape(3, -1).T + rng.uniform(
@@ -94,7 +99,7 @@ def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh
 
 
 def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
-    """Mesh a cube with edges `ratio` times longer in one corner than in the opposite one."""
+    """Mesh a cube whose edges are `ratio` times longer in one corner than in the opposite corner."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(40 * count, 3)) ** (1 + np.log10(ratio))
     away = np.linalg.norm(points, axis=1) / 3**0.5
@@ -109,8 +114,8 @@ def flat_body(
     """Triangulate a figure of longest side `size` [m] irregularly, and extrude it by `thickness` [m].
 
     Args:
-        spacing: distance of points along the outline, over `size`.
-        inside: distance of points within it, over that along the outline.
+        spacing: distance between points on the outline [`size`].
+        inside: distance between points inside the outline [`spacing`].
     """
     rng = np.random.default_rng(seed)
     outline = [np.asarray(loop, dtype=np.float64) for loop in loops]
@@ -131,7 +136,7 @@ def flat_body(
 
 
 def _along(loop: Floats, spacing: float) -> Floats:
-    """Points (n, 2) on a closed outline, about `spacing` apart, including its corners."""
+    """Return points (n, 2) on a closed outline, about `spacing` apart, including its corners."""
     sides = zip(loop, np.roll(loop, -1, axis=0), strict=True)
     return np.concatenate(
         [
@@ -142,7 +147,7 @@ def _along(loop: Floats, spacing: float) -> Floats:
 
 
 def _is_inside(points: Floats, outline: list[Floats]) -> NDArray[np.bool_]:
-    """True for points (n, 2) from which a ray to the right crosses the outline an odd number of times."""
+    """True for points (n, 2) inside the outline: a ray to the right crosses it an odd number of times."""
     crossings = np.zeros(len(points), dtype=np.int64)
     for loop in outline:
         for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True):
@@ -317,5 +322,5 @@ FOREIGN_MESHES: dict[str, Maker] = {
         )
     },
 }
-"""The 49 meshes by name. `python -m lab drop-test --sweep` lists their smallest dihedral angles: 0.02 to 20
-degrees."""
+"""The 49 meshes by name. Their smallest dihedral angles, 0.02 to 20 degrees, are listed by `python -m lab
+drop-test --sweep`."""

@@ -1,4 +1,4 @@
-"""The library's own shapes, each in four resolutions, about a metre large."""
+"""The library's own shapes in four resolutions each, about 1 m wide."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Maker = Callable[[], TetMesh]
 
 
 def _frame(cells: int) -> TetMesh:
-    """The twelve edges of a cube, `cells` thick."""
+    """Make a mesh of the twelve edges of a cube, each `cells` cells thick."""
     side = 4 * cells
     index = np.arange(side)
     is_outer = (index < cells) | (index >= side - cells)

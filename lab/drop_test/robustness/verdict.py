@@ -1,4 +1,4 @@
-"""Verdicts: one word and a reason."""
+"""Judge a run: a verdict and its reason."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from taichi_soft.core.types import Choice
 
 MOST_SUBSTEPS = 500
-"""Substeps of 1/60 s beyond which a body is too slow for a game."""
+"""Largest number of substeps per 1/60 s. A body that needs more is too slow for a game."""
 
 SHAPE_TOLERANCE = 0.01
-"""Largest distance from the rest shape at the end, over the size of the body."""
+"""Largest distance from the rest shape at the end [sizes of the body]."""
 
 SPEED_TOLERANCE = 1.5
-"""Speed at the end over the largest of the fall, above which the body gained energy."""
+"""Largest speed at the end over the largest speed of the fall. Faster bodies have gained energy."""
 
 
 class Verdict(Choice):
-    """Verdict of a cell, worst first.
+    """Verdicts, worst first.
 
-    `TOO_SOFT`: inverted, after the world had warned of it when it was built. `NO_RESULT`: the trial failed.
+    `TOO_SOFT`: inverted, but `World.build` warned of it. `NO_RESULT`: the run failed.
     """
 
     FROZEN = "frozen"
@@ -35,19 +35,19 @@ class Verdict(Choice):
 
 @dataclass(frozen=True)
 class Ending:
-    """Measurements at the end of a trial."""
+    """Measurements at the end of a run."""
 
     tets: int
-    failure: str | None  # why it froze; None if it did not
+    failure: str | None  # reason why the body froze; None if it did not
     is_finite: bool
-    flipped: int  # inverted tetrahedra
-    speed: float  # root mean square over mass [m/s]
+    flipped: int  # number of inverted tetrahedra
+    speed: float  # root mean square, weighted by mass [m/s]
     fastest: float  # largest speed of the fall [m/s]; infinite for a strongly deformed start
-    distance: float = 0.0  # from the rest shape after a strongly deformed start, in its size
+    distance: float = 0.0  # distance from the rest shape after a strongly deformed start [body sizes]
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:
-    """The worst verdict, and its reason; no reason if the body is well."""
+    """Return the worst verdict that applies, and its reason, which is empty for `OK`."""
     if end.failure is not None:
         return Verdict.FROZEN, end.failure
     if not end.is_finite:

@@ -1,4 +1,4 @@
-"""Strongly deformed bodies, as starting points of a recovery."""
+"""Strongly deformed initial shapes of bodies, from which they must recover."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from taichi_soft.core.math.rotations import matrix_of
 
 Floats = NDArray[np.float64]
 Wreck = Callable[[Floats, np.random.Generator], Floats]
-"""Function of vertices (n, 3) of a body about the origin that returns their deformed positions."""
+"""Function that maps the vertices (n, 3) of a body about the origin to deformed positions."""
 
 NOISE = 1e-3
-"""Remaining thickness of flat, straight or shrunk bodies, over their size."""
+"""Remaining thickness of flattened, straightened or shrunk bodies [sizes of the body]."""
 
 
 def _scrambled(x: Floats, rng: np.random.Generator) -> Floats:
@@ -54,14 +54,15 @@ WRECKS: dict[str, Wreck] = {
 
 
 def wrecked(x: Floats, wreck: str, seed: int) -> Floats:
-    """Deformed vertices (n, 3) [m] of a body about the origin."""
+    """Return the deformed positions (n, 3) [m] of a body whose vertices `x` lie about the origin."""
     return WRECKS[wreck](x, np.random.default_rng([seed, list(WRECKS).index(wreck)]))
 
 
 def distance_from_rest(rest: Floats, now: Floats, masses: Floats) -> float:
-    """Distance of vertices from the rest shape without rigid motion (Kabsch 1976).
+    """Return the distance of a body from its rest shape after the best rigid motion (Kabsch 1976).
 
-    It is a root mean square over mass, in units of the longest edge of the rest shape's box.
+    The result is a root mean square weighted by mass, in units of the longest edge of the rest shape's
+    bounding box.
     """
     weights = masses / masses.sum()
     a, b = rest - weights @ rest, now - weights @ now

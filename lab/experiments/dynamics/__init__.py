@@ -1,4 +1,4 @@
-"""Motion against theory, beyond the thesis: frequencies, waves, contact, and conserved quantities."""
+"""Motion compared with theory (not in the thesis): frequencies, waves, contact, and conserved quantities."""
 
 from lab.experiments.dynamics.energy_budget import ENERGY_BUDGET
 from lab.experiments.dynamics.hertz import HERTZ

@@ -1,6 +1,6 @@
-"""First natural frequencies of a beam after Timoshenko (1921), by Ritz's method with Legendre polynomials.
+"""First natural frequencies of a Timoshenko beam (1921), by Ritz's method with Legendre polynomials.
 
-With deflection w and rotation t of the sections, the elastic energy is 1/2 int E I (dt/dx)^2 + kappa G A
+For a deflection w and a rotation t of the sections, the elastic energy is 1/2 int E I (dt/dx)^2 + kappa G A
 (dw/dx - t)^2 dx. At the angular frequency o, the kinetic energy is o^2/2 int rho A w^2 + rho I t^2 dx.
 """
 
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 DEGREE = 12
-"""Number of polynomials, with which the first frequency has seven correct digits."""
+"""Number of polynomials. With 12, the first frequency has seven correct digits."""
 
 
 @dataclass(frozen=True)
 class Beam:
-    """A straight beam of rectangular section that bends along its height. SI units."""
+    """A straight beam of rectangular section that bends in the direction of its height. SI units."""
 
     length: float
     width: float
@@ -31,34 +31,36 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Area of its section [m^2]."""
+        """Area of the section [m^2]."""
         return self.width * self.height
 
     @property
     def inertia(self) -> float:
-        """Second moment of its section [m^4]."""
+        """Second moment of area of the section [m^4]."""
         return self.width * self.height**3 / 12
 
     @property
     def shear_coefficient(self) -> float:
-        """kappa of a rectangle, Cowper 1966."""
+        """Shear coefficient kappa of a rectangle (Cowper 1966)."""
         return 10 * (1 + self.poisson) / (12 + 11 * self.poisson)
 
 
 def euler_bernoulli_frequency(beam: Beam, *, is_held: bool) -> float:
-    """First frequency of a cantilever, or of a free beam [Hz]: closed form, without shear."""
+    """Return the first natural frequency of a cantilever (`is_held`) or a free beam without shear [Hz], a
+    closed form.
+    """
     root = 1.87510407 if is_held else 4.73004074
     speed = np.sqrt(beam.young * beam.inertia / (beam.density * beam.area))
     return float(root**2 / beam.length**2 * speed / (2 * np.pi))
 
 
 def timoshenko_frequency(beam: Beam, *, is_held: bool) -> float:
-    """First frequency of a cantilever, or of a free beam, that is not zero [Hz]."""
+    """Return the first non-zero natural frequency of a cantilever (`is_held`) or a free beam [Hz]."""
     at, weights = legendre.leggauss(DEGREE + 4)
     weights = weights * beam.length / 2
     values = legendre.legvander(at, DEGREE)
     slopes = np.stack([legendre.legval(at, legendre.legder(row)) for row in np.eye(DEGREE + 1)], axis=1)
-    if is_held:  # zero at the clamp: polynomials times the distance from it
+    if is_held:  # polynomials times the distance from the clamp are zero there
         slopes = slopes * (at + 1)[:, None] + values
         values = values * (at + 1)[:, None]
     slopes = slopes * 2 / beam.length
@@ -77,10 +79,10 @@ def timoshenko_frequency(beam: Beam, *, is_held: bool) -> float:
 
 
 def first_shape(along: Floats, *, is_held: bool) -> Floats:
-    """Deflection in the first mode of Euler and Bernoulli's beam, largest about 1.
+    """Return the deflection in the first mode of an Euler-Bernoulli beam, scaled to a maximum of about 1.
 
     Args:
-        along: place over the length, 0 at the clamp, to 1.
+        along: positions over the length, from 0 (at the clamp) to 1.
     """
     if is_held:
         k, s = 1.87510407, 0.73409551

@@ -1,4 +1,4 @@
-"""Laws that the experiments on motion compare."""
+"""Laws that the experiments on dynamics compare."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from lab.experiments.experiment import Effort
 from taichi_soft import LAWS
 
 TETRAHEDRAL = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
-"""Laws that compute stress; the others act along edges."""
+"""Laws that compute stress in tetrahedra; all others act along edges."""
 
 VARIANTS = ("cmpm2", "best_fitting_plane", "split_ring_plane", "tilted_plane", "tilted_plane_printed")
-"""Laws of chapter 4 without Voronoi faces."""
+"""Laws of chapter 4 that need no Voronoi faces."""
 
 WITHOUT_ENERGY = ("volume_springs", "cmpm", *VARIANTS)
-"""Laws along edges whose forces derive from no energy: most undamped bodies become unstable after several
-vibrations."""
+"""Laws along edges whose forces do not derive from an energy. Without damping, most bodies become unstable
+after several vibrations."""
 
 
 def laws_of(effort: Effort) -> tuple[str, ...]:
-    """All laws; for a quick report CMPM without its variants, because each of them compiles for long."""
+    """List all laws. A quick report omits the variants of CMPM, because they take long to compile."""
     return tuple(law for law in LAWS if effort is Effort.FULL or law not in VARIANTS)

@@ -1,4 +1,4 @@
-"""A body pressed on a rigid plane without friction, by finite elements (scikit-fem) at small strain."""
+"""Press a body onto a rigid plane without friction: finite elements (scikit-fem) with small strain."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Floats = NDArray[np.float64]
 def contact_forces(
     mesh: TetMesh, material: Material, held: NDArray[np.int64], lifts: list[float]
 ) -> list[float]:
-    """Force on a plane that was lifted above the lowest vertex, for each lift [N].
+    """Return the force on a plane for each height of the plane above the lowest vertex [N].
 
-    No vertex may be below the plane, and the plane only pushes. Few vertices can touch it. With the matrix of
-    the displacements that a force on each causes at all of them, the least energy is a least squares problem
-    with non-negative forces.
+    The plane only pushes, and no vertex may lie below it. Only few vertices can touch it. From their
+    displacements under unit forces, minimising the energy becomes a least-squares problem with non-negative
+    forces.
     Args:
-        held: fixed vertices.
-        lifts: [m].
+        held: indices of fixed vertices.
+        lifts: heights of the plane above the lowest vertex [m].
     """
     from scipy.optimize import nnls
     from scipy.sparse.linalg import splu

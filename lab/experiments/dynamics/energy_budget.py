@@ -1,8 +1,8 @@
 """Energy budget of a falling, bending bar (not in the thesis).
 
-A bar fixed at one end is released from the horizontal, falls, and swings about its bent shape. The work of
-gravity must equal kinetic and strain energy plus the loss in the dampers of its edges. All are computed here,
-in float64, from positions and velocities only.
+A bar clamped at one end is released from the horizontal, falls, and swings about its bent shape. The work of
+gravity must equal the kinetic energy, the strain energy and the energy lost in the edges' dampers together.
+All energies are computed here, in float64, from positions and velocities only.
 """
 
 from __future__ import annotations
@@ -30,24 +30,28 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
-DAMPING = 150.0  # N s/m
+DAMPING = 150.0  # [N s/m]
 WITH_ENERGY = ("st_venant_kirchhoff", "neo_hookean")
 GRAVITY = 9.81
-PART = 0.5  # of the stable substep: leapfrog's energy oscillates with the square of the step
+PART = 0.5  # [stable substep]; the error of leapfrog's energy grows with the square of the step
 FRAMES = 120
 UNDAMPED, DAMPED = 1e-3, 1e-3
-"""Largest error of the budget over the work of gravity, without damping and with it."""
+"""Largest error of the budget over the work of gravity, without and with damping."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Two laws with an energy, and the thesis's own without one; undamped and damped."""
+    """List the points: two laws with an energy, undamped and damped, and the thesis's law without one,
+    undamped.
+    """
     seconds = 0.6 if effort is Effort.QUICK else 6.0
     rows = [(law, damping) for law in WITH_ENERGY for damping in (0.0, DAMPING)]
     return [{"law": law, "damping": b, "seconds": seconds} for law, b in [*rows, ("virial", 0.0)]]
 
 
 def measure(point: Point) -> Numbers:
-    """Energies over time [J]: kinetic, strain and potential energy, damped energy, and the rest."""
+    """Measure kinetic, elastic and potential energy and the energy lost to damping over time [J], and their
+    sum.
+    """
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     held = np.flatnonzero(mesh.vertices[:, 0] < -0.5 + 1e-9)
@@ -81,15 +85,15 @@ def measure(point: Point) -> Numbers:
 
 
 def _edges(mesh: TetMesh, positions: Floats) -> Floats:
-    """Edges from the first vertex of each tetrahedron to the others, as rows, (m, 3, 3)."""
+    """Return the edges from the first vertex of each tetrahedron to the others, as rows, (m, 3, 3) [m]."""
     corners = positions[mesh.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
 
 def _energy_density(law: LawName, F: Floats) -> Floats:
-    """Energy density of deformations (m, 3, 3) [J/m^3].
+    """Return the energy density for deformation gradients (m, 3, 3) [J/m^3].
 
-    For a law without energy it is that of Hooke's law, which is the same in the strains F F^T and F^T F.
+    A law without energy gets that of Hooke's law, which is the same for the strains of F F^T and F^T F.
     """
     mu, lam = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
     if law == "neo_hookean":  # Smith, de Goes and Kim 2018, eq. 14 with the constants of their section 3.4
@@ -104,7 +108,7 @@ def _energy_density(law: LawName, F: Floats) -> Floats:
 
 
 def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float:
-    """Power of dampers b on all edges, the sum of b (n . dv)^2 [W]."""
+    """Return the power of dampers b on all edges, the sum of b (n . dv)^2 [W]."""
     p, q = mesh.edges.T
     along = x[q] - x[p]
     closing = ((v[q] - v[p]) * along).sum(axis=1) / np.linalg.norm(along, axis=1)
@@ -112,7 +116,7 @@ def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float
 
 
 def conclude(results: Results) -> Section:
-    """Judge the budget of laws with an energy."""
+    """Judge the budget of the laws with an energy."""
     rows = results.where()
     lost = {(p["law"], p["damping"]): n["error"] / n["given"] for p, n in rows}
     undamped, damped = (max(lost[law, b] for law in WITH_ENERGY) for b in (0.0, DAMPING))

@@ -1,7 +1,8 @@
-"""An elastic sphere pressed on a rigid plane: force against depth, after Hertz 1881 (not in the thesis).
+"""An elastic sphere pressed onto a rigid plane: force against depth, after Hertz 1881 (not in the thesis).
 
-The oracles are Hertz's formula, for a smooth sphere and small depths, and finite elements with contact on the
-same mesh. The mesh is refined at the contact: in an even mesh, too few vertices touch.
+The references are Hertz's formula, which holds for a smooth sphere and small depths, and finite elements with
+contact on the same mesh. The mesh is refined at the contact, because too few vertices of an even mesh would
+touch the plane.
 """
 
 from __future__ import annotations
@@ -40,15 +41,17 @@ ELEMENTS = "finite elements"
 QUICK_LAWS, FULL_LAWS = ("virial", "neo_hookean", "springs"), (*TETRAHEDRAL, "springs", "volume_springs")
 EXPONENT, EXPONENT_TOLERANCE = 1.5, 0.1
 FROM_HERTZ = 0.1
-"""Largest difference from Hertz at any depth. Finite elements leave 8 %: few vertices touch at first."""
+"""Largest relative difference from Hertz at any depth. Finite elements differ by 8 %, because few vertices
+touch the plane at first."""
 SAME_MESH = 0.03
-"""Largest difference from finite elements at the smallest depth. They are for small strain, which below the
-contact is about half of the root of depth over radius, 4 to 10 %."""
+"""Largest relative difference from finite elements at the smallest depth. They assume small strain. The
+strain below the contact is about half the root of depth over radius, 4 to 10 %."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: some laws and finite elements on the graded mesh, the latter also on an even one; in full, all,
-    and finer.
+    """List the points: some laws and finite elements on the graded mesh, and finite elements on an even mesh.
+
+    A full report has all laws, a finer mesh, and a collider instead of the floor.
     """
     laws = QUICK_LAWS if effort is Effort.QUICK else FULL_LAWS
     rows = [(law, COARSE, GRADED, "floor") for law in (*laws, ELEMENTS)]
@@ -60,7 +63,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Forces at the depths [N], and their exponent: the slope in logarithms."""
+    """Measure the force at each depth [N], and its exponent: the slope of log(force) over log(depth)."""
     mesh = graded_sphere(point["pieces"], point["grading"])
     if point["law"] == ELEMENTS:
         forces = contact_forces(mesh, MATERIAL, cap(mesh), [RADIUS * depth for depth in DEPTHS])
@@ -73,7 +76,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the forces against Hertz and finite elements."""
+    """Compare the forces with Hertz and with finite elements."""
     rows = results.where()
     hertz = np.array([hertz_force(RADIUS * depth) for depth in DEPTHS])
     elements = results.one(law=ELEMENTS, pieces=COARSE, grading=GRADED)
@@ -172,7 +175,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
-    """Reason: the model if finite elements on the same mesh are closer, else the mesh."""
+    """Name the cause of a deviation: the model if finite elements on the mesh are closer, else the mesh."""
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:
         return f"the mesh: finite elements on it are off by up to {left:.1%}, and the laws are near to these"

@@ -1,4 +1,6 @@
-"""Momentum and angular momentum of a free, tumbling, vibrating body under every law (not in the thesis)."""
+"""Momentum and angular momentum of a free, tumbling and vibrating body under every law (not in the
+thesis).
+"""
 
 from __future__ import annotations
 
@@ -27,18 +29,19 @@ Floats = NDArray[np.float64]
 
 SIZE, CELLS = (1.0, 0.5, 0.5), (4, 2, 2)
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
-DAMPING = 20.0  # N s/m
-VELOCITY, SPIN = np.array([1.0, 0.5, -0.3]), np.array([0.5, 3.0, 1.0])  # m/s, rad/s
+DAMPING = 20.0  # [N s/m]
+VELOCITY, SPIN = np.array([1.0, 0.5, -0.3]), np.array([0.5, 3.0, 1.0])  # [m/s], [rad/s]
 STRETCH, SHEAR = 1.05, 0.05
 FRAMES = 60
 CENTRAL = (*TETRAHEDRAL, "springs", "volume_springs")
-"""Laws whose forces should not turn a body. Those of chapter 4 also push both ends of an edge sideways."""
+"""Laws whose forces should not rotate a body. The laws of chapter 4 also push both ends of an edge
+sideways."""
 ROUND_OFF = 1e-5
-"""Relative change: round-off of float32 causes about 1e-7, torques a hundredth and more."""
+"""Largest relative change that counts as round-off. Float32 causes about 1e-7, torques cause 1e-2 or more."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Every law, undamped and damped."""
+    """List the points: every law, undamped and damped."""
     seconds = 1.0 if effort is Effort.QUICK else 5.0
     return [
         {"law": law, "damping": damping, "seconds": seconds}
@@ -48,7 +51,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Largest relative change of momentum and angular momentum; -1 if the body fails."""
+    """Measure the largest relative change of momentum and angular momentum; -1 if the body fails."""
     mesh = box(SIZE, CELLS)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
@@ -58,11 +61,11 @@ def measure(point: Point) -> Numbers:
     body.set_motion(start, VELOCITY + np.cross(SPIN, start))
     first = _momenta(body.masses, body.positions(), body.velocities())
     dt = point["seconds"] / FRAMES
-    substeps = 2 * world.stable_substeps(dt)  # undamped, some laws break at the limit within 5 s
+    substeps = 2 * world.stable_substeps(dt)  # undamped, some laws become unstable at the limit
     changes = np.zeros((FRAMES + 1, 2))
     turning = np.ones(FRAMES + 1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # reported by -1
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # -1 reports it
         for frame in range(1, FRAMES + 1):
             world.step(dt, substeps)
             if body.is_frozen:
@@ -80,14 +83,14 @@ def measure(point: Point) -> Numbers:
 
 
 def _momenta(masses: Floats, positions: NDArray[Any], velocities: NDArray[Any]) -> Floats:
-    """Momentum [N s], and angular momentum about the centre of mass [N m s], as rows."""
+    """Return the momentum [N s] and the angular momentum about the centre of mass [N m s], as rows."""
     x, impulses = positions.astype(np.float64), masses[:, None] * velocities.astype(np.float64)
     arms = x - masses @ x / masses.sum()
     return np.stack([impulses.sum(axis=0), np.cross(arms, impulses).sum(axis=0)])
 
 
 def conclude(results: Results) -> Section:
-    """Judge momentum under every law, and angular momentum under those without sideways forces."""
+    """Judge momentum under every law, and angular momentum under the laws without sideways forces."""
     rows = results.where()
     sound = [(p, n) for p, n in rows if n["times"]]
     momentum = max(n["momentum"] for _, n in sound)
@@ -124,7 +127,7 @@ def conclude(results: Results) -> Section:
                 axes.plot(numbers["times"], numbers["turning"], style, label=name)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angular momentum, over that at the start [1]")
-        axes.set_ylim(-0.1, 2.0)  # beyond it the body has failed
+        axes.set_ylim(-0.1, 2.0)  # larger changes mean that the body failed
         figure.legend(loc="outside right upper")
 
     return Section(

@@ -1,7 +1,7 @@
-"""First natural frequencies of a cantilever and a free beam, under every law (not in the thesis).
+"""First natural frequencies of a cantilever and a free beam under every law (not in the thesis).
 
-A beam at rest gets a small velocity in the shape of its first mode, and vibrates. Its frequency is read from
-the zeros of its deflection. The oracles are Timoshenko's beam, and finite elements on the same mesh.
+A beam at rest receives a small velocity in the shape of its first mode and vibrates. The zeros of its
+deflection give the frequency. The references are a Timoshenko beam, and finite elements on the same mesh.
 """
 
 from __future__ import annotations
@@ -47,14 +47,17 @@ SUPPORTS = {"cantilever": "cantilever-frequency", "free": "free-beam-frequency"}
 ELEMENTS = "finite elements"
 
 SAME_MESH = 0.01
-"""Largest difference of a law on tetrahedra from finite elements on the same mesh with the same masses."""
+"""Largest relative difference between a law on tetrahedra and finite elements with the same mesh and
+masses."""
 EXTRAPOLATED = 0.02
-"""Largest difference between theory and the extrapolation from two meshes. Finite elements leave 1.4 %
-here."""
+"""Largest relative difference between theory and the extrapolation from two meshes. Finite elements differ by
+1.4 %."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: every law on the coarse mesh, two on a finer one too, and finite elements on these."""
+    """List the points: every law and finite elements on the coarse mesh, some laws and finite elements on
+    finer ones.
+    """
     laws: list[Point] = [{"law": law, "cells": FINE} for law in ("virial", "springs")]
     laws += [{"law": law, "cells": COARSE} for law in laws_of(effort)]
     elements: list[Point] = [{"law": ELEMENTS, "cells": cells} for cells in (COARSE, FINE)]
@@ -66,7 +69,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Frequencies of both beams [Hz], 0 if they fail; an amplitude over that one period before."""
+    """Measure the frequency of both beams [Hz] and the growth of the amplitude per period; 0 if the beam
+    fails.
+    """
     mesh = beam_mesh(point["cells"])
     numbers: Numbers = {"tets": len(mesh.tets)}
     for support in SUPPORTS:
@@ -80,7 +85,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge laws against finite elements on the same mesh, and two meshes against theory."""
+    """Compare laws with finite elements on the same mesh, and the extrapolation with theory."""
     findings = [_finding(results, support, claim) for support, claim in SUPPORTS.items()]
     tables = [_table(results, support) for support in SUPPORTS]
     fine = results.one(law="virial", cells=FINE)
@@ -142,7 +147,7 @@ def conclude(results: Results) -> Section:
 
 
 def _laws(results: Results) -> list[str]:
-    """Laws of the coarse mesh, in order."""
+    """List the laws on the coarse mesh, in order."""
     return [point["law"] for point, _ in results.where(cells=COARSE) if point["law"] != ELEMENTS]
 
 
@@ -151,7 +156,7 @@ def _excess(results: Results, support: str, cells: int) -> str:
 
 
 def _extrapolated(results: Results, support: str, law: LawName = "virial") -> float:
-    """Frequency extrapolated to cells of zero size from the two finest meshes, with a second-order error."""
+    """Extrapolate the frequency to cells of zero size from the two finest meshes (error of second order)."""
     rows = sorted((point["cells"], numbers[support]) for point, numbers in results.where(law=law))
     (coarse, low), (fine, high) = rows[-2:]
     return float((fine**2 * high - coarse**2 * low) / (fine**2 - coarse**2))
@@ -163,7 +168,7 @@ def _finding(results: Results, support: str, claim: str) -> Finding:
     worst = max(abs(parts[law]) for law in TETRAHEDRAL)
     expected, promised = theory(support), _extrapolated(results, support)
     agrees = worst < SAME_MESH and abs(promised / expected - 1) < EXTRAPOLATED
-    others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # whole ones
+    others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # not failed
     return judged_but_for(
         claim,
         f"the laws on tetrahedra are within {worst:.1g} of finite elements on the same mesh, which is "

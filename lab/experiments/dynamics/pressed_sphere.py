@@ -1,4 +1,4 @@
-"""An elastic sphere, held by its cap and pressed on a rigid plane."""
+"""Press an elastic sphere, held at its cap, onto a rigid plane."""
 
 from __future__ import annotations
 
@@ -11,26 +11,25 @@ from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
-RADIUS = 0.5  # m
+RADIUS = 0.5  # [m]
 MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 GRADED = 0.6
-"""Refinement towards the lowest point: edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
-DEPTHS = (0.005, 0.01, 0.02, 0.04)  # over the radius
-FRICTIONLESS, BRAKE = 0.0, 100.0  # 1, 1/s
-DT, LOWERING, RESTING = 0.005, 10, 30  # s; steps to each depth, and at rest there
+"""Refinement towards the lowest point. With 0.6, edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
+DEPTHS = (0.005, 0.01, 0.02, 0.04)  # [radius]
+FRICTIONLESS, BRAKE = 0.0, 100.0  # friction, damping rate [1/s]
+DT, LOWERING, RESTING = 0.005, 10, 30  # length of a step [s]; steps to each depth, and at rest there
 
 
 def hertz_force(depth: float) -> float:
-    """4/3 E* sqrt(R) d^(3/2) [N]."""
+    """Return Hertz's force 4/3 E* sqrt(R) d^(3/2) at a depth d [N]."""
     modulus = float(np.unique(MATERIAL.young)[0]) / (1 - float(np.unique(MATERIAL.poisson)[0]) ** 2)
     return float(4 / 3 * modulus * np.sqrt(RADIUS) * depth**1.5)
 
 
 def graded_sphere(resolution: int, grading: float) -> TetMesh:
-    """A ball, with smaller elements near its lowest point.
+    """Make a ball with smaller tetrahedra near its lowest point.
 
-    A Moebius map of the ball onto itself moves vertices down. It maps spheres to spheres and preserves
-    angles.
+    A Moebius map of the ball onto itself moves the vertices down. It preserves spheres and angles.
     """
     ball = sphere(1.0, resolution)
     x, a = ball.vertices, np.array([0.0, 0.0, -grading])
@@ -40,12 +39,15 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Vertices above half of the radius, which are fixed."""
+    """Return the indices of the vertices above half the radius, which are fixed."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
 def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
-    """Force that holds the cap after lowering it by each depth [N], from the positions in float64."""
+    """Return the force that holds the cap after lowering it by each depth [N].
+
+    The forces are computed in float64 from the positions.
+    """
     held, ground = cap(mesh), float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=held)
@@ -63,7 +65,7 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
-    """Force on a plane that rises by each depth against the sphere [N], from the impulse on the plane."""
+    """Return the force on a plane after raising it by each depth [N], from the impulse on it."""
     ground = float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
@@ -81,7 +83,7 @@ def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def _descent() -> list[list[float]]:
-    """Descent in each step [m], for each depth: on the way there, and at rest."""
+    """Return the depth after each step, for each of `DEPTHS`: on the way there and at rest [m]."""
     starts = (0.0, *DEPTHS[:-1])
     return [
         [

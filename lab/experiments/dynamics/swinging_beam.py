@@ -16,23 +16,23 @@ from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
-LENGTH, WIDTH, HEIGHT = 2.0, 0.3, 0.2  # m
+LENGTH, WIDTH, HEIGHT = 2.0, 0.3, 0.2  # [m]
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 MATERIAL = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)
 BEAM = Beam(LENGTH, WIDTH, HEIGHT, YOUNG, POISSON, DENSITY)
 NEEDS_DAMPING = {law: 20.0 if law == "volume_springs" else 5.0 for law in WITHOUT_ENERGY}
-"""Damping [N s/m] with which these beams last for two periods."""
+"""Damping [N s/m] with which the beam stays stable for two periods under these laws."""
 AMPLITUDE = 0.01 * LENGTH  # strains stay below 0.2 %
-FRAMES = 60  # a period of the theory
+FRAMES = 60  # steps per theoretical period
 
 
 def beam_mesh(cells: int) -> TetMesh:
-    """Mesh of the beam with the given number of cubic cells along the height."""
+    """Make the mesh of the beam with `cells` cubic cells along its height."""
     return box((LENGTH, WIDTH, HEIGHT), (10 * cells, 3 * cells // 2, cells))
 
 
 def mode_shape(mesh: TetMesh, support: str) -> tuple[Floats, NDArray[np.int64]]:
-    """Shape of the first mode, (n, 3), and the fixed vertices."""
+    """Return the shape of the first mode, (n, 3), and the indices of the fixed vertices."""
     along = mesh.vertices[:, 0] / LENGTH + 0.5
     shape = np.zeros_like(mesh.vertices)
     shape[:, 2] = first_shape(along, is_held=support == "cantilever")
@@ -44,13 +44,16 @@ def theory(support: str) -> float:
 
 
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
-    """Frequency [Hz], and an amplitude over that one period before. Both are 0 if the beam fails."""
+    """Return the frequency of the vibrating beam [Hz], and its amplitude over that one period earlier.
+
+    Both are 0 if the beam fails.
+    """
     shape, held = mode_shape(mesh, support)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     material = replace(MATERIAL, damping=NEEDS_DAMPING.get(law, 0.0))
     body = world.add_body(mesh, material, law=law, pinned=held)
     world.build()
-    if support == "free":  # a kick without momentum, nor angular momentum
+    if support == "free":  # remove momentum and angular momentum
         weight = np.sqrt(body.masses)
         rigid = np.stack([np.ones(len(weight)), mesh.vertices[:, 0]], axis=1) * weight[:, None]
         shape[:, 2] -= (rigid @ np.linalg.lstsq(rigid, shape[:, 2] * weight, rcond=None)[0]) / weight
@@ -60,7 +63,7 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     substeps = world.stable_substeps(dt)
     mode = body.masses * shape[:, 2] / (body.masses @ shape[:, 2] ** 2)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # reported by a frequency of 0
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # a frequency of 0 reports it
         while len(crossings) < 5 and len(deflections) < 8 * FRAMES and not body.is_frozen:
             world.step(dt, substeps)
             before, now = deflections[-1], float(mode @ (body.positions()[:, 2] - mesh.vertices[:, 2]))
@@ -72,5 +75,5 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     turns = [round(time / dt) for time in crossings]
     early, late = (
         np.abs(deflections[turns[i] : turns[i + 1]]).max() for i in (0, 2)
-    )  # a period apart, on the same side
+    )  # one period apart, to the same side
     return 2 / (crossings[4] - crossings[0]), float(late / early)

@@ -13,11 +13,11 @@ Floats = NDArray[np.float64]
 def bending_frequency(
     mesh: TetMesh, material: Material, shape: Floats, held: NDArray[np.int64], *, is_lumped: bool
 ) -> float:
-    """Frequency of the mode most similar to a given one [Hz].
+    """Return the frequency of the mode that is most similar to a given shape [Hz].
 
     Args:
-        shape: (n, 3) displacement of the vertices.
-        held: fixed vertices.
+        shape: displacements of the vertices, (n, 3).
+        held: indices of fixed vertices.
         is_lumped: True for masses at the vertices, a quarter of each tetrahedron's, as in the models of the
             thesis; otherwise they are spread over the elements.
     """
@@ -42,7 +42,7 @@ def bending_frequency(
     vector[number] = shape
     free = np.setdiff1d(np.arange(elements.N), number[held].ravel())
     stiffness, mass = (matrix.tocsc()[free][:, free] for matrix in (stiffness, mass))
-    # Shift to a value below all frequencies, so that the matrix is regular for a free body too.
+    # A shift below all frequencies makes the matrix regular, even for a free body.
     scale = float(stiffness.diagonal().mean() / mass.diagonal().mean())
     squares, modes = eigsh(stiffness, k=9, M=mass, sigma=-1e-5 * scale, which="LM", v0=np.ones(len(free)))
     sizes = np.sqrt(np.einsum("im,im->m", modes, mass @ modes))

@@ -1,7 +1,8 @@
-"""A pressure pulse runs through a long bar, under every law (not in the thesis).
+"""A pressure pulse travels along a long bar under every law (not in the thesis).
 
-A displacement along the bar, half a bell at its free end, is released from rest. By d'Alembert, half of it
-travels away as a bell, at sqrt(E / rho) if the bar is thin compared with the bell's width.
+The bar is released from rest, displaced along its axis in the shape of half a bell at its free end. By
+d'Alembert's formula, half of the displacement travels away as a bell. Its speed is sqrt(E / rho) if the bar
+is thin compared with the bell.
 """
 
 from __future__ import annotations
@@ -28,20 +29,20 @@ from taichi_soft.world.bare import bare_world
 
 Floats = NDArray[np.float64]
 
-LENGTH, THICKNESS = 8.0, 0.2  # m
-WIDTH = 0.8  # m, standard deviation of the bell: Love's correction for lateral inertia is below 0.1 %
-HEIGHT = 0.008  # m: strains stay below 0.6 %
+LENGTH, THICKNESS = 8.0, 0.2  # [m]
+WIDTH = 0.8  # standard deviation of the bell [m]; Love's correction for lateral inertia is below 0.1 %
+HEIGHT = 0.008  # height of the bell [m]; strains stay below 0.6 %
 YOUNG, DENSITY = 1e6, 1000.0
 POISSONS = (0.3, 0.0)
 SPEED = float(np.sqrt(YOUNG / DENSITY))
 FRAMES = 60
 SHOWN = 5
 TOLERANCE = 0.01
-"""Largest relative error of the speed due to the mesh, at two cells across."""
+"""Largest relative error of the speed due to the mesh, with two cells across the bar."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """Points: every law at a Poisson's ratio of 0.3, those with stress at 0 too; some on a finer mesh."""
+    """List the points: every law for nu = 0.3, laws with stress also for nu = 0, and some on a finer mesh."""
     rows: list[Point] = [{"law": law, "poisson": POISSONS[0], "cells": 2} for law in laws_of(effort)]
     rows += [{"law": law, "poisson": POISSONS[1], "cells": 2} for law in TETRAHEDRAL]
     if effort is Effort.FULL:
@@ -50,7 +51,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Speed of the pulse [m/s], deviation from a constant speed, and its shape at some times."""
+    """Measure the speed of the pulse [m/s], the deviation from a constant speed, and its shape at
+    some times.
+    """
     cells = point["cells"]
     mesh = box((LENGTH, THICKNESS, THICKNESS), (round(LENGTH / THICKNESS) * cells, cells, cells))
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
@@ -61,7 +64,7 @@ def measure(point: Point) -> Numbers:
     along = mesh.vertices[:, 0] + LENGTH / 2
     bell = HEIGHT * np.exp(-0.5 * (along / WIDTH) ** 2)
     strain = -along / WIDTH**2 * bell
-    start = mesh.vertices * (1 - point["poisson"] * strain)[:, None]  # thinner where it is stretched
+    start = mesh.vertices * (1 - point["poisson"] * strain)[:, None]  # lateral contraction
     start[:, 0] = mesh.vertices[:, 0] + bell
     body.set_motion(start, np.zeros_like(start))
     places, section = np.unique(np.round(along, 9), return_inverse=True)
@@ -92,7 +95,9 @@ def measure(point: Point) -> Numbers:
 
 
 def _peak(places: Floats, profile: Floats) -> float:
-    """Position of the maximum of a bell: that of a parabola through values above 0.7 of the largest [m]."""
+    """Return the position of a bell's maximum [m]: that of a parabola fitted to values above 0.7 of the
+    largest.
+    """
     top = int(profile.argmax())
     low, high = top, top
     while low > 0 and profile[low - 1] > 0.7 * profile[top]:
@@ -106,7 +111,7 @@ def _peak(places: Floats, profile: Floats) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge: laws on tetrahedra have the correct speed, those along edges have their own."""
+    """Judge whether laws on tetrahedra have the correct speed."""
     rows = results.where()
     known = {(p["law"], p["poisson"], p["cells"]): n["speed"] / SPEED for p, n in rows}
     errors = [abs(known[law, poisson, 2] - 1) for law in TETRAHEDRAL for poisson in POISSONS]
@@ -180,7 +185,7 @@ def conclude(results: Results) -> Section:
 
 
 def _why(known: dict[tuple[str, float, int], float]) -> str:
-    """Reason: the mesh if a finer one is closer to theory, else the model."""
+    """Name the cause of an error: the mesh if a finer mesh is closer to theory, else the model."""
     coarse, fine = (
         max(abs(known.get((law, POISSONS[0], cells), 0.0) - 1) for law in TETRAHEDRAL) for cells in (2, 4)
     )

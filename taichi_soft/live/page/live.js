@@ -1,4 +1,4 @@
-// Keeps the connection; passes packets to the view and messages to the panel.
+// Keeps the connection to the server. Passes packets to the view and messages to the panel.
 import { Activities } from "./activities.js";
 import { Panel } from "./panel.js";
 import { View } from "./view.js";
@@ -22,7 +22,7 @@ const ask = request => {
   else { sendValues(); send(request); }
 };
 
-// Latency of the last moves: from a move of the hand to the frame after the first one that shows it [ms].
+// Latencies of the last moves [ms]: from a move of the hand to the frame after the first one that shows it.
 const begun = new Map(), late = [];
 let pull = 0;
 

@@ -1,4 +1,4 @@
-// The controls: plain HTML, for keyboards and screen readers.
+// The controls. They are plain HTML, so that keyboards and screen readers can use them.
 import { Plot } from "./plot.js";
 import { quantity } from "./quantity.js";
 import { PATIENCE, Slider } from "./slider.js";
@@ -67,7 +67,7 @@ export class Panel {
     };
   }
 
-  // Let all sliders follow the world immediately, even one that was just moved.
+  // Show the world's values on all sliders immediately, even on one that was just moved.
   release() { for (const slider of this.sliders.values()) slider.touched = -PATIENCE; }
 
   async upload(limit) {
@@ -78,7 +78,7 @@ export class Panel {
     at("upload").value = "";
   }
 
-  // Warn of a material that needs more substeps than are set, before it becomes unstable.
+  // Warn of a material that needs more substeps than the slider's value, before it becomes unstable.
   warn() {
     const state = this.state, sliders = this.sliders;
     if (!state) return;
@@ -121,7 +121,7 @@ export class Panel {
     }
     this.follow("tint", message.tint);
     this.follow("preset", state.preset);
-    // Show laws chosen by others, and refusals; keep a selection that is not applied yet.
+    // Show the law that others chose or that remains after a refusal. Keep a selection that is not applied yet.
     const choice = message.coming ?? message.chosen;
     if (!this.isEdited) for (const id of CHOICE) this.follow(id, choice[id]);
   }
@@ -150,7 +150,7 @@ export class Panel {
     this.fading = setTimeout(() => { at("said").textContent = this.trouble ?? ""; }, isRefused ? 12000 : 8000);
   }
 
-  // Show a text and disable the controls, until null.
+  // Show a text and disable the controls; null clears the text.
   stop(words) {
     const before = this.trouble;
     this.trouble = words;

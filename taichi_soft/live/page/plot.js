@@ -1,6 +1,6 @@
 import { quantity } from "./quantity.js";
 
-// Plots numbers over the last seconds: lines of [name, colour], in one unit.
+// Plots numbers over the last seconds, all in one unit. Each line is [name, colour].
 export class Plot {
   constructor(canvas, list, lines, unit) {
     this.canvas = canvas; this.lines = lines; this.unit = unit; this.rows = [];

@@ -1,4 +1,4 @@
-// Light, sky, and a floor with a grid that fades into the horizon.
+// Creates light, sky, and a floor with a grid that fades towards the horizon.
 import * as THREE from "three";
 
 const HORIZON = 0xdde3ea, ZENITH = 0x8fadcb, FLOOR = 0xb9bec5, LINE = "rgba(70, 84, 100, 0.34)", BOLD = "rgba(70, 84, 100, 0.6)";
@@ -21,7 +21,7 @@ export class Room {
     this.reach = 3;
   }
 
-  // Draw a floor at a height, or none. Its grid has cells of 1 m, and bold lines every 10 m.
+  // Draw a floor at a height, or no floor for null. Its grid has cells of 1 m, and bold lines every 10 m.
   drawFloor(height) {
     if (this.floor) { this.scene.remove(this.floor); this.floor.geometry.dispose(); this.floor.material.map.dispose(); this.floor.material.dispose(); }
     this.floor = null;
@@ -33,7 +33,7 @@ export class Room {
     this.scene.add(this.floor);
   }
 
-  // Aim the sun at a point; shadows cover the range `reach` around it.
+  // Aim the sun at a point. Shadows cover `reach` metres on each side of it.
   aim(target, reach) {
     this.reach = reach;
     this.sun.target.position.set(...target);
@@ -43,7 +43,7 @@ export class Room {
     eye.updateProjectionMatrix();
   }
 
-  // Move sky and fog with the camera, whose target is `away` metres from it.
+  // Move sky and fog with the camera, which is `away` metres from its target.
   follow(camera, away) {
     this.sky.position.copy(camera.position);
     this.sky.scale.setScalar(0.5 * camera.far);

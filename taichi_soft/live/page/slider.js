@@ -1,6 +1,6 @@
 import { quantity } from "./quantity.js";
 
-// The server confirms a change some frames later: until then, a control keeps the user's value [ms].
+// Time for which a control keeps the user's value [ms], because the server confirms it some frames later.
 export const PATIENCE = 1500;
 
 export class Slider {

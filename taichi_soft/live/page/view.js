@@ -6,7 +6,7 @@ import { OrbitControls } from "./three/OrbitControls.js";
 const RAMP = [[77, 133, 204], [107, 191, 194], [242, 224, 133], [242, 145, 71], [204, 46, 56]].map(c => c.map(v => v / 255));
 const toLinear = v => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 
-// Content of one world.
+// The rendered objects of one world.
 class Pane {
   constructor() {
     this.scene = new THREE.Scene();
@@ -60,7 +60,7 @@ class Pane {
     });
   }
 
-  // Bounding box of all bodies, or null without bodies.
+  // Return the bounding box of all bodies, or null if there are none.
   box() {
     const box = new THREE.Box3();
     if (this.body) box.setFromBufferAttribute(this.body.geometry.attributes.position);
@@ -94,7 +94,7 @@ class Pane {
   }
 }
 
-// Colour scale in 128 steps.
+// Linear colours of the colour scale, in 128 steps.
 const LADDER = Array.from({ length: 128 }, (_, i) => {
   const place = (i / 127) * (RAMP.length - 1), at = Math.min(Math.floor(place), RAMP.length - 2), share = place - at;
   return RAMP[at].map((v, k) => toLinear(v + share * (RAMP[at + 1][k] - v)));
@@ -185,7 +185,7 @@ export class View {
     });
   }
 
-  // Ray under a pointer, and its pane.
+  // Return the ray under a pointer, and its pane.
   ray(event) {
     const box = this.canvas.getBoundingClientRect(), wide = box.width / this.shown.length;
     const i = Math.min(this.shown.length - 1, Math.max(0, Math.floor((event.clientX - box.left) / wide)));
@@ -200,7 +200,7 @@ export class View {
     return { place: i, pane: this.shown[i], caster };
   }
 
-  // Hit of a ray on a body that no collider hides, or null.
+  // Return the hit of a ray on a body, or null if it hits none or a collider hides the body.
   hit(pane, caster) {
     const { body, solids } = this.panes.get(pane) ?? {};
     if (!body) return null;
@@ -247,7 +247,7 @@ export class View {
     this.canvas.classList.remove("holds");
   }
 
-  // Frame all bodies, keeping the camera's direction.
+  // Move the camera to frame all bodies, and keep its direction.
   frameAll() {
     const box = new THREE.Box3();
     for (const number of this.shown) {
