@@ -310,7 +310,7 @@ class SoftBodyAsset:
                 surface. TetGen's licence, the AGPL, requires you to publish the source of everything that
                 you ship or serve with it.
             time_limit: time after which the process of "ftetwild" or "tetgen" is killed [s]; None: 120.
-            refine: for "lattice", how often cells may be halved around limbs and sheets thinner than about a
+            refine: for "lattice", how often cells can be halved around limbs and sheets thinner than about a
                 sixteenth of a cell, which the cage would otherwise omit: 0 to 3; None: 1. Each halving also
                 halves the substep. Parts that are still omitted are drawn, but neither bend nor collide. The
                 log reports halvings and omitted parts, with the `cell_size` that keeps the parts.

@@ -34,7 +34,7 @@ class BoundHull:
     """Binding of a hull to a mesh, shared by all bodies of an asset."""
 
     vertices: Ints32  # (h, 4), vertices of the mesh that carry each point
-    weights: Floats  # (h, 4), of these vertices; they sum to 1
+    weights: Floats  # (h, 4), weights of these vertices, which sum to 1
     points: Floats  # (h, 3), positions at rest [m]
     triangles: Ints32  # (t, 3), indices of points
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Failure:
-    """Time and place at which a body became non-finite; the body is frozen since."""
+    """Time and place at which a body became non-finite and was frozen."""
 
     body: int  # slot of the body
     tetrahedron: int | None  # first tetrahedron that failed, in the caller's order; None if unknown

@@ -22,8 +22,8 @@ _CHUNK = 4
 
 _MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
-"""The search ends when the squared frequency changes by less than `_CHANGE`, relatively, over `_WINDOW`
-iterations. A single iteration can change little long before convergence, as in long bodies and letters."""
+"""The search ends when the relative change of the squared frequency over `_WINDOW` iterations is below
+`_CHANGE`. A single iteration can change little long before convergence, as in long bodies and letters."""
 
 _ROUND_OFF = 1e-9
 """Length of a direction, relative to the longest, below which it is discarded as round-off. If normalised, it
@@ -152,8 +152,8 @@ def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
 def _rigid_motions(body: BodyDescription) -> Floats:
     """Orthonormal rigid motions (3n, k), times the root of the masses.
 
-    Components that share no vertices move independently. The motions are those of the `MAX_PARTS` largest
-    components, six for each.
+    Components that share no vertices move independently. The result contains six motions for
+    each of the `MAX_PARTS` largest components.
     """
     tets = body.mesh.tets
     part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))

@@ -41,7 +41,7 @@ class HullArrays:
 
     vertices: Ints  # (h, 4) particles of this body that carry each point
     weights: Floats  # (h, 4)
-    triangles: Ints  # (t, 3) of the points
+    triangles: Ints  # (t, 3) points of each triangle
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class BodyArrays:
     stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic stiffness; else zero
     tet_damping: Floats  # (m,) [N s/m]
     tet_edges: Ints  # (m, 6) edges of each tetrahedron, in the order of `LOCAL_EDGES`
-    edge_vertices: Ints  # (k, 2)
+    edge_vertices: Ints  # (k, 2) particles at the ends of each edge
     edge_order: Ints  # (k,) caller's index of each edge
     edge_blocks: Ints  # (c, 2) first row and number of edges of each block: see `_edge_blocks`
     edge_damping: Floats  # (k,) [N s/m]
@@ -157,11 +157,11 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
 
     Returns: numbers of particles, edges, blocks of edges, triangles and outer particles.
 
-    The points of a hull follow the particles of the body. The rows of its triangles and points are separate
-    from those of the surface, but have the same numbers.
+    The points of a hull follow the particles of the body. Triangles and points of a hull have their own rows,
+    numbered like the rows of the surface.
 
-    For each of its vertices, a cut has about three edges, and two triangles on either side. If it is small
-    and ends inside the body, it can have twice as many (Euler's formula).
+    For each of its vertices, a cut has about three edges, and two triangles on either side. A small
+    cut that ends inside the body can have twice as many (Euler's formula).
     """
     if spare_vertices == 0:
         exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer

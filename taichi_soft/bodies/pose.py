@@ -27,8 +27,8 @@ def best_fitting_pose(rest: Floats, positions: Floats, masses: Floats) -> Pose:
 
     The method is Kabsch's (1976). The result is never a reflection, even for flat and mirrored shapes.
     Args:
-        rest, positions: (n, 3) [m].
-        masses: (n,) [kg], positive.
+        rest, positions: positions of the vertices at rest and at present, (n, 3) [m].
+        masses: masses of the vertices, (n,) [kg], positive.
     """
     weights = masses / masses.sum()
     rest_center, center = weights @ rest, weights @ positions

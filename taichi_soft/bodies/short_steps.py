@@ -25,7 +25,7 @@ RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 
 
 def warn_of_short_steps(mesh: TetMesh, cell_size: float, method: str) -> None:
-    """Log a warning if the stable substeps of a mesh are much shorter than those of a lattice.
+    """Log a warning if the stable substeps of a mesh are much shorter than for a lattice.
 
     Args:
         cell_size: edge of the lattice's cells [m].

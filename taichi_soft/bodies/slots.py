@@ -17,11 +17,11 @@ class Occupant(Protocol):
 
     @property
     def index(self) -> int:
-        """Index of its slot."""
+        """Index of the body's slot."""
 
     @property
     def asset(self) -> SoftBodyAsset:
-        """Asset whose slots it can occupy."""
+        """Asset whose slots the body can occupy."""
 
 
 Kind = TypeVar("Kind", bound=Occupant)

@@ -143,8 +143,8 @@ class Slice:
     """One optional feature of a world, such as grabs. Only its slice knows its data."""
 
     name = ""  # name of its part of a snapshot
-    prevents_cuts = True  # True if a body that it constrains cannot be cut or torn
-    prevents_levels = True  # True if a body that it constrains cannot change its level of detail
+    prevents_cuts = True  # True if a body that the slice constrains cannot be cut or torn
+    prevents_levels = True  # True if a body that the slice constrains cannot change its level
 
     def __init__(self, context: Context) -> None:
         """Create an empty slice."""
@@ -216,7 +216,7 @@ class Slice:
 class BodyRecord:
     """Internal data of a body, behind the handle that users have: see `record_of`."""
 
-    description: BodyDescription  # of the present mesh and material
+    description: BodyDescription  # description with the present mesh and material
     first_step: int
     present: BodyArrays | None = None  # with intermediate constants while the material changes gradually
     removed_in: int | None = None  # step in which the body was removed
@@ -227,10 +227,10 @@ class BodyRecord:
     skin_meshes: tuple[Any, ...] | None = None  # created at the first request
     level: int = 0  # level of detail; 0 is the finest
     friction: float | None = None  # None: the asset's friction
-    held: NDArray[np.int64] | None = None  # vertices of the finest level for which the pins stand
+    held: NDArray[np.int64] | None = None  # vertices of the finest level that pins represent
 
     def set_topology(self, part: CutMesh | None, level: int = 0) -> None:
-        """Set the level of detail, and the part of the asset's mesh that remains after cuts, or None."""
+        """Set the level of detail, and the part of the asset's mesh that cuts have left (None if uncut)."""
         self.part, self.level = part, level
         self.topology_version += 1
 

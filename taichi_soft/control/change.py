@@ -36,7 +36,7 @@ def mark_modified(body: SoftBody) -> None:
 
 
 def numbers(*values: Any) -> Rows32:
-    """Concatenate numbers and vectors to one float32 array, for kernels."""
+    """Concatenate numbers and vectors into one float32 array, for kernels."""
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
 
 

@@ -1,6 +1,6 @@
 """Change the material of a moving body gradually, so that a stiffer material adds no energy.
 
-A sudden change to a stiffer material would increase the strain energy of a deformed body and fling it away.
+A sudden change to a stiffer material would increase the strain energy of a deformed body and accelerate it.
 The constants therefore follow k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance decreases as a
 parabola, and a loaded body moves to its new shape with constant deceleration. While k grows, vibrations are
 damped like k^-`FADING`: the energy of a mode that is faster than the change follows k^(1/2 - FADING).
@@ -53,7 +53,7 @@ class Easing:
 
     constants: Floats  # present values in the fields: see `_constants`
     ratio: float  # largest ratio of final to initial stiffness of all elements
-    seconds: float  # duration
+    seconds: float  # duration of the change [s]
     passed: float = 0.0  # elapsed time [s]
 
     @property

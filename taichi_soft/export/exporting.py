@@ -30,7 +30,7 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.world import World, context_of_world, force_field_of
 
 WORLD, KERNELS = "world.tsw", "kernels"
-"""Names of the world file and of the kernels in the folder."""
+"""Names of the world file, and of the folder with the machine code of the kernels."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Manifest: the state of a world outside its fields, as plain data. It has time, bodies and slices."""
+"""Manifest: the state of a world outside its fields, as plain data. It contains time, bodies and slices."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _remove(context: WorldContext, state: State, body: SoftBody) -> None:
 
 
 def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) -> SoftBody:
-    """Insert a body into a free slot. Return its handle, which a caller can have already, or a new one."""
+    """Insert a body into a free slot. Return its handle: the one that a caller has, or a new one."""
     asset = context.slots.assets[slot]
     if entry.part is not None or context.layout.bodies[slot] is not asset.levels[entry.level].arrays:
         refill_slot(context, state, slot, entry.level, entry.arrays)

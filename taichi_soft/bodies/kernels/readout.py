@@ -44,7 +44,7 @@ def write_motion(
     positions: ti.types.ndarray(ndim=2),
     velocities: ti.types.ndarray(ndim=2),
 ):
-    """Set the positions [m] and velocities [m/s] of one body's particles, both at the same time."""
+    """Set the positions [m] of one body's particles, and their velocities [m/s] at that time."""
     i = 0
     while i < positions.shape[0]:
         p = state.particle_of_vertex[state.body_particles[body][0] + i]

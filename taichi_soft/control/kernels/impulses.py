@@ -1,6 +1,7 @@
 """Impulses on particles between two steps, as immediate changes of velocity.
 
-Leapfrog stores velocities half a substep earlier than positions; the change is added to these.
+Leapfrog stores velocities half a substep earlier than positions; the change is added to the stored
+velocities.
 """
 
 from taichi_soft.bodies.status import ABSENT

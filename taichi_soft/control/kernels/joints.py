@@ -67,7 +67,7 @@ class JointFields(FieldGroup):
     impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
-    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # of the row's impulse
+    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # fraction of the impulse
     # Impulse on the first end in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap

@@ -106,7 +106,7 @@ def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.templa
 
 @ti.func
 def row_of(rows, i):
-    """Row i of a matrix (4, 3) as a vec3; i can be known only at run time."""
+    """Row i of a matrix (4, 3) as a vec3. The index i need not be known at compile time."""
     return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
 
 

@@ -9,7 +9,7 @@ from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, part
 from taichi_soft.elements.laws.force_model import cauchy_stress
 
 NO_LIMIT = 1e30
-"""Stress limit that means no limit [Pa]; not infinity, which fast-math compilers can assume away."""
+"""Stress that means no limit [Pa]; not infinity, which fast-math compilers assume not to occur."""
 
 
 @ti.func

@@ -143,7 +143,7 @@ def _mixed_cofactor(M, N):
 def pair_stiffness(F, gi, gj, stress, stiffness):
     """- d f_i / d x_j of two vertices [N/m], as columns, for forces -V F S g_i with S = `green_stress`.
 
-    They are F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of vertex i to strain.
+    The matrix is F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of vertex i to strain.
     Args:
         gi, gj: rows of A^-1 of the vertices, times the root of the rest volume.
         stress: S, or the part of S to include, as columns.

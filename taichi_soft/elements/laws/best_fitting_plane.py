@@ -1,9 +1,10 @@
 """CMPM with the plane that best fits the particles around an edge (thesis section 4.4.2).
 
-For more than three particles, the plane is a least-squares fit; for three, the same formula gives their cross
-product. If there are two, the centre of the edge is the third point. Such planes are rarely perpendicular to
-their edge. As in CMPM2, the normal is therefore compared with its rest direction as carried by the
-tetrahedra. Implicit Euler keeps the normal fixed and compares it with the edge itself (`bond_stiffness`).
+For more than three particles, the plane is a least-squares fit; for three, the same formula gives the plane
+through them. If there are two, the centre of the edge is the third point. Such planes are rarely
+perpendicular to their edge. As in CMPM2, the normal is therefore compared with its rest direction as carried
+by the tetrahedra. Implicit Euler keeps the normal fixed and compares it with the edge itself
+(`bond_stiffness`).
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ class Bonds:
         ring_weights: (r, 4), with a meaning that depends on the law.
         normals: (k, 3) unit normal at rest of the plane that separates tension from shear; NaN without one.
         masses: (n,) [kg], if the law distributes mass differently from the mesh; else None.
-        expansion_modulus: (m,) [Pa], pressure of each tetrahedron on its edges per dV / V0; None without.
+        expansion_modulus: (m,) [Pa], pressure of each tetrahedron on its edges per dV / V0, or None.
     """
 
     constants: Floats

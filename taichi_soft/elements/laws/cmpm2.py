@@ -33,8 +33,8 @@ def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
     """Weights (r, 3) of an edge's far end and of the two sides of a subface in the carried direction.
 
     In each tetrahedron, a direction d at rest becomes F d = sum (A^-1 d)_i (x_i - x_0) (eq. 6.3), here with
-    the edge's first end as x_0. Summed over the rows of an edge, they give the weighted mean over its
-    tetrahedra.
+    the edge's first end as x_0. Summed over the rows of an edge, the weights give the weighted
+    mean over its tetrahedra.
     """
     mesh = rings.mesh
     x = mesh.vertices

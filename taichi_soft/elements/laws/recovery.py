@@ -4,8 +4,7 @@ Laws with Hooke's stress can hardly restore a tetrahedron that is pressed flat: 
 deformed area, and only the area across the thinnest axis remains. They have no restoring force for a flipped
 tetrahedron. It therefore gets a separate energy in the principal stretches s0 >= s1 >= -s2 > 0 of F,
 
-    psi = M/2 ((s0 - 1)^2 + (s1 - 1)^2) + phi(s2),   phi' = M (s2 - 1), but with a steep ramp from 0 at s2 =
-    0,
+    psi = M/2 ((s0 - 1)^2 + (s1 - 1)^2) + phi(s2),   phi' = M (s2 - 1) after a steep ramp from 0 at s2 = 0,
 
 where M = lambda + 2 mu is the modulus of pressure waves. Without the ramp, psi is M/2 |F - R|^2 with the
 nearest rotation R: corotated elasticity without lateral contraction. Lateral contraction would invert a

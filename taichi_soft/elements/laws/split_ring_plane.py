@@ -43,8 +43,7 @@ def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:
 
 
 def split_ring_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Return the bonds of a mesh. A ring row has a particle, and weights of `carried_by_ring` and both
-    splits.
+    """Return the bonds of a mesh. A ring row has a particle, `carried_by_ring` weights and `split_weights`.
 
     Raises: MeshError if the two vectors of an edge are parallel, so that they span no plane.
     """

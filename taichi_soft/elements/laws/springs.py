@@ -9,7 +9,7 @@ from taichi_soft.elements.materials import Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
 
 TINY = 1e-30
-"""Offset of squared lengths [m^2], far below any of them: faster than a maximum."""
+"""Offset of squared lengths [m^2], far below any squared length: faster than a maximum."""
 
 
 @ti.func

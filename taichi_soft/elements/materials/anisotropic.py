@@ -105,7 +105,7 @@ class AnisotropicMaterial:
         """Return the material of a subset of the tetrahedra.
 
         Args:
-            rows: numbers of the tetrahedra, (k,).
+            rows: indices of the tetrahedra, (k,).
         """
         lists = {"density": 1, "damping": 1, "frame": 3}
         given = {
@@ -134,7 +134,7 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
     """Return a frame for each direction whose first axis points along it, for fibres.
 
     Args:
-        directions: (m, 3), of any length but zero.
+        directions: directions of the fibres, (m, 3), of any length except zero.
     Returns: rotation matrices, (m, 3, 3), with the smallest possible angles. Use them for the `frame` of an
         `AnisotropicMaterial` with `Stiffness.one_axis`.
     Raises: MaterialError for a direction that is zero.

@@ -120,7 +120,7 @@ class Material:
         """Return the material of a subset of the tetrahedra.
 
         Args:
-            rows: numbers of the tetrahedra, (k,).
+            rows: indices of the tetrahedra, (k,).
         """
         given = {name: getattr(self, name) for name in CONSTANTS}
         return replace(self, **{name: value[rows] for name, value in given.items() if np.ndim(value) == 1})

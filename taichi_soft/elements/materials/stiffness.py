@@ -221,7 +221,7 @@ class Stiffness:
         """Return the Young's modulus of a bar that is cut along `direction` [Pa].
 
         Args:
-            direction: axis of the bar, (3,), of any length but zero.
+            direction: axis of the bar, (3,), of any length except zero.
         """
         n = as_array(direction, "direction", (3,))
         length = float(np.linalg.norm(n))
