@@ -1,1 +1,1 @@
-"""Bodies: assets, layout, fields, and quantities that follow from their material."""
+"""Bodies: assets, layout, fields, and quantities derived from material and state."""

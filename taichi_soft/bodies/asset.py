@@ -1,4 +1,4 @@
-"""Assets: the data that all bodies of one kind share, made once and placed many times."""
+"""Soft-body assets: the data that all bodies of one kind share."""
 
 from __future__ import annotations
 
@@ -61,49 +61,50 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 DAMPING_INTERVAL = 0.5
-"""Interval between two dampings of vibrations, over the time in which the first mode turns by one radian:
-about 12 dampings per period."""
+"""Longest interval between two dampings of vibrations, times the angular frequency of the first mode: about
+12 dampings per period."""
 
 MAX_BOX_DIFFERENCE = 0.25
-"""Largest difference between the bounding boxes of a level of detail and the finest, in sizes of the body."""
+"""Largest distance between sides of the bounding boxes of a level of detail and the finest level, relative to
+the longest side of the finest level's box."""
 
 
 @dataclass(frozen=True, eq=False)
 class SoftBodyAsset:
-    """A kind of body, immutable: the data that its bodies in all worlds share.
+    """Immutable data of one kind of body, shared by its bodies in all worlds.
 
     Args:
         mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs".
         material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
-        law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
-            along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
+        law: one of `LAWS`. Laws on tetrahedra: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff",
+            "neo_hookean". Laws along edges: "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
             "best_fitting_plane", "split_ring_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
-            None: "neo_hookean"; "virial" if `strain` or other `flips` are given, or for an
-            `AnisotropicMaterial`; "springs" for a `SpringMaterial`.
+            None: "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial`, with `strain`, or
+            with `flips` other than "recover"; else "neo_hookean".
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
-        flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None: the
-            law's default. The energy of a law determines its own value, and no other is accepted.
+        flips: "tolerant" (as in the thesis, a mirrored tetrahedron is at rest too), "recover" or "off"; None:
+            the law's default. A law with an energy accepts only its own value.
         damping_model: "edge" (eq. 3.9) or "tet_mean" (rejected in section 6.4, because it stops rotation).
         pinned: vertices that stay in place.
-        contact: contact properties of its surface, in a world with colliders or soft contact.
-        spare_vertices: room for copies of vertices that `Body.cut` splits; 0 for a body that is not cut.
-            Needs a law on tetrahedra. A cut through a body of n vertices needs about n^(2/3).
+        contact: contact properties of the surface, used in a world with colliders or soft contact.
+        spare_vertices: number of vertices that cuts and tears can add; 0 for a body that is never cut. Needs
+            a law on tetrahedra. A cut through a body of n vertices adds about n^(2/3).
         plasticity: permanent deformation; None for none. Needs a law on tetrahedra and a `Material`.
-        tearing: strength at which it tears, using its spare vertices; None for no tearing. Needs a
+        tearing: strength above which the body tears; None for no tearing. Needs spare vertices and a
             `Material`.
-        skin: surface that is drawn instead of its own, as for `read_surfaces`: a file, a trimesh.Trimesh or
-            Scene. See `Body.render_meshes`.
-        hull: contact surface instead of that of its tetrahedra. A number (12 to 20,000), or True for a
-            suitable one, makes a hull of as many points of its skin and triangles between them. A surface, as
-            for `read_surfaces`, gives its own vertices and triangles. None: the surface of the tetrahedra.
-            See docs/artists-mesh.md. Needs tetrahedra; not possible with spare vertices or self-contact.
-        coarser: assets of the same body with fewer and fewer tetrahedra, as `with_coarser` makes them: levels
-            of detail for `Body.set_level`. Not possible with spare vertices or plasticity.
+        skin: surface to draw instead of the surface of the tetrahedra: a file, a trimesh.Trimesh or a Scene,
+            as for `read_surfaces`. See `Body.render_meshes`.
+        hull: contact surface. None: the surface of the tetrahedra. A number (12 to 20,000): that many points
+            of the skin, with triangles between them; True chooses the number. A surface, as for
+            `read_surfaces`: its vertices and triangles. See docs/artists-mesh.md. Needs tetrahedra; not
+            possible with spare vertices or self-contact.
+        coarser: levels of detail for `Body.set_level`: assets of the same body, each with fewer tetrahedra
+            than the one before, as `with_coarser` makes them. Not possible with spare vertices or plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
     Example:
         crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
         arena = World()
-        arena.reserve(crate, 10)  # room for ten of them
+        arena.reserve(crate, 10)  # slots for ten crates
     """
 
     mesh: BodyMesh
@@ -146,7 +147,7 @@ class SoftBodyAsset:
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
-        _ = description.bonds  # computed now, because a pairwise law can refuse the mesh
+        _ = description.bonds  # computed now, because a pairwise law can reject the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
@@ -157,7 +158,7 @@ class SoftBodyAsset:
         object.__setattr__(self, "coarser", self._checked_levels(self.coarser))
 
     def _checked_levels(self, coarser: object) -> tuple[SoftBodyAsset, ...]:
-        """Check levels of detail of this asset. Raises: OptionError, MeshError."""
+        """Check and return the levels of detail of this asset. Raises: OptionError, MeshError."""
         if not isinstance(coarser, (tuple, list)) or not all(
             isinstance(each, SoftBodyAsset) for each in coarser
         ):
@@ -187,7 +188,7 @@ class SoftBodyAsset:
         return tuple(coarser)
 
     def _require_coarser(self, before: SoftBodyAsset, asset: SoftBodyAsset, level: int) -> None:
-        """Check that a level is coarser than the one before, and of the same shape. Raises: MeshError."""
+        """Check that a level is coarser than the level before and has the same shape. Raises: MeshError."""
         room, needed = room_of(self.arrays, 0), room_of(asset.arrays, 0)
         if len(asset.mesh.tets) >= len(before.mesh.tets) or any(
             n > m for n, m in zip(needed, room, strict=True)
@@ -213,15 +214,15 @@ class SoftBodyAsset:
         return (self, *self.coarser)
 
     def with_coarser(self, *meshes: TetMesh) -> SoftBodyAsset:
-        """Return the asset with levels of detail of these meshes, each coarser than the one before.
+        """Return a copy of the asset with a level of detail for each of these meshes.
 
-        The materials of the levels are calibrated to the same mass and the same frequencies of the slowest
-        modes, which takes seconds for each.
+        The materials of the levels are calibrated so that mass and lowest frequencies are the same as for the
+        finest level. This takes seconds for each level.
         Args:
-            meshes: rest shapes with fewer and fewer tetrahedra.
+            meshes: rest shapes, each with fewer tetrahedra than the one before.
         Raises: MeshError for a mesh that is not coarser; MaterialError unless the material is a `Material`
             with one number for each constant; OptionError for spare vertices, tearing, plasticity or a law
-            along edges. All checks precede the calibration.
+            along edges.
         """
         material = self.material
         if not isinstance(material, Material) or any(
@@ -240,7 +241,7 @@ class SoftBodyAsset:
             pinned = np.unique((offsets**2).sum(axis=2).argmin(axis=0)) if offsets.shape[1] else ()
             levels.append(SoftBodyAsset(mesh, material, pinned=pinned, **plain))
         self._checked_levels(levels)
-        # After all checks, because it takes seconds.
+        # The calibration takes seconds, so all checks precede it.
         materials = calibrated(self.description, [each.description for each in levels])
         fitted = (
             replace(each, material=calibrated_material)
@@ -294,34 +295,35 @@ class SoftBodyAsset:
         """Make a body from an artist's mesh: a cage of tetrahedra with the mesh as its skin.
 
         The surface can have holes, flipped faces, inner walls and parts that overlap: see
-        `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
+        `taichi_soft.cages`. The body has the mass, centre and inertia of the solid that the surface encloses.
         Args:
             surface: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh or Scene, or
                 (vertices (n, 3) [m], triangles (m, 3)).
             material: material of the solid.
-            cells: number of cells of the cage along the longest side; 10 if neither this nor cell_size is
-                given. Several numbers, the largest first, make levels of detail: see `with_coarser`.
+            cells: number of cells of the cage along the longest side; 10 if neither `cells` nor `cell_size`
+                is given. Several numbers, the largest first, make levels of detail: see `with_coarser`.
             cell_size: edge of a cell [m], instead of `cells`.
-            method: method that makes the tetrahedra. "lattice" accepts every surface, needs no other package
-                and gives the longest substeps. Two others fill the surface, in a separate process: "ftetwild"
-                (extra `ftetwild`: fTetWild, MPL-2.0) follows it within a twentieth of a cell, and differs
-                from run to run. "tetgen" (extra `tetgen`) keeps every triangle of a closed surface. TetGen's
-                licence is the AGPL: it requires the source of everything that is shipped or served with it.
-            time_limit: time after which such a process is killed [s]; None: 120.
-            refine: for "lattice", the largest number of halvings of cells around limbs and sheets that would
-                be left out, thinner than about a sixteenth of a cell: 0 to 3; None: 1. Each halving also
-                halves the substep. Parts that are still left out are drawn, but neither bend nor collide.
-                Both are logged, with the `cell_size` that keeps the parts.
+            method: mesher. "lattice" accepts every surface, needs no other package and gives the longest
+                substeps. "ftetwild" and "tetgen" fill the surface in a separate process. "ftetwild" (extra
+                `ftetwild`: fTetWild, MPL-2.0) follows the surface within a twentieth of a cell, and its
+                result differs from run to run. "tetgen" (extra `tetgen`) keeps every triangle of a closed
+                surface. TetGen's licence, the AGPL, requires you to publish the source of everything that
+                you ship or serve with it.
+            time_limit: time after which the process of "ftetwild" or "tetgen" is killed [s]; None: 120.
+            refine: for "lattice", how often cells can be halved around limbs and sheets thinner than about a
+                sixteenth of a cell, which the cage would otherwise omit: 0 to 3; None: 1. Each halving also
+                halves the substep. Parts that are still omitted are drawn, but neither bend nor collide. The
+                log reports halvings and omitted parts, with the `cell_size` that keeps the parts.
             up: axis that points up in the file, "y" or "z"; None: "y" for .glb, .gltf and .obj, and "z" for
                 all others, as most programs write.
-            center: move the centre of the bounding box to the origin. A file that lies kilometres away from
-                it (geographic coordinates) needs this, because positions are 32-bit numbers.
-            scale: factor from the unit of the file to metres: 0.001 for millimetres.
+            center: True moves the centre of the bounding box to the origin. Files in geographic coordinates,
+                kilometres away from the origin, need this because positions are 32-bit numbers.
+            scale: length of the file's unit [m]: 0.001 for millimetres.
             options: further arguments of `SoftBodyAsset`. A `skin` is drawn instead of the surface.
-        Assumptions about the file, repairs and omissions are logged (logger `taichi_soft`).
+        The logger `taichi_soft` reports assumptions about the file, repairs and omissions.
         Raises: MeshError, with a suggested fix, for a surface that cannot be read or encloses nothing, and
             for a process that crashes or takes too long; OptionError for cells out of range, with the memory
-            that they would need; MissingExtraError without the package of the method.
+            that they would need; MissingExtraError if the package of the method is not installed.
         Example:
             duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
             print(duck.mesh.quality.summary())
@@ -372,7 +374,7 @@ class SoftBodyAsset:
 
     @cached_property
     def arrays(self) -> BodyArrays:
-        """The body in kernel order: slow to make, and made once."""
+        """The body in kernel order; slow to compute, so it is cached."""
         arrays, hull = arrange(self.description), self.bound_hull
         if hull is None:
             return arrays
@@ -380,7 +382,7 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Positions of the points that touch colliders, for vertices at `x`.
+        """Positions of the points that can touch colliders, (k, 3) [m]: of the hull, else of the surface.
 
         Args:
             x: positions of the vertices, (n, 3) [m].
@@ -388,9 +390,7 @@ class SoftBodyAsset:
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
-        return np.asarray(
-            (hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1)
-        )  # in the order of corners
+        return np.asarray((hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1))
 
     @cached_property
     def stable_step(self) -> StableStep:
@@ -399,22 +399,22 @@ class SoftBodyAsset:
 
     @cached_property
     def first_frequency(self) -> float:
-        """Angular frequency of the slowest vibration of the free body [rad/s], too high by less than a fifth.
+        """Angular frequency of the slowest vibration of the free body [rad/s], at most 20 % too high.
 
-        It is 0 for ropes and cloth, which bend freely.
+        0 for ropes and cloth, which bend freely.
         """
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
-        """Estimate of `first_frequency` that is faster to compute; 0 also for pairwise laws."""
+        """Estimate of `first_frequency` [rad/s], faster to compute; 0 for pairwise laws too."""
         return guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
-        """Decay of vibrations of a body of this asset: rate [1/s], and longest interval of damping [s].
+        """Decay rate of vibrations [1/s] of a body of this asset, and longest interval between dampings [s].
 
-        The body can be cut or have another material: its frequency is then scaled by the square root of its
-        mean stiffness over its mass.
+        The body can be cut or have another material: the frequency of its first mode is then scaled by the
+        square root of its mean stiffness over its mean density.
         Args:
             body: description of that body.
         """
@@ -431,7 +431,7 @@ class SoftBodyAsset:
         and `vibration_row`.
 
         Args:
-            is_implicit: True for implicit Euler, whose substeps have any length: the stride is 0.
+            is_implicit: True for implicit Euler, which has no largest stable substep: the stride is then 0.
         """
         speed = self.description.sound_speed
         stride = 0.0 if is_implicit else self.stable_step.recommended * speed
@@ -441,7 +441,8 @@ class SoftBodyAsset:
     def surface_row(self) -> tuple[float, float, float]:
         """Friction, thickness [m] and mean edge [m] of the contact surface.
 
-        It is the hull, else the surface, else all edges if there are no triangles.
+        The contact surface is the hull if there is one, else the surface. Without triangles, the mean is over
+        all edges.
         """
         corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
         ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
@@ -475,13 +476,13 @@ class SoftBodyAsset:
         angular_velocity: ArrayLike,
         floor: float | None,
     ) -> Floats32:
-        """Position, velocity, inverse mass and mass of each vertex of a body that starts there, (n, 8).
+        """Position, velocity, inverse mass and mass of each vertex of a body placed in a world, (n, 8).
 
         Args:
             position, rotation, velocity, angular_velocity: as for `World.spawn`.
             floor: height of the floor [m], or None.
-        Raises: OptionError for bad values, a vertex that is too fast, and a position out of range or below
-            the floor, which would crush the body.
+        Raises: OptionError for bad values, a vertex that is too fast, or a position that is out of range or
+            below the floor.
         """
         origin, rotation_matrix = as_vector(position, "position", "m"), as_rotation(rotation)
         start_velocity = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
@@ -528,7 +529,7 @@ def _are_same(skin: tuple[Surface, ...], other: tuple[Surface, ...]) -> bool:
 
 
 def _mean_stiffness(body: BodyDescription) -> float:
-    """Mean stiffness of a body over its mean density, up to a constant factor [m^2/s^2]."""
+    """Mean stiffness of a body divided by its mean density, up to a constant factor [m^2/s^2]."""
     mesh, material = body.mesh, body.material
     assert isinstance(mesh, TetMesh)
     assert isinstance(material, Material | AnisotropicMaterial)

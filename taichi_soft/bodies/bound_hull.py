@@ -1,10 +1,10 @@
-"""Hull of a body, bound to the tetrahedra of its cage: points of the artist's surface that make its contacts.
+"""Hull of a body, bound to the tetrahedra of its cage: points of the artist's surface that make contact.
 
 A point has weights w in the four vertices of a tetrahedron, x = sum_i w_i x_i, and moves with them. An
 impulse P at the point is w_i P at each vertex, so its inverse mass is sum_i w_i^2 / m_i. Momentum and angular
 momentum are conserved, because the impulses w_i P at x_i are equivalent to P at x.
 
-A point outside of the cage follows the nearest tetrahedron, extrapolated beyond its faces.
+A point outside the cage follows the nearest tetrahedron, extrapolated beyond its faces.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
 
 MIN_WEIGHT = -2.0
-"""Smallest weight: a point lies in a tetrahedron enlarged ninefold about its centre, or is moved there. An
-impact on a point farther out would move the nearest vertices by many times the displacement of the point."""
+"""Smallest weight. It confines a point to its tetrahedron enlarged ninefold about the centre. An impact on a
+point farther out would move the nearest vertices by many times the displacement of the point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class BoundHull:
     """Binding of a hull to a mesh, shared by all bodies of an asset."""
 
     vertices: Ints32  # (h, 4), vertices of the mesh that carry each point
-    weights: Floats  # (h, 4), of these vertices; they sum to 1
+    weights: Floats  # (h, 4), weights of these vertices, which sum to 1
     points: Floats  # (h, 3), positions at rest [m]
     triangles: Ints32  # (t, 3), indices of points
 
@@ -46,14 +46,14 @@ class BoundHull:
 
 
 def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
-    """Bind a hull to a mesh at rest.
+    """Bind a hull to a mesh at rest, and return the binding.
 
-    Raises: MeshError if most points are too far from the mesh to be of the same body.
+    Raises: MeshError if most points are too far from the mesh to belong to the same body.
     """
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
     offset = barycentric(hull.points, corners) - nearest
-    # As far from the nearest point of the mesh as weights allow; float32 rounds their sum to 1 later.
+    # Fraction of the offset from the mesh that `MIN_WEIGHT` allows.
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(offset < 0.0, (MIN_WEIGHT - nearest) / offset, np.inf).min(axis=1)
     clamped_count = int((allowed < 1.0).sum())

@@ -1,9 +1,10 @@
-"""Calibrate the material of a coarser mesh to the mass and the frequencies of a finer one.
+"""Calibrate the material of a coarser mesh to the mass and frequencies of a finer mesh.
 
-A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. Young's modulus of each of
-its tetrahedra is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995): for a
-mode u with u^T M u = 1, the part of tetrahedron t in u^T K u is the sensitivity of the squared frequency to
-its modulus. Among all moduli with the right frequencies, those with the smallest change are chosen.
+A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. The Young's modulus of
+each tetrahedron is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995): for a
+mode u with u^T M u = 1, the contribution of tetrahedron t to u^T K u is the sensitivity of the squared
+frequency to the logarithm of its modulus. Of all moduli that give the target frequencies, the update chooses
+those with the smallest change.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ MODES = 4
 """Number of modes whose frequencies must agree: the slowest ones dominate the visible wobble."""
 
 MODE_TOLERANCE = 2e-3
-"""Relative change of squared frequencies at which modes have converged."""
+"""Relative change of the squared frequencies below which the modes count as converged."""
 
 TOLERANCE = 0.01
-"""Relative error of the frequencies at which the update ends."""
+"""Relative error of the frequencies below which the updates end."""
 
 WARNING_ERROR = 0.05
 """Relative error of the frequencies above which a warning is logged."""
@@ -43,25 +44,25 @@ RCOND = 0.1
 that no modulus can separate, such as the two bending modes of a round bar."""
 
 MAX_CHANGE = 3.0
-"""Largest factor between a modulus and the median of all: beyond it, the body would be of another kind."""
+"""Largest ratio between a modulus and the median of all moduli: more would make a visibly different body."""
 
 
 def calibrated(fine: BodyDescription, coarser: Sequence[BodyDescription]) -> list[Material]:
     """Return the materials that give coarser bodies the mass and the lowest frequencies of `fine`.
 
-    Args: bodies of one material with a number for each constant.
-    Returns: materials with a Young's modulus for each tetrahedron.
+    Args: fine, coarser: bodies of one material that has one number for each constant.
+    Returns: for each coarser body, a material with a Young's modulus for each tetrahedron.
     """
     target, _ = lowest_modes(fine, MODES, MODE_TOLERANCE)
     return [_fitted(target, fine.masses.sum(), each) for each in coarser]
 
 
 def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
-    """Material with which `coarse` has these angular frequencies [rad/s] and this mass [kg]."""
+    """Return the material that gives `coarse` the angular frequencies `target` [rad/s] and this mass [kg]."""
     material = coarse.material
     assert isinstance(material, Material)
     density = material.density * mass / coarse.masses.sum()
-    factors = np.zeros(len(coarse.mesh.tets))  # logarithms
+    factors = np.zeros(len(coarse.mesh.tets))  # logarithms of the factors of the modulus
     best, smallest_error = coarse.material, np.inf
     for _ in range(MAX_UPDATES):
         young = material.young * np.exp(factors)
@@ -75,7 +76,7 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
         if error < TOLERANCE:
             break
         sensitivities = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
-        # A common factor first, because the least-squares solution would distribute it unevenly.
+        # The common factor is separate, because the least-squares solution would distribute it unevenly.
         common = gaps.mean()
         factors += common + np.linalg.pinv(sensitivities, rcond=RCOND) @ (gaps - common)
         median = np.median(factors)

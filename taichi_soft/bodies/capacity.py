@@ -8,11 +8,11 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.field_table import BLOCK, BODY, EDGE, OUTER, PARTICLE, RING, TRIANGLE, WORLD
 
 ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
-"""Numbers of a `Capacity` that can be larger than needed without any effect."""
+"""Attributes of a `BodyCapacity` that can be larger than needed without any effect."""
 
 
 LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
-"""Smallest capacity of a world; the last two in worlds with contact."""
+"""Smallest capacity of a world. "colliders" and "samples" apply to worlds with contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 
@@ -27,12 +27,12 @@ class BodyCapacity:
     bodies: int
     triangles: int
     outer: int
-    parallel: bool  # room for the forces of all corners and edges at once, for the flat schedule
+    parallel: bool  # room for the forces of all corners and edges, for the flat schedule
     rings: int = 0  # rows of edge rings; 0 if no edges carry elastic forces
     implicit: bool = False  # room for the linear system of implicit integration
     anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
     plastic: bool = False  # room for the original rest shapes of plastic bodies
-    double: bool = False  # float64 instead of float32: to evaluate forces without motion
+    double: bool = False  # float64 instead of float32, to evaluate forces without motion
 
     @classmethod
     def of(
@@ -45,8 +45,9 @@ class BodyCapacity:
         double: bool = False,
         **others: Any,
     ) -> Room:
-        """Capacity for `scene`. The lanes of its last body read beyond its particles and triangles.
+        """Return the capacity for `scene`, with `LANES` spare particles and triangles.
 
+        Vector code reads these beyond the last body.
         Args: others: values that a subclass adds, by name.
         """
         return cls(
@@ -72,17 +73,17 @@ class BodyCapacity:
 
     @property
     def solves_bonds(self) -> bool:
-        """Whether implicit integration solves for edges that carry elastic forces."""
+        """True if implicit integration solves for edges that carry elastic forces."""
         return self.implicit and self.rings > 0
 
     @property
     def names_edges(self) -> bool:
-        """Whether tetrahedra know their edges."""
+        """True if the fields store the edges of each tetrahedron."""
         return self.implicit or self.rings > 0
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of rows, by what `declare` names."""
+        """Number of rows for each group of fields, by the names that `declare` uses."""
         return {
             WORLD: 1,
             PARTICLE: self.particles,
@@ -95,11 +96,11 @@ class BodyCapacity:
         }
 
     def has_room_for(self, other: "BodyCapacity") -> bool:
-        """True if a state of this capacity has the fields of one of `other`, none of them shorter."""
+        """True if a state of this capacity has all fields of a state of capacity `other`, none shorter."""
         widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
         return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
 
 
 def room_for(count: int, name: str) -> int:
-    """Smallest power of two that is at least `count` and `LEAST`."""
+    """Return the smallest power of two that is at least `count`, but not less than `LEAST[name]`."""
     return max(LEAST[name], 1 << max(count - 1, 0).bit_length())

@@ -9,8 +9,7 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.serialisation import serialised
 
 DEFAULT_THICKNESS = 0.02
-"""Default thickness over the mean edge of the surface: too thin to be seen, and the search finds contacts
-well before."""
+"""Default thickness relative to the mean edge of the surface: too thin to be visible."""
 
 
 @serialised("friction", "thickness", "itself", "group", "mask")
@@ -19,13 +18,13 @@ class Contact:
     """Contact properties of a body's surface.
 
     Args:
-        friction: Coulomb coefficient, 0 or more. Two bodies use the geometric mean of theirs; a body and a
-            collider use the collider's.
-        thickness: thickness of a layer on the surface [m]: two bodies keep apart by the mean of theirs. None:
-            2 % of the mean edge of the surface.
+        friction: Coulomb coefficient, 0 or more. Between two bodies, the geometric mean of their coefficients
+            applies; between a body and a collider, the collider's coefficient.
+        thickness: thickness of a layer on the surface [m]. The distance kept between two bodies is the mean
+            of their thicknesses. None: 2 % of the mean edge of the surface.
         itself: True for self-contact, between parts of the body that are more than 1.5 edges apart at rest.
-        group, mask: bits. Two bodies, or a body and a collider, collide if each one's mask has a bit of the
-            other's group.
+        group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each shares a
+            bit with the group of the other.
     Raises: OptionError for a value out of range.
     """
 

@@ -1,4 +1,4 @@
-"""State of an asset's mesh after cuts: a few numbers, from which everything else can be rebuilt."""
+"""State of an asset's mesh after cuts, as the few numbers from which everything else can be rebuilt."""
 
 from __future__ import annotations
 
@@ -24,35 +24,35 @@ Ints = NDArray[np.int64]
 class CutMesh:
     """A subset of the tetrahedra of an asset's mesh, and copies of its vertices."""
 
-    vertices: Ints  # (n,), vertex of the asset's mesh that each vertex is or copies
+    vertices: Ints  # (n,), vertex of the asset's mesh for each vertex, which is the same or a copy
     order: NDArray[np.int32]  # (n,), order of the vertices in the kernels
     tets: Ints  # (m,), tetrahedra of the asset's mesh
     corners: NDArray[np.int32]  # (m, 4), vertices of each tetrahedron
 
     @cached_property
     def rows(self) -> NDArray[np.int32]:
-        """All arrays in one, (2 n + 5 m,)."""
+        """All four arrays concatenated, (2 n + 5 m,)."""
         parts = (self.vertices, self.order, self.tets, self.corners.ravel())
         return np.concatenate(parts).astype(np.int32)
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the rows."""
+        """Hash of `rows`, in hexadecimal."""
         return blake2b(self.rows.astype("<i4").tobytes(), digest_size=8).hexdigest()
 
     @property
     def summary(self) -> list[Any]:
-        """Numbers of vertices and tetrahedra, and the digest."""
+        """Number of vertices, number of tetrahedra, and the digest."""
         return [len(self.vertices), len(self.tets), self.digest]
 
     @classmethod
     def of_rows(cls, rows: NDArray[np.int32], n: int, m: int) -> CutMesh:
-        """Rebuild a mesh from its `rows`."""
+        """Rebuild a mesh with n vertices and m tetrahedra from its `rows`."""
         vertices, order, tets, corners = np.split(rows, [n, 2 * n, 2 * n + m])
         return cls(vertices.astype(np.int64), order, tets.astype(np.int64), corners.reshape(m, 4))
 
     def require_part_of(self, asset: SoftBodyAsset) -> None:
-        """Check that cuts of an asset's mesh can have left it. Raises: ValueError."""
+        """Check that this mesh can result from cuts of an asset's mesh. Raises: ValueError."""
         mesh, n = asset.mesh, len(self.vertices)
         if asset.spare_vertices == 0 or not isinstance(mesh, TetMesh) or n == 0 or len(self.tets) == 0:
             raise ValueError("a body is cut that cannot be cut")
@@ -71,7 +71,7 @@ class CutMesh:
             raise ValueError("a cut body is not a part of its mesh")
 
     def describe(self, asset: SoftBodyAsset, material: Any) -> BodyDescription:
-        """Describe a body of this mesh."""
+        """Return the description of a body with this mesh and `material`."""
         original = asset.description
         assert isinstance(original.mesh, TetMesh)
         mesh = original.mesh.part(self.vertices, self.corners, self.tets)
@@ -79,10 +79,10 @@ class CutMesh:
         return BodyDescription(mesh, material, original.model, pinned)
 
     def arrange(self, asset: SoftBodyAsset, description: BodyDescription) -> BodyArrays:
-        """Arrange a body of this mesh in kernel order."""
+        """Return the arrays of a body with this mesh, in kernel order."""
         return arrange_part(description, asset.arrays, self.vertices, self.tets, self.order)
 
 
 def name_of(part: CutMesh | None) -> str:
-    """Digest of a cut mesh; "" for an uncut one."""
+    """Return the digest of a cut mesh; "" for None, an uncut mesh."""
     return "" if part is None else part.digest

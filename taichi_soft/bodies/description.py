@@ -1,4 +1,4 @@
-"""Physical description of a body in the order of its vertices: masses, constants, rest shape."""
+"""Physical description of a body in the caller's order: masses, constants, rest shape."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SHORTEST_EDGE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription:
-    """One kind of body, independent of position and motion."""
+    """Mesh, material and force model of a body, independent of position and motion."""
 
     mesh: BodyMesh
     material: AnyMaterial
@@ -55,7 +55,7 @@ class BodyDescription:
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
 
     def per_tet(self, name: str) -> Floats:
-        """A constant of the material for each tetrahedron, times its solid fraction, (m,)."""
+        """Return a constant of the material for each tetrahedron, times its solid fraction, (m,)."""
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
         assert isinstance(self.mesh, TetMesh)
@@ -76,8 +76,8 @@ class BodyDescription:
     def sound_speed(self) -> float:
         """Speed of the fastest waves at rest [m/s].
 
-        It is the largest sqrt((lambda + 2 mu) / density) of the tetrahedra, or the largest a sqrt(k / m) of
-        given springs, with their length a.
+        The largest sqrt((lambda + 2 mu) / density) of the tetrahedra. For springs between given particles,
+        the largest a sqrt(k / m), with the length a and the smaller mass m of the two ends.
         """
         mesh, material = self.mesh, self.material
         if isinstance(material, SpringMaterial):
@@ -138,9 +138,9 @@ def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
 
 
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
-    """Masses of the vertices, (n,) [kg]: a quarter of each adjacent tetrahedron's (thesis chapter 6).
+    """Masses of the vertices, (n,) [kg]: a quarter of each adjacent tetrahedron's mass (thesis chapter 6).
 
-    In a `CageMesh` they are those of the solid that the vertices carry.
+    A vertex of a `CageMesh` has the mass of the solid that it carries.
     """
     masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
     if isinstance(mesh, CageMesh):  # with the mean density of the adjacent tetrahedra

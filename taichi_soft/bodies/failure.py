@@ -1,4 +1,4 @@
-"""Failures of bodies that became non-finite."""
+"""Failures of bodies: records of when and where a body became non-finite."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Failure:
-    """Cause of the freezing of a body."""
+    """Time and place at which a body became non-finite and was frozen."""
 
-    body: int  # its slot
-    tetrahedron: int | None  # the first that failed, in the caller's order; None if unknown
+    body: int  # slot of the body
+    tetrahedron: int | None  # first tetrahedron that failed, in the caller's order; None if unknown
     step: int  # step of the world, counted from 0, that was undone for this body
-    substep: int | None  # within that step, or its finest retry
-    time: float  # [s], of the last valid state, in which the body now rests
-    edge: tuple[int, int] | None = None  # instead of a tetrahedron, for forces along edges
+    substep: int | None  # substep in that step, or in its last retry; None if unknown
+    time: float  # [s], time of the last valid state, in which the body now rests
+    edge: tuple[int, int] | None = None  # first edge that failed, for forces along edges
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class FailedStep:
     """The fixed step in which a body became non-finite."""
 
     step: int
-    time: float  # [s], before the step
-    substeps: int  # of the last retry
-    h: float  # [s]
-    is_braked: bool  # True if vibrations were braked in it
+    time: float  # [s], time before the step
+    substeps: int  # number of substeps of the last retry
+    h: float  # [s], length of a substep
+    is_braked: bool  # True if vibrations were braked in the step

@@ -1,4 +1,4 @@
-"""Slowest vibration of a free body, to which the damping ratio of its material refers."""
+"""Slowest vibration of a free body. The damping ratio of a material refers to its frequency."""
 
 from __future__ import annotations
 
@@ -15,34 +15,38 @@ from taichi_soft.core.residue import rounded
 Floats = NDArray[np.float64]
 
 _EXTRA_MODES = 3
-"""Modes computed beyond those requested: round bodies have several of one frequency."""
+"""Number of modes computed beyond those requested: round bodies have several modes of one frequency."""
 
 _CHUNK = 4
-"""Columns per product with the stiffness matrix: more do not fit into a processor's cache."""
+"""Columns per product with the stiffness matrix: more do not fit into the processor's cache."""
 
 _MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
-"""Number of iterations, and relative change of the squared frequency over them, at which the search ends by
-default. In long bodies and letters, a single iteration changes little long before the end."""
+"""The search ends when the relative change of the squared frequency over `_WINDOW` iterations is below
+`_CHANGE`. A single iteration can change little long before convergence, as in long bodies and letters."""
 
 _ROUND_OFF = 1e-9
-"""Length of a direction, relative to the longest, below which it is round-off: normalised, it would contain
-rigid motion. Bodies of few tetrahedra have no other directions left."""
+"""Length of a direction, relative to the longest, below which it is discarded as round-off. If normalised, it
+would contain rigid motion. Bodies of few tetrahedra soon have no other directions."""
 
 MAX_PARTS = 30
-"""Largest number of components whose rigid motions are removed. Bodies with more count as undamped."""
+"""Largest number of separate components whose rigid motions are removed. A body with more components
+counts as undamped."""
 
 
 def first_frequency(body: BodyDescription) -> float:
-    """Angular frequency of the slowest vibration of a free body [rad/s], too high by less than a fifth.
+    """Angular frequency of the slowest vibration of a free body [rad/s], at most 20 % too high.
 
-    It is 0 if there is none.
+    0 if the body cannot vibrate.
     """
     return first_mode(body)[0]
 
 
 def guessed_frequency(body: BodyDescription) -> float:
-    """Estimate of the same for tetrahedra by Ritz's method with polynomials: fast, and an upper bound."""
+    """Upper bound of the first angular frequency [rad/s], by Ritz's method with polynomials: fast.
+
+    0 for pairwise laws.
+    """
     if body.bonds is not None:
         return 0.0
     _, deformed = _polynomials(body)
@@ -55,7 +59,7 @@ def guessed_frequency(body: BodyDescription) -> float:
 def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:
     """Slowest vibration of a free body: angular frequency [rad/s], and shape (n, 3) with largest entry 1.
 
-    Both are 0 if there is none. The frequency is an upper bound.
+    Both are 0 if the body cannot vibrate. The frequency is an upper bound.
     Args: change: relative change of the squared frequency in 10 iterations at which the search ends.
     """
     frequencies, shapes = lowest_modes(body, 1, change)
@@ -67,9 +71,9 @@ def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, F
 def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floats, Floats]:
     """Slowest vibrations of a free body: angular frequencies [rad/s], ascending, and shapes (k, n, 3).
 
-    The squares of a shape weighted by mass sum to 1. There are fewer than `count` if the body has no more.
-    Ritz's method with polynomials of up to third order gives a first guess, which locally optimal block
-    conjugate gradients refine (Knyazev 2001). The frequencies are upper bounds.
+    The squares of a shape, weighted by mass, sum to 1. The result has fewer than `count` vibrations if the
+    body has no more. Ritz's method with polynomials of up to third order gives a first guess. The locally
+    optimal block conjugate gradient method refines it (Knyazev 2001). The frequencies are upper bounds.
     Args: change: relative change of the sum of squared frequencies in 10 iterations at which the search ends.
     """
     vibration = vibration_of(body)
@@ -101,7 +105,7 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
-    """K times the columns of u, (3n, k); a few at a time, which stay in a processor's cache."""
+    """Return K times the columns of u, (3n, k), a few columns at a time so that they stay in the cache."""
     parts = [u[:, k : k + _CHUNK] for k in range(0, u.shape[1], _CHUNK)]
     return np.hstack(
         [vibration.apply(part.reshape(-1, 3, part.shape[1])).reshape(part.shape) for part in parts]
@@ -109,7 +113,7 @@ def _applied(vibration: Vibration, u: Floats) -> Floats:
 
 
 def _ritz(directions: Floats, images: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """Slowest `count` vibrations in the span of directions (3n, k), whose images by K are given.
+    """Find the slowest `count` vibrations in the span of directions (3n, k); `images` are K times these.
 
     Returns: the vibrations, their images and their squared frequencies.
     """
@@ -148,8 +152,8 @@ def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
 def _rigid_motions(body: BodyDescription) -> Floats:
     """Orthonormal rigid motions (3n, k), times the root of the masses.
 
-    There are six for each of the `MAX_PARTS` largest components without shared vertices, as none strains
-    them.
+    Components that share no vertices move independently. The result contains six motions for
+    each of the `MAX_PARTS` largest components.
     """
     tets = body.mesh.tets
     part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))
@@ -176,7 +180,7 @@ def _centred(x: Floats, mass: Floats) -> Floats:
 
 
 def _displacements(amounts: Sequence[tuple[int, Floats]]) -> Floats:
-    """Displacements (3n, k), each by an amount (n,) along one axis."""
+    """Displacements (3n, k), one column for each pair of an axis and the amounts (n,) along it."""
     columns = np.zeros((len(amounts[0][1]), 3, len(amounts)))
     for k, (axis, amount) in enumerate(amounts):
         columns[:, axis, k] = amount

@@ -1,4 +1,4 @@
-"""Internal forces of a mesh without a world: for tests and material studies."""
+"""Internal forces of a mesh without a world, for tests and material studies."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ def internal_forces(
 ) -> NDArray[Any]:
     """Return the elastic and damping forces on every vertex of a deformed mesh [N].
 
-    They come from the functions of a running world, in the requested precision.
+    The functions of a running world compute them, in the requested precision.
     Args:
         mesh: mesh at rest.
         material: constants of the body.
         positions: deformed vertices, (n, 3) [m], in the mesh's order.
-        velocities: (n, 3) [m/s]; None leaves damping out.
+        velocities: velocities of the vertices, (n, 3) [m/s]; None: without damping forces.
         law, strain, flips, damping_model: as for `World.add_body`.
         dtype: float64 or float32, the precision of the computation.
-    Returns: (n, 3) of `dtype`.
+    Returns: forces, (n, 3) of `dtype`.
     Raises: OptionError for an unknown name or dtype; MeshError for arrays of the wrong shape.
     """
     model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
@@ -78,13 +78,13 @@ def force_gradient(
 ) -> NDArray[np.float64]:
     """Return the derivative of the elastic forces on a deformed mesh by its vertices, in float64.
 
-    It is exact, except for laws of chapter 4. For these, the normals of the planes stay fixed (thesis 4.2),
-    with an error of 0.1 to 0.6 by the sum of squares. "cmpm2", "best_fitting_plane" and "split_ring_plane"
-    compare directions. They use the matrix that "cmpm" would have for an edge with the same normal.
+    It is exact, except for the laws of chapter 4. For these, the normals of the planes stay fixed (thesis
+    4.2), with an error of 0.1 to 0.6 by the sum of squares. "cmpm2", "best_fitting_plane" and
+    "split_ring_plane" use the matrix that "cmpm" would have for an edge with the same normal.
     Args:
         mesh, material, positions, law, strain, flips: as for `internal_forces`.
-        projected: True for the matrix in implicit Euler's system, symmetric and negative semi-definite.
-    Returns: df/dx, (n, 3, n, 3) [N/m], as a dense array: for meshes of some hundred vertices.
+        projected: True for the symmetric, negative semi-definite matrix that implicit Euler uses.
+    Returns: df/dx, (n, 3, n, 3) [N/m], as a dense array, for meshes of a few hundred vertices.
     Raises: as for `internal_forces`.
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
@@ -97,10 +97,10 @@ def force_gradient(
 
 
 class StaticBody:
-    """One body in its own fields: evaluates forces as a world does, without motion."""
+    """One body in its own fields, which evaluates forces as a world does, without motion."""
 
     def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
-        """Put the body into fields of float64 (`double`) or float32. Starts Taichi if necessary."""
+        """Put the body into fields of float64 if `double`, else float32. Start Taichi if necessary."""
         init()
         self.body = body
         self._rows = arrange(body)
@@ -140,8 +140,9 @@ class StaticBody:
         return self._in_mesh_order(total)
 
     def system_stiffness(self) -> Floats:
-        """-df/dx as in implicit Euler's system, (n, 3, n, 3) [N/m]: projected, from blocks of particles and
-        edges.
+        """-df/dx at the last positions of `forces` as implicit Euler uses it, projected, (n, 3, n, 3) [N/m].
+
+        It is assembled from the blocks of particles and edges, in the mesh's order.
         """
         n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
         compute_system_stiffness(self._state, self._program)
@@ -158,7 +159,7 @@ class StaticBody:
 
 
 def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> None:
-    """Add elements (m, 3 c, 3 c) to the blocks (n, n, 3, 3) of their c owners (m, c)."""
+    """Add the matrix of each element, (m, 3 c, 3 c), to the blocks (n, n, 3, 3) of its c owners, (m, c)."""
     corners = owners.shape[1]
     blocks = elements.reshape(-1, corners, 3, corners, 3)
     for i in range(corners):
@@ -171,11 +172,11 @@ _cached: dict[bool, StaticBody] = {}
 
 @in_turn
 def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
-    """Evaluate forces with the static body of the last call if it is the same, for loops over positions."""
+    """Evaluate forces [N]. Reuse the static body of the last call for the same body."""
     double = positions.dtype == np.float64
     cached = _cached.get(double)
     if cached is not None:
-        last_body = cached.body  # its parts compare by identity
+        last_body = cached.body  # compared by its parts, because each call makes a new description
         if (last_body.mesh, last_body.material, last_body.model) != (body.mesh, body.material, body.model):
             del _cached[double], cached  # frees its fields for the next body
     if double not in _cached:

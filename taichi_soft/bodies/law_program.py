@@ -1,4 +1,4 @@
-"""Parameters that kernels for one body are compiled for."""
+"""Compile-time parameters of the kernels for one body."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from taichi_soft.elements.laws import ElementModel
 
 @dataclass(frozen=True)
 class Program:
-    """The laws of a world: everything that shapes the code, and no numbers."""
+    """The laws of a world: choices that shape the compiled code, without numbers."""
 
     models: tuple[ElementModel, ...]  # each body refers to one by its index
 

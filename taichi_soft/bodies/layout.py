@@ -29,7 +29,7 @@ class BondArrays:
     """The bonds of one body, in kernel order."""
 
     constants: Floats  # (k, 4), see `Bonds`
-    ring: Ints  # (k, 2) rows of each edge in the arrays below
+    ring: Ints  # (k, 2) range of rows of each edge in the arrays below
     members: Ints  # (r, 4) particles or tetrahedra of this body
     weights: Floats  # (r, 4)
     expansion_modulus: Floats | None  # (m,) [Pa], if the members are tetrahedra
@@ -37,11 +37,11 @@ class BondArrays:
 
 @dataclass(frozen=True)
 class HullArrays:
-    """Contact surface of a body in place of its own: see `bodies.bound_hull`."""
+    """Hull that replaces a body's own surface in contact: see `bodies.bound_hull`."""
 
     vertices: Ints  # (h, 4) particles of this body that carry each point
     weights: Floats  # (h, 4)
-    triangles: Ints  # (t, 3) of the points
+    triangles: Ints  # (t, 3) points of each triangle
 
 
 @dataclass(frozen=True)
@@ -52,26 +52,26 @@ class BodyArrays:
     rank: Ints  # (n,) particle of each of the caller's vertices
     rest_position: Floats  # (n, 3) [m]
     mass: Floats  # (n,) [kg]
-    tet_vertices: Ints  # (m, 4) into the particles of this body
+    tet_vertices: Ints  # (m, 4) particles of this body
     tet_order: Ints  # (m,) caller's index of each tetrahedron
     rest_inverse: Floats  # (m, 3, 3) [1/m]
     lame: Floats  # (m, 2) lambda, mu [Pa]; zero if the stiffness is anisotropic
     stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic stiffness; else zero
     tet_damping: Floats  # (m,) [N s/m]
-    tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
-    edge_vertices: Ints  # (k, 2)
+    tet_edges: Ints  # (m, 6) edges of each tetrahedron, in the order of `LOCAL_EDGES`
+    edge_vertices: Ints  # (k, 2) particles at the ends of each edge
     edge_order: Ints  # (k,) caller's index of each edge
-    edge_blocks: Ints  # (c, 2) first row and number of edges, up to `LANES`; a half shares its first end
+    edge_blocks: Ints  # (c, 2) first row and number of edges of each block: see `_edge_blocks`
     edge_damping: Floats  # (k,) [N s/m]
-    bonds: BondArrays | None  # of a pairwise law
+    bonds: BondArrays | None  # None unless the law is pairwise
     pinned: Ints  # particles that do not move
-    triangles: Ints  # (f, 3) of the surface, in the caller's order
-    outer: Ints  # particles that can make contact: those of the surface, or all if there is no inside
-    hull: HullArrays | None = None  # makes contact in their place
+    triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
+    outer: Ints  # particles that can make contact: on the surface, or all if the body has no inside
+    hull: HullArrays | None = None  # makes contact in place of `outer`
 
     @property
     def expansion_modulus(self) -> Floats:
-        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero for laws without."""
+        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero if the law has none."""
         if self.bonds is None or self.bonds.expansion_modulus is None:
             return np.zeros(len(self.tet_vertices))
         return self.bonds.expansion_modulus
@@ -79,7 +79,7 @@ class BodyArrays:
 
 @dataclass
 class Ranges:
-    """Rows of a body in the world's flat arrays, with the room for those that cuts will add."""
+    """Ranges of rows of a body in the world's flat arrays, including spare rows for cuts."""
 
     particles: tuple[int, int] = (0, 0)
     edges: tuple[int, int] = (0, 0)
@@ -92,10 +92,10 @@ class Ranges:
 
 @dataclass
 class Scene:
-    """All bodies in sequence.
+    """All bodies of a world in sequence.
 
-    `LANES` spare rows follow the edges of each body: the last block of edges is read in full, and must not
-    reach into another body, which another thread can be moving.
+    `LANES` spare rows follow the edges of each body: kernels read the last block of edges in full, and must
+    not read another body, which another thread can be moving.
     """
 
     bodies: list[BodyArrays] = field(default_factory=list)
@@ -115,7 +115,7 @@ class Scene:
 
     @property
     def ends(self) -> Ranges:
-        """Empty ranges where the next body would start."""
+        """Empty ranges at the rows where the next body would start."""
         return Ranges(
             (self.particle_count,) * 2,
             (self.edge_count,) * 2,
@@ -127,7 +127,7 @@ class Scene:
         )
 
     def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
-        """Give `body` the next free rows, with room for copies of its vertices."""
+        """Assign the next free rows to `body`, with room for `spare_vertices` copies of its vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
@@ -153,13 +153,15 @@ class Scene:
 
 
 def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
-    """Rows of particles, edges, blocks of edges, triangles and outer particles for a body and its copies.
+    """Count the rows that a body and the copies of its vertices need.
 
-    The points of a hull follow its particles. Its triangles and points have separate rows elsewhere, with the
-    numbers of those of the surface.
+    Returns: numbers of particles, edges, blocks of edges, triangles and outer particles.
 
-    A cut has about three edges, and two triangles on either side, for each vertex on it, and up to twice as
-    many if it is small and ends inside (Euler's formula).
+    The points of a hull follow the particles of the body. Triangles and points of a hull have their own rows,
+    numbered like the rows of the surface.
+
+    For each of its vertices, a cut has about three edges, and two triangles on either side. A small
+    cut that ends inside the body can have twice as many (Euler's formula).
     """
     if spare_vertices == 0:
         exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
@@ -194,11 +196,13 @@ def arrange_part(
     tets: NDArray[np.int64],
     order: Ints | None = None,
 ) -> BodyArrays:
-    """Arrange what a cut leaves of a body in the order that the body had; copies follow their originals.
+    """Arrange the remainder of a cut body in the order before the cut; copies follow their originals.
 
     Args:
-        vertices, tets: vertex or tetrahedron of the body before that each one is or copies.
-        order: order of the vertices; None: copies in the order of their numbers.
+        description: description of the body after the cut.
+        before: arrays of the body before the cut.
+        vertices, tets: original of each vertex and each tetrahedron in the body before the cut.
+        order: order of the vertices; None: copies of one vertex in the order of their numbers.
     """
     mesh, rank = description.mesh, before.rank[vertices]
     if order is None:
@@ -243,7 +247,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
 
 
 def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
-    """The same body with another material, in the same order."""
+    """Return the arrays of the same body with the material of `description`, in the same order."""
     tets, bonds = arrays.tet_order, description.bonds
     return replace(
         arrays,
@@ -257,7 +261,7 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
 
 
 def _directed_edges(edges: Ints, particle_count: int) -> Ints:
-    """Direct the edges so that most particles are the first end of a multiple of `HALF` edges."""
+    """Orient the edges so that, for most particles, `HALF` divides the number of edges that start there."""
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
     owner = edge_owners(in_order, particle_count, HALF)
@@ -266,10 +270,10 @@ def _directed_edges(edges: Ints, particle_count: int) -> Ints:
 
 
 def _edge_blocks(first_ends: Ints) -> Ints:
-    """Blocks of edges: first row and number, at most `LANES`; all edges of a half share their first end.
+    """Divide the edges into blocks of at most `LANES`. Return first row and number of edges of each, (c, 2).
 
-    Rows are ordered by first end. A half that is not full ends its block, so that the rows of a block are
-    contiguous.
+    A block has two halves. All edges of a half have the same first end. Rows are ordered by first end. A half
+    that is not full ends its block, so that the rows of a block are contiguous.
     """
     starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
     counts = np.diff(np.r_[starts, len(first_ends)])
@@ -320,7 +324,7 @@ def _arrange_bonds(
 
 
 def blocks_of(rows: NDArray[np.generic], width: int, fill: float) -> NDArray[np.generic]:
-    """Rows (m, width) as (blocks, width, LANES), flattened and padded with `fill`."""
+    """Return rows (m, width) as (blocks, width, LANES), flattened and padded with `fill`."""
     block_count = -(-len(rows) // LANES)
     padded = np.full((block_count * LANES, width), fill, dtype=rows.dtype)
     padded[: len(rows)] = rows.reshape(len(rows), width)

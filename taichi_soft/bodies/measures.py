@@ -1,4 +1,4 @@
-"""Quantities derived from the state of a body, in float64 from its float32 fields."""
+"""Measures of a body's state, computed in float64 from its float32 fields."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def require_tets(body: SoftBody) -> None:
 
 
 def positions_of(body: SoftBody) -> Floats:
-    """Positions of its vertices, (n, 3) [m]."""
+    """Positions of the vertices of a body, (n, 3) [m], in float64."""
     return body.positions().astype(np.float64)
 
 
 def velocities_of(body: SoftBody) -> Floats:
-    """Velocities of its vertices, (n, 3) [m/s]."""
+    """Velocities of the vertices of a body, (n, 3) [m/s], in float64."""
     return body.velocities().astype(np.float64)
 
 
@@ -42,7 +42,7 @@ def tet_volumes(body: SoftBody) -> Floats:
 
 
 def _edge_vectors(body: SoftBody) -> Floats:
-    """Vectors from the first vertex of each tetrahedron to the others, as rows, (m, 3, 3) [m]."""
+    """Vectors from the first vertex of each tetrahedron to its other vertices, as rows, (m, 3, 3) [m]."""
     corners = positions_of(body)[body.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
@@ -70,7 +70,7 @@ def gravitational_energy(body: SoftBody) -> float:
 
 
 def tet_mesh(body: SoftBody) -> TetMesh:
-    """The mesh of a body with tetrahedra."""
+    """Return the mesh of a body with tetrahedra."""
     assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused earlier"
     return body.mesh
 
@@ -91,9 +91,9 @@ def elastic_energy(body: SoftBody) -> float:
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
-    """Green strain 1/2 (F^T F - I), and its Hookean stress [Pa], in the rest axes, (m, 3, 3) each.
+    """Green strain 1/2 (F^T F - I) and its stress by Hooke's law [Pa], in the rest axes, (m, 3, 3) each.
 
-    It is the same for every law: see `Body.elastic_energy`.
+    Both are independent of the body's law: see `Body.elastic_energy`.
     """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
@@ -153,12 +153,12 @@ def tet_strain(body: SoftBody) -> Floats:
 
 
 def _deviator_norms(tensors: Floats) -> Floats:
-    """sqrt(e:e) of the deviator e of each tensor (m, 3, 3)."""
+    """Norm sqrt(e:e) of the deviator e of each tensor (m, 3, 3), (m,)."""
     deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
     return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
 
 
 def vertex_means(body: SoftBody, values: Floats) -> Floats:
-    """Means of values (m,), weighted by volume, over the tetrahedra around each vertex, (n,)."""
+    """Mean of `values` (m,) over the tetrahedra around each vertex, weighted by volume, (n,)."""
     mesh, n = tet_mesh(body), body.vertex_count
     return np.asarray(lumped(mesh.tets, values * mesh.volumes, n) / lumped(mesh.tets, mesh.volumes, n))

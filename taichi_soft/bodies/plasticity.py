@@ -10,30 +10,29 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 
 _UNLIMITED = 1e30
-"""Finite stand-in for no limit, so that kernels need no infinity."""
+"""Number that means no limit: kernels must not use infinity."""
 
 
 @serialised("yield_stress", "yield_strain", "creep", "maximum")
 @dataclass(frozen=True)
 class Plasticity:
-    """Permanent change of the rest shape where a body is strained beyond its yield point.
+    """Permanent deformation of a body that is strained beyond its yield point.
 
-    The deformation of a tetrahedron is a plastic one followed by an elastic one, F = Fe Fp, and Fp preserves
-    the volume (Irving, Teran and Fedkiw 2004). Yield point, creep and maximum are those of O'Brien, Bargteil
-    and Hodgins 2002 and of Mueller and Gross 2004: strain beyond the yield point flows into Fp at the rate
-    `creep`, until Fp reaches `maximum`. It flows at the end of each fixed step, so an impact that is over
-    within one step leaves no dent.
+    A tetrahedron deforms plastically, then elastically: F = Fe Fp, where Fp preserves the volume (Irving,
+    Teran and Fedkiw 2004). Strain beyond the yield point flows into Fp at the rate `creep`, until Fp reaches
+    `maximum` (O'Brien, Bargteil and Hodgins 2002; Mueller and Gross 2004). Plastic flow happens at the end of
+    each fixed step, so an impact that begins and ends within one step leaves no dent.
 
     Args:
-        yield_stress: von Mises stress [Pa] by Hooke's law and linear strain, for every law, below which the
-            deformation is elastic.
-        yield_strain: the same as a strain, as in `Body.tet_strain`; pass one of the two. They are related by
-            yield_stress = 3 G yield_strain, with the shear modulus G.
-        creep: rate of flow [1/s]: within 1/creep the excess falls to 1/e. Infinity: within a step.
-        maximum: largest plastic strain, logarithmic and equivalent: a tetrahedron can become e^maximum times
-            as long permanently. Long ones need shorter substeps, which `World.stable_substeps` does not
-            consider.
-    Raises: OptionError for a value out of range, or for none or both of the yield points.
+        yield_stress: von Mises stress [Pa] below which the deformation is elastic. For every law it is
+            computed by Hooke's law from the linear strain.
+        yield_strain: yield point as a strain, as in `Body.tet_strain`, instead of `yield_stress`. They are
+            related by yield_stress = 3 G yield_strain, with the shear modulus G.
+        creep: rate of flow [1/s]: within 1/creep the excess strain falls to 1/e. Infinity: within one step.
+        maximum: largest equivalent logarithmic plastic strain: a tetrahedron can become e^maximum times as
+            long permanently. Elongated tetrahedra need shorter substeps, which `World.stable_substeps` does
+            not consider.
+    Raises: OptionError for a value out of range, or unless exactly one yield point is given.
     """
 
     _: KW_ONLY
@@ -58,7 +57,7 @@ class Plasticity:
 
     @property
     def row(self) -> tuple[float, float, float, float]:
-        """Yield stress [Pa] and yield strain, of which one is zero, creep [1/s] and maximum."""
+        """Yield stress [Pa], yield strain, creep [1/s], maximum. The yield point not given is zero."""
         return self.yield_stress or 0.0, self.yield_strain or 0.0, min(self.creep, _UNLIMITED), self.maximum
 
 

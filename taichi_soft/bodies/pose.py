@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _REGULARISATION = 1e-10
-"""Weight of rotating as little as possible. It decides only what the shape leaves open: the rotation of a
-straight rope about its axis, and of a body shrunk to a point."""
+"""Weight that prefers the smallest rotation. It matters only if the shape leaves the rotation open: a
+straight rope about its axis, or a body shrunk to a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,16 +19,16 @@ class Pose:
     """A rotation followed by a translation."""
 
     rotation: Floats  # (3, 3), determinant +1
-    position: Floats  # (3,) [m], position of the origin
+    position: Floats  # (3,) [m], new position of the rest shape's origin
 
 
 def best_fitting_pose(rest: Floats, positions: Floats, masses: Floats) -> Pose:
-    """Pose of the rest shape that best fits the positions, by squared distances weighted by mass.
+    """Find the pose of the rest shape that minimises the squared distances to `positions`, weighted by mass.
 
-    Kabsch 1976; always a rotation, even for flat and mirrored shapes.
+    The method is Kabsch's (1976). The result is never a reflection, even for flat and mirrored shapes.
     Args:
-        rest, positions: (n, 3) [m].
-        masses: (n,) [kg], positive.
+        rest, positions: positions of the vertices at rest and at present, (n, 3) [m].
+        masses: masses of the vertices, (n,) [kg], positive.
     """
     weights = masses / masses.sum()
     rest_center, center = weights @ rest, weights @ positions

@@ -1,4 +1,4 @@
-"""Present constants of the law of a body, intermediate while another material is eased in."""
+"""Present constants of a body's law. They are intermediate while the material changes gradually."""
 
 from __future__ import annotations
 

@@ -21,14 +21,15 @@ Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
 MIN_PARALLEL_VERTICES = 4000
-"""Render vertices from which threads share the work: waking them costs as much as some thousand vertices."""
+"""Smallest number of render vertices that several threads compute: waking them costs as much as a few
+thousand vertices."""
 
 
 class RenderMesh:
-    """The surface of one body for a renderer. Made by `Body.render_mesh`, and read-only.
+    """The surface of one body for a renderer, read-only. Created by `Body.render_mesh`.
 
-    It has only the vertices on the surface, one copy for each side of a sharp edge. It never changes: a cut
-    body has other vertices, so its mesh is outdated and must be rebuilt.
+    It contains only vertices on the surface, with one copy for each side of a sharp edge. It never changes. A
+    cut gives the body other vertices, so its render mesh is then outdated and you must make a new one.
     Example:
         skin = body.render_mesh(crease=40)  # skin.triangles is the index buffer
         vertices = np.empty((skin.vertex_count, 3), np.float32)
@@ -41,8 +42,8 @@ class RenderMesh:
         """Use `Body.render_mesh` instead.
 
         Args:
-            body: body that it draws.
-            vertices: vertex of the body that each render vertex is or copies, (k,).
+            body: body to draw.
+            vertices: vertex of the body that each render vertex copies, (k,).
             triangles: render vertices, (m, 3).
         """
         self._describe(body, vertices, triangles)
@@ -59,7 +60,7 @@ class RenderMesh:
         return "make a new one by body.render_mesh(), and buffers for its vertex_count"
 
     def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
-        """Fill two buffers, (k, 3) each, from the fields of a world."""
+        """Write positions and normals, (k, 3) each, from the fields of a world."""
         is_serial = self.vertex_count < MIN_PARALLEL_VERTICES
         _write(state, is_serial, self._body.index, alpha, self._table, positions, normals)
 
@@ -69,7 +70,7 @@ class RenderMesh:
 
     @property
     def body(self) -> SoftBody:
-        """Body that it draws."""
+        """Body that the mesh draws."""
         return self._body
 
     @property
@@ -86,7 +87,7 @@ class RenderMesh:
     def body_vertices(self) -> Ints32:
         """Vertex of the body that each render vertex copies, int32 (k,).
 
-        It turns values per vertex of the body into an attribute: `body.vertex_stress()[mesh.body_vertices]`.
+        Use it to turn values per body vertex into an attribute: `body.vertex_stress()[mesh.body_vertices]`.
         """
         return self._body_vertices
 
@@ -97,7 +98,7 @@ class RenderMesh:
 
     @property
     def is_outdated(self) -> bool:
-        """True if the body was since cut, torn, restored or given another level: make a new mesh then."""
+        """True if the body was cut, torn, restored or given another level since: then make a new mesh."""
         return self._topology_version != self._body.topology_version
 
 
@@ -112,7 +113,7 @@ def surface_render_mesh(body: SoftBody, crease: float | None) -> RenderMesh:
 
 
 def require_current(mesh: RenderMesh) -> None:
-    """Check that a mesh is current. Raises: StateError if its body was removed or has other vertices."""
+    """Check that a mesh is not outdated. Raises: StateError if its body was removed or has other vertices."""
     body = mesh.body
     require_alive(body)
     if mesh.is_outdated:
@@ -126,13 +127,13 @@ def require_current(mesh: RenderMesh) -> None:
 def read_render_mesh(
     state: Any, mesh: RenderMesh, alpha: float, positions: Floats32, normals: Floats32
 ) -> None:
-    """Fill two buffers, (k, 3) each, from the fields of a world. See `World.read_render_mesh`."""
+    """Write positions and normals, (k, 3) each, from the fields of a world. See `World.read_render_mesh`."""
     mesh._write(state, alpha, positions, normals)
 
 
 def warm_up(state: Any, assets: Iterable[SoftBodyAsset]) -> None:
-    """Compile what `read_render_mesh` calls, for few vertices, and for many if `assets` need it."""
-    # A single vertex of the first body.
+    """Compile the kernels of `read_render_mesh` for few vertices, and for many if `assets` need them."""
+    # One triangle, whose three corners are the first vertex of the first body.
     table = render_table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))
     positions, normals = np.empty((2, 3, 3), dtype=np.float32)
     _write(state, True, 0, 1.0, table, positions, normals)
@@ -153,16 +154,16 @@ def _write(
 
 
 def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
-    """Table for the kernel: one array, because each argument of a kernel costs as much as 100 vertices.
+    """Return the table for the kernel: one array, because each kernel argument costs as much as 100 vertices.
 
-    It contains blocks; the body's vertex of each render vertex; where the further triangles of each block
-    begin in the table, and where the last ones end; the number of blocks with small rings only; the further
-    triangles.
+    The table contains, in this order: the blocks; the body's vertex of each render vertex; the index in the
+    table at which the further triangles of each block begin, and the end of the last ones; the number of
+    blocks that have only small rings; the further triangles.
 
     A block has `LANES` render vertices, followed by `RING` rows with the rings around them. Triangles (v, a,
-    b) and (v, b, c) make the ring a, b, c, which is padded with v itself. A further triangle is the lane of
-    its vertex and its two other vertices. The last block repeats its last vertex, with its ring and
-    triangles.
+    b) and (v, b, c) form the ring a, b, c, which is padded with v. Further triangles do not fit into a ring:
+    each consists of the lane of its vertex, and its two other vertices. The last block is padded with copies
+    of the last vertex, its ring and its further triangles.
     """
     count = len(vertices)
     rings, further = _rings(count, triangles)
@@ -186,10 +187,10 @@ def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32
 
 
 def _rings(count: int, triangles: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ring around each render vertex, (k, RING), and the triangles in no ring, (f, 3), in ascending order.
+    """Find the ring around each render vertex, (k, RING), and the triangles in no ring, (f, 3), ascending.
 
-    Such a triangle begins with the vertex whose ring lacks it. A ring begins at a border of the surface if
-    there is one. It ends when it is full or no triangle continues it.
+    A triangle in no ring begins with the vertex whose ring lacks it. A ring begins at a border of the surface
+    if the vertex lies on a border. It ends when it is full or no triangle continues it.
     """
     rotations = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
     own, one, other = rotations[np.argsort(triangles.ravel(), kind="stable")].T

@@ -1,4 +1,4 @@
-"""Warn of substeps that slivers and small tetrahedra shorten, compared with a lattice."""
+"""Warn of meshes whose slivers and small tetrahedra need much shorter substeps than a lattice."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from taichi_soft.meshing import TetMesh
 _log = logging.getLogger(__name__)
 
 LATTICE_STEP = 0.33
-"""Stable step of a lattice that fills space, over the time cell / sqrt(young / density)."""
+"""Stable step of a lattice that fills space, relative to the time cell / sqrt(young / density)."""
 
 WARNING_RATIO = 4.0
-"""Ratio of the lattice's step to a mesh's above which a warning is logged. Moving a lattice's outer vertices
-onto a surface costs up to a factor of 2."""
+"""Ratio of a lattice's stable step to a mesh's above which a warning is logged. A lattice whose outer
+vertices are moved onto a surface can itself need steps half as long."""
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 """Material for the comparison of meshes; the choice is arbitrary."""
 
 
 def warn_of_short_steps(mesh: TetMesh, cell_size: float, method: str) -> None:
-    """Log a warning if the stable substeps of a mesh are much shorter than those of a lattice.
+    """Log a warning if the stable substeps of a mesh are much shorter than for a lattice.
 
     Args:
         cell_size: edge of the lattice's cells [m].

@@ -1,4 +1,4 @@
-"""Render mesh of an artist's mesh, with the vertices and normals of each frame."""
+"""Render mesh of a skin: the vertices and normals of an artist's mesh in each frame."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ from taichi_soft.meshing import TetMesh
 Floats32 = NDArray[np.float32]
 
 MIN_PARALLEL_VERTICES = 2000
-"""Vertices from which threads share the work: waking them costs as much as some thousand vertices."""
+"""Smallest number of vertices that several threads compute: waking them costs as much as a few thousand
+vertices."""
 
 
 class SkinMesh(RenderMesh):
-    """The skin of one body, in its artist's order. Made by `Body.render_meshes`, and read-only.
+    """The skin of one body, in the order of the artist's mesh, read-only. Created by `Body.render_meshes`.
 
-    `body_vertices` are the nearest vertices of the body. A skin cannot follow a cut: once its body is cut or
-    torn, it is outdated, and there is no new one.
+    `body_vertices` are the nearest vertices of the body. A skin cannot follow a cut: once the body is cut or
+    torn, the skin mesh is outdated for good.
     """
 
     def __init__(self, body: SoftBody, number: int) -> None:
-        """Use `Body.render_meshes` instead. `number` is that of a surface in the asset's skin."""
+        """Use `Body.render_meshes` instead. `number` is the index of a surface in the asset's skin."""
         self._body, self._number = body, number
         self._bind()
 
     def _bind(self) -> None:
-        """Bind to the body's present tetrahedra: levels of detail have different ones."""
+        """Bind to the tetrahedra of the body's present level of detail."""
         body = self._body
         asset, self._level = present_asset(body), record_of(body).level
         self._skin: Skin = asset.skins[self._number]
@@ -51,7 +52,7 @@ class SkinMesh(RenderMesh):
 
     @property
     def body_vertices(self) -> NDArray[np.int32]:
-        """Vertex of the body that is nearest to each render vertex at rest, int32 (k,)."""
+        """Vertex of the body with the largest weight in each render vertex, int32 (k,)."""
         _ = self._present_skin
         return super().body_vertices
 
@@ -67,7 +68,7 @@ class SkinMesh(RenderMesh):
 
     @property
     def visual(self) -> Any:
-        """trimesh's texture coordinates, material and colours; None without any."""
+        """trimesh's texture coordinates, material and colours; None if the mesh has none of them."""
         return self._skin.surface.visual
 
     @property
@@ -87,7 +88,7 @@ class SkinMesh(RenderMesh):
 
 
 def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
-    """Skin meshes of a body; none if it was cut or torn."""
+    """Return the skin meshes of a body: an empty tuple if it has no skin, or was cut or torn."""
     if body.is_cut:
         return ()
     record = record_of(body)
@@ -97,7 +98,10 @@ def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
 
 
 def first_skin_mesh(body: SoftBody) -> SkinMesh:
-    """First skin mesh. Raises: OptionError for a body without skin, or cut; StateError for a removed one."""
+    """Return the first skin mesh of a body.
+
+    Raises: OptionError if the body has no skin or was cut; StateError if it was removed.
+    """
     require_alive(body)
     meshes = skin_meshes(body)
     if not meshes:
@@ -108,7 +112,7 @@ def first_skin_mesh(body: SoftBody) -> SkinMesh:
 
 
 def warm_up(state: Any) -> None:
-    """Compile the kernel of skins for few vertices and for many, with a vertex without neighbours."""
+    """Compile the kernel of skins for few vertices and for many, by calling it for a single vertex."""
     ints, floats = np.zeros(2 + 4 * LANES, np.int32), np.zeros(3 + ROW * LANES, np.float32)
     frames, positions, normals = np.empty(FRAME, dtype=np.float32), *np.empty((2, 3), dtype=np.float32)
     for is_serial in (True, False):

@@ -17,37 +17,37 @@ class Occupant(Protocol):
 
     @property
     def index(self) -> int:
-        """Index of its slot."""
+        """Index of the body's slot."""
 
     @property
     def asset(self) -> SoftBodyAsset:
-        """Asset whose slots it can occupy."""
+        """Asset whose slots the body can occupy."""
 
 
 Kind = TypeVar("Kind", bound=Occupant)
 
 
 class Pools(Generic[Kind]):
-    """Slots of one world. A body takes the lowest free slot of its asset, so that slots are reproducible."""
+    """Slots of one world. A body gets the lowest free slot of its asset, so that slots are reproducible."""
 
     def __init__(self) -> None:
-        self.assets: list[SoftBodyAsset] = []  # of each slot
+        self.assets: list[SoftBodyAsset] = []  # asset of each slot
         self.slots: list[Kind | None] = []  # body in each slot
-        self.starts: dict[int, NDArray[np.float32]] = {}  # of bodies added before build, by slot
-        self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # made by add_body, by content
-        self._free: dict[SoftBodyAsset, list[int]] = {}  # heaps
+        self.starts: dict[int, NDArray[np.float32]] = {}  # start rows of bodies added before build, by slot
+        self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # assets made by add_body, by content
+        self._free: dict[SoftBodyAsset, list[int]] = {}  # free slots of each asset, as heaps
         self._occupants: tuple[Kind, ...] | None = ()
 
     @property
     def kinds(self) -> tuple[SoftBodyAsset, ...]:
-        """Every asset once, in the order of their first slots."""
+        """All assets, each once, in the order of their first slots."""
         return tuple(self._free)
 
     @property
     def can_touch(self) -> bool:
         """True if bodies, or parts of one body, can touch each other.
 
-        This takes two slots, or an asset that touches itself.
+        This needs two slots, or an asset with self-contact.
         """
         return len(self.slots) > 1 or any(
             level.contact.itself for asset in self.kinds for level in asset.levels
@@ -55,23 +55,23 @@ class Pools(Generic[Kind]):
 
     @property
     def occupants(self) -> tuple[Kind, ...]:
-        """All bodies, by slot."""
+        """All bodies, in the order of their slots."""
         if self._occupants is None:
             self._occupants = tuple(body for body in self.slots if body is not None)
         return self._occupants
 
     def add_slot(self, asset: SoftBodyAsset) -> None:
-        """Add a slot with the next number."""
+        """Add a slot for `asset` with the next number."""
         heapq.heappush(self._free.setdefault(asset, []), len(self.slots))
         self.assets.append(asset)
         self.slots.append(None)
 
     def free_slots(self, asset: SoftBodyAsset) -> list[int]:
-        """Slots of the next bodies of an asset, in order."""
+        """Free slots of an asset, in the order in which bodies will get them."""
         return sorted(self._free[asset])
 
     def next_slot(self, asset: SoftBodyAsset) -> int:
-        """Slot of the next body of an asset. Raises: StateError if it has no slot, or no free one."""
+        """Slot that the next body of an asset will get. Raises: StateError if the asset has no free slot."""
         free = self._free.get(asset)
         if free is None:
             raise StateError(f"{asset!r} has no pool in this world: call reserve(asset, count) before build")
@@ -84,13 +84,13 @@ class Pools(Generic[Kind]):
         return free[0]
 
     def enter(self, body: Kind) -> None:
-        """Put a body into the next slot of its asset, which must have the body's number."""
+        """Put a body into the next slot of its asset. `body.index` must be the number of this slot."""
         heapq.heappop(self._free[body.asset])
         self.slots[body.index] = body
         self._occupants = None
 
     def enter_at(self, body: Kind) -> None:
-        """Put a body into the free slot with its number, even if another one is next."""
+        """Put a body into the free slot `body.index`, even if it is not the next one."""
         free = self._free[body.asset]
         free.remove(body.index)
         heapq.heapify(free)

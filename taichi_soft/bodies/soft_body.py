@@ -1,6 +1,6 @@
-"""A body, and the part of its world that all slices share.
+"""`SoftBody` and `Context`: a body, and the part of its world that all slices share.
 
-Slices see a `Context` and `SoftBody`, never the world above them. These classes refer to each other, so they
+Slices use a `Context` and `SoftBody`, never the world above them. These classes refer to each other, so they
 are in one file.
 """
 
@@ -35,73 +35,76 @@ Ints = NDArray[np.int64]
 
 
 RowsOf = Callable[[Any], NDArray[Any]]
-"""Rows of a field in a snapshot, (rows, width): integers, or float32."""
+"""Function that returns the rows of a field in a snapshot, (rows, width), of integers or float32."""
 
 SomeSlice = TypeVar("SomeSlice", bound="Slice")
 
 
 class Built(Protocol):
-    """Fields of a built world, and notifications of changes to them."""
+    """Fields of a built world, and methods that read and change them."""
 
     state: Any
     program: Any
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that changes a body, or all bodies for -1."""
+        """Call `kernel(state, *arguments)`, which changes the body in a slot, or all bodies for -1."""
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that can refuse: bodies stay asleep until `mark_modified`."""
+        """Call `kernel(state, *arguments)`, which can reject the change. Does not wake bodies.
+
+        Call `mark_modified` after a change.
+        """
 
     def mark_modified(self, slot: int) -> None:
-        """Record that control has modified a body, or all for -1."""
+        """Wake the body in a slot, or all bodies for -1, after a change of its state."""
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, first particle of a body, *arguments) that only reads."""
+        """Call `kernel(state, first, *arguments)`, which only reads; `first` is the body's first particle."""
 
     def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Rows of a body's vertices in the fields."""
+        """Return the rows of some vertices of a body in the fields."""
 
     def mark_changed(self) -> None:
-        """Record that the fields were written to."""
+        """Record that the fields have changed."""
 
     def wake(self, slot: int) -> None:
-        """Wake a body, or all for -1."""
+        """Wake the body in a slot, or all bodies for -1."""
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
-        """Wake bodies that sleep within range of a box, given by two corners [m]."""
+        """Wake sleeping bodies within range of a box, given by two opposite corners [m]."""
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Bounding box of a body and its skin now, as two corners [m]."""
+        """Return the present bounding box of a body and its skin, as two opposite corners [m]."""
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """Positions of the vertices, between the previous step and the last one, (n, 3) [m]."""
+        """Positions of the vertices, (n, 3) [m], interpolated by `alpha` between the last two steps."""
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
         """Velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Vertices that are pinned now, ascending."""
+        """Vertices of a body that are pinned at present, ascending."""
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """A^-1 of each tetrahedron of a body that can have flowed, (m, 3, 3) [1/m]."""
+        """Present A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
-        """Check points of a body's surface, (k, 3) [m]. Raises: OptionError if a collider crushes them."""
+        """Check that no collider crushes points of a body's surface, (k, 3) [m]. Raises: OptionError."""
 
     def mark_joints_changed(self) -> None:
         """Record that joints between bodies have changed."""
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """Find what failed first in the body in a slot."""
+        """Find the first failure of the body in a slot."""
 
     def on_cut(self, body: SoftBody) -> None:
-        """Record that a body has other vertices."""
+        """Record that a cut has changed the vertices of a body."""
 
     def on_placed(self, body: SoftBody) -> None:
-        """Search for bodies that a body overlaps in the next step."""
+        """Request a search, in the next step, for bodies that a placed body overlaps."""
 
     def apply_settings(self, settings: Settings) -> None:
-        """Apply other gravity, or another friction of the floor."""
+        """Apply a change of gravity or of the floor's friction."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -113,35 +116,35 @@ class Context:
     handles: Handles
     slots: Pools[SoftBody]
     layout: Scene
-    renew_substeps: Callable[[], None]  # called when a body has another mesh or material
-    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]  # for the body in the next free slot of an asset
+    renew_substeps: Callable[[], None]  # called after a body's mesh or material has changed
+    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]  # for a body in the next free slot of an asset
     slices: list[Slice] = field(default_factory=list)
     fields: Built | None = None  # set by `World.build`
 
     @property
     def built(self) -> Built:
-        """The built world. Raises: StateError before `World.build`."""
+        """Fields of the built world. Raises: StateError before `World.build`."""
         if self.fields is None:
             raise StateError("the world is not built: call world.build() after the last add_body")
         return self.fields
 
     def apply_settings(self, settings: Settings) -> None:
-        """Apply other gravity, or another friction of the floor; all else in `settings` must be unchanged."""
+        """Apply a change of gravity or of the floor's friction; the rest of `settings` must be unchanged."""
         self.settings = settings
         if self.fields is not None:
             self.fields.apply_settings(settings)
 
     def of(self, kind: type[SomeSlice]) -> SomeSlice:
-        """Return the slice of a kind."""
+        """Return the slice of a given class."""
         return next(each for each in self.slices if isinstance(each, kind))
 
 
 class Slice:
-    """One feature that a game can switch on. Its data in a world are known here and nowhere else."""
+    """One optional feature of a world, such as grabs. Only its slice knows its data."""
 
-    name = ""  # of its part of a snapshot
-    prevents_cuts = True  # True if a body that it constrains cannot be cut or torn
-    prevents_levels = True  # True if a body that it constrains cannot change its level of detail
+    name = ""  # name of its part of a snapshot
+    prevents_cuts = True  # True if a body that the slice constrains cannot be cut or torn
+    prevents_levels = True  # True if a body that the slice constrains cannot change its level
 
     def __init__(self, context: Context) -> None:
         """Create an empty slice."""
@@ -149,89 +152,95 @@ class Slice:
 
     @property
     def context(self) -> Context:
-        """Context of the slice. Raises: StateError if the world is gone."""
+        """Context of the slice. Raises: StateError if the world no longer exists."""
         context = self._context_ref()
         if context is None:
             raise StateError("the world is gone: keep a reference to it")
         return context
 
     def holds(self, body: SoftBody) -> bool:
-        """True if it constrains a body or a part of one."""
+        """True if the slice constrains a body or a part of it."""
         return False
 
     def release_body(self, body: SoftBody) -> None:
-        """Release everything that is tied to a body that leaves the world."""
+        """Release everything that belongs to a body, which leaves the world."""
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Call everything that a game can do to a body, and to another one if given: see `World.warm_up`.
+        """Compile the kernels of the slice, by calling them for a body: see `World.warm_up`.
 
-        Args: step: makes a step and undoes it.
+        Args:
+            body: body to call the kernels for.
+            other: second body, if there is one.
+            step: function that makes a step and undoes it.
         """
 
-    # Snapshots. All of these are called in a built world.
+    # Snapshots. The world must be built when these methods are called.
 
     def entries(self) -> list[list[Any]]:
-        """The slice's Python data as plain rows."""
+        """Return the slice's Python data as rows of plain values."""
         return []
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """Numbers of the handles that have a row: the first entry of each row."""
+        """Return the serial numbers of handles in `entries`: the first value of each row."""
         return [row[0] for row in entries]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """Number of rows in use, by `entries`, in each group of its fields that a snapshot keeps."""
+        """Return how many rows `entries` use in each group of the slice's fields that a snapshot stores."""
         return {}
 
     def read(self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]) -> Any:
-        """Read `entries`, checked against the bodies in each slot; 0 vertices for an empty slot.
+        """Check `entries` against the bodies of the snapshot, and return the data that they describe.
 
-        Args: earlier: results of the slices before this one, by name.
-        Raises: ValueError, or what Python raises, if they are invalid.
+        Args:
+            entries: rows as `entries()` returns them.
+            vertex_counts: number of vertices of the body in each slot, 0 for an empty slot.
+            earlier: results of the slices before this one, by name.
+        Raises: ValueError, or another exception of Python, if the rows are invalid.
         """
 
     def things(self, read: Any) -> dict[str, int]:
-        """Numbers of things that fields may name: see `field_table.Below`."""
+        """Return the numbers of objects to which fields can refer: see `field_table.Below`."""
         return {}
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Check the rows of its fields. Raises: ValueError if they are invalid or do not match `read`."""
+        """Check the rows of the slice's fields. Raises: ValueError if invalid or inconsistent with `read`."""
 
     def clear(self) -> None:
-        """Prepare for its fields to be overwritten."""
+        """Prepare the slice for a restore, before its fields are overwritten."""
 
     def restore(self, read: Any) -> None:
-        """Restore handles from `read`; bodies and fields are already restored."""
+        """Restore the handles from `read`, the result of `read()`. Bodies and fields are already restored."""
 
 
 @dataclass(eq=False)
 class BodyRecord:
-    """Internal record of a body behind the handle that a user holds: see `record_of`."""
+    """Internal data of a body, behind the handle that users have: see `record_of`."""
 
-    description: BodyDescription  # as added, or after a change of material or a cut
+    description: BodyDescription  # description with the present mesh and material
     first_step: int
-    present: BodyArrays | None = None  # with intermediate constants, while a material is eased in
-    removed_in: int | None = None  # step
+    present: BodyArrays | None = None  # with intermediate constants while the material changes gradually
+    removed_in: int | None = None  # step in which the body was removed
     frozen_in: FailedStep | None = None
-    failure: Failure | None = None  # found on the first request
-    part: CutMesh | None = None  # part of the asset's mesh, after a cut
+    failure: Failure | None = None  # computed at the first request
+    part: CutMesh | None = None  # remaining part of the asset's mesh; None for an uncut body
     topology_version: int = 0
-    skin_meshes: tuple[Any, ...] | None = None  # made on the first request
-    level: int = 0  # of detail, 0 being the finest
-    friction: float | None = None  # if it differs from its asset's
+    skin_meshes: tuple[Any, ...] | None = None  # created at the first request
+    level: int = 0  # level of detail; 0 is the finest
+    friction: float | None = None  # None: the asset's friction
     held: NDArray[np.int64] | None = None  # vertices of the finest level that pins represent
 
     def set_topology(self, part: CutMesh | None, level: int = 0) -> None:
-        """Record the part of the asset's mesh that cuts have left, None for all of it, and the level."""
+        """Set the level of detail, and the part of the asset's mesh that cuts have left (None if uncut)."""
         self.part, self.level = part, level
         self.topology_version += 1
 
 
 class SoftBody(Handle):
-    """A body without its world. Users hold the subclass `Body`."""
+    """Handle of a body, without functions that need the whole world. Users get the subclass `Body`."""
 
     def __init__(self, context: Context, index: int, asset: SoftBodyAsset) -> None:
         """Use `World.add_body` or `World.spawn` instead."""
-        # Weak, so that a dropped world returns its state without waiting for the garbage collector.
+        # Weak: an unreferenced world then frees its state without waiting for the garbage collector.
         self._context_ref = weakref.ref(context)
         self._asset = asset
         self._index = index
@@ -252,37 +261,37 @@ class SoftBody(Handle):
 
     @property
     def asset(self) -> SoftBodyAsset:
-        """Asset that it shares with other bodies of its kind; `World.spawn` takes it."""
+        """Asset of the body; pass it to `World.spawn` for more bodies of this kind."""
         return self._asset
 
     @property
     def level(self) -> int:
-        """Level of detail, 0 being the finest: see `set_level`."""
+        """Level of detail; 0 is the finest. See `set_level`."""
         return self._record.level
 
     @property
     def index(self) -> int:
-        """Number of its slot in the world, which another body may get after `World.despawn`."""
+        """Number of the body's slot in the world. After `World.despawn`, another body can get it."""
         return self._index
 
     @property
     def is_alive(self) -> bool:
-        """False once `World.despawn` has removed it: queries of the world then raise StateError."""
+        """False once `World.despawn` has removed the body; reading its state then raises StateError."""
         return self._record.removed_in is None
 
     @property
     def mesh(self) -> BodyMesh:
-        """Rest shape, as added or after cuts."""
+        """Present mesh at rest, which cuts and levels of detail change."""
         return self._record.description.mesh
 
     @property
     def material(self) -> AnyMaterial:
-        """Material, as added or set since."""
+        """Present material."""
         return self._record.description.material
 
     @property
     def friction(self) -> float:
-        """Coulomb coefficient of its surface against other bodies, of its asset or as set since."""
+        """Present Coulomb coefficient of the surface against other bodies."""
         own = self._record.friction
         return float(self._asset.contact.friction) if own is None else own
 
@@ -298,33 +307,33 @@ class SoftBody(Handle):
 
     @property
     def surface(self) -> NDArray[np.int32]:
-        """Surface triangles, outward, (f, 3)."""
+        """Vertices of each surface triangle, (f, 3), counterclockwise seen from outside."""
         return np.asarray(self.mesh.surface)
 
     @property
     def is_held(self) -> bool:
-        """True if it is attached to a frame or another body, grabbed, or driven by a motor."""
+        """True if the body is attached to a frame or to another body, grabbed, or driven by a motor."""
         return any(each.holds(self) for each in self._context.slices)
 
     @property
     def topology_version(self) -> int:
-        """Number of changes of its vertices and tetrahedra: after a change, read `surface` again."""
+        """Number of changes to the vertices and tetrahedra. After a change, read `surface` again."""
         return self._record.topology_version
 
     @property
     def is_cut(self) -> bool:
-        """True if cuts or tears have changed its mesh from that of its asset."""
+        """True if the body was cut or torn, so that its mesh differs from its asset's mesh."""
         return self._record.part is not None
 
     @property
     def vertex_origins(self) -> Ints:
-        """Vertex of the asset's mesh that each vertex is or copies, (n,)."""
+        """Original of each vertex in the asset's mesh, (n,). Cuts copy vertices."""
         part = self._record.part
         return np.arange(self.vertex_count) if part is None else part.vertices
 
     @property
     def tet_origins(self) -> Ints:
-        """Tetrahedron of the asset's mesh that each tetrahedron is, (m,)."""
+        """Index of each tetrahedron in the asset's mesh, (m,)."""
         part = self._record.part
         return np.arange(len(self.tets)) if part is None else part.tets
 
@@ -335,21 +344,22 @@ class SoftBody(Handle):
 
     @property
     def pinned(self) -> NDArray[np.int32]:
-        """Vertices that are pinned now, ascending."""
+        """Vertices that are pinned at present, ascending."""
         fields = self._context.fields
         return self._record.description.pinned if fields is None else fields.pinned(self)
 
     @property
     def is_frozen(self) -> bool:
-        """True once the body became non-finite; from then on it stays in its last finite state."""
+        """True once the body has become non-finite. It then stays in its last finite state."""
         return self._record.frozen_in is not None
 
     @property
     @one_thread
     def failure(self) -> Failure | None:
-        """First failure, None while the body is valid. Found on the first request, not within a step.
+        """First failure of the body; None while the body is valid.
 
-        The first request compiles kernels, for some seconds: `World.warm_up` does not include them.
+        The first request computes it, and compiles kernels for a few seconds. `World.warm_up` does not
+        compile these.
         """
         require_alive(self)
         record = self._record
@@ -361,7 +371,7 @@ class SoftBody(Handle):
         """Vertex positions after the last step, float32 (n, 3) [m].
 
         Args:
-            out: C-contiguous float32 array to fill and return; None makes a new one.
+            out: C-contiguous float32 array (n, 3) to fill and return; None: a new array.
         Raises: OptionError if `out` does not fit.
         """
         return self._context.built.positions(self, 1.0, out)
@@ -369,13 +379,14 @@ class SoftBody(Handle):
     def velocities(self) -> Floats32:
         """Vertex velocities at the time of the positions, float32 (n, 3) [m/s].
 
-        Leapfrog stores them half a substep behind; they are advanced with the present acceleration.
+        Leapfrog stores velocities half a substep earlier than positions. This method advances them with the
+        present acceleration.
         """
         return self._context.built.velocities(self)
 
     @property
     def gravity_scale(self) -> float:
-        """Factor of the world's gravity for this body."""
+        """Factor by which the world's gravity is multiplied for this body."""
         fields = self._context.fields
         return 1.0 if fields is None else float(fields.state.body_gravity_scale[self.index])
 
@@ -390,26 +401,26 @@ class SoftBody(Handle):
         return np.asarray(weighted_sum(masses, self.positions().astype(np.float64)) / masses.sum())
 
 
-# For the library, not for users.
+# Functions for the library, not for users.
 
 
 def record_of(body: SoftBody) -> BodyRecord:
-    """Internal record of a body, to read and to write."""
+    """Return the internal record of a body, which callers can change."""
     return body._record
 
 
 def present_asset(body: SoftBody) -> SoftBodyAsset:
-    """Asset in the slot of an uncut body: its own, or a coarser level of it."""
+    """Return the asset of an uncut body's present level of detail."""
     return body._asset.levels[body._record.level]
 
 
 def context_of(body: SoftBody) -> Context:
-    """Context of a body. Raises: StateError if the body or its world is gone."""
+    """Return the context of a body. Raises: StateError if the body or its world no longer exists."""
     return body._context
 
 
 def belongs_to(body: SoftBody, context: Context) -> bool:
-    """True if a body was made in a context; it can have been removed since."""
+    """True if a body was made in a context, even if the body was removed since."""
     return body._context_ref() is context
 
 
@@ -420,12 +431,12 @@ def require_alive(body: SoftBody) -> None:
 
 
 def slices_against_cuts(body: SoftBody) -> list[str]:
-    """Names of the slices that constrain a body and prevent a cut."""
+    """Return the names of the slices that constrain a body and thereby prevent a cut."""
     return [each.name for each in body._context.slices if each.prevents_cuts and each.holds(body)]
 
 
 def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays) -> Ranges:
-    """Record another description of a body. Returns its ranges in the fields."""
+    """Replace the description and arrays of a body. Return its ranges in the fields."""
     context = body._context
     body._record.description = description
     context.layout.bodies[body.index] = arrays

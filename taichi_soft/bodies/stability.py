@@ -1,14 +1,14 @@
-"""Largest substep that stays stable, from the vibrations of a body at rest.
+"""Largest stable substep, from the vibrations of a body at rest.
 
 Leapfrog with a lagging damper, x'' = -K x - C x' in units where M = 1, is
 
     x_(n+1) - 2 x_n + x_(n-1) = -h^2 K x_n - h C (x_n - x_(n-1)).
 
-With x_n - x_(n-1) = (x_(n+1) - x_(n-1)) / 2 - (x_(n+1) - 2 x_n + x_(n-1)) / 2 the energy
-1/2 d^T (1 - h C / 2 - h^2 K / 4) d + 1/2 s^T h^2 K s, of differences d and means s of neighbouring positions,
-never grows. It is therefore stable exactly if the largest eigenvalue of h^2 K + 2 h C is below 4. Lazy
-leapfrog makes the same steps. Lanczos' method finds that eigenvalue from below; its possible error is added,
-so that the limit is never above the true one.
+With x_n - x_(n-1) = (x_(n+1) - x_(n-1)) / 2 - (x_(n+1) - 2 x_n + x_(n-1)) / 2, the energy
+1/2 d^T (1 - h C / 2 - h^2 K / 4) d + 1/2 s^T h^2 K s, with differences d and means s of successive positions,
+never grows. The step h is therefore stable exactly if the largest eigenvalue of h^2 K + 2 h C is below 4.
+Lazy leapfrog makes the same steps. Lanczos' method approaches that eigenvalue from below. Its error bound is
+added, so that the estimated limit is never above the true one.
 """
 
 from __future__ import annotations
@@ -31,31 +31,32 @@ from taichi_soft.meshing import BodyMesh, TetMesh
 Floats = NDArray[np.float64]
 
 MARGIN = 0.9
-"""Recommended fraction of the linear limit: compression stiffens an element beyond its rest value."""
+"""Recommended fraction of the limit for small motion: compression makes elements stiffer than at rest."""
 
 _MAX_ITERATIONS = 120
 _MIN_ITERATIONS = 30
-"""Regular meshes have many nearly equal eigenvalues: fewer can end at one that is not the largest."""
+"""Regular meshes have many nearly equal eigenvalues: fewer iterations can miss the largest one."""
 
 _RESIDUAL = 0.02
-"""Relative residual at which Lanczos' method ends. The same amount is added for safety: 1 % of a step."""
+"""Relative residual at which Lanczos' method ends. The eigenvalue is increased by it for safety, which
+shortens the step by 1 %."""
 
 _DAMPING_PASSES = 8
 
 SLIVER_ANGLE = 15.0
-"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; 70.5 if regular."""
+"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular one has 70.5."""
 
 
 @dataclass(frozen=True)
 class StableStep:
-    """Limit of the substep of one body."""
+    """Largest stable substep of one body, and its cause."""
 
-    limit: float  # [s], largest stable substep for small motion: at most 15 % below the true one, never above
+    limit: float  # [s], for small motion: at most 15 % below the true limit, never above
     stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
-    period: float  # [s] of the fastest vibration
-    stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron, for forces along edges
+    period: float  # [s], period of the fastest vibration
+    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for forces along edges
     undamped: float = 0.0  # [s], limit without damping
-    slivers: int = 0  # flat tetrahedra whose own limit is below half of that of 99 of 100 others
+    slivers: int = 0  # number of flat tetrahedra with limits below half of the first percentile
     without_slivers: float = 0.0  # [s], approximate limit without slivers
     tets: int = 0  # number of tetrahedra of the body
 
@@ -91,9 +92,9 @@ class StableStep:
 def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> StableStep:
     """Estimate the largest stable substep for leapfrog and its lazy variant; explicit Euler has none.
 
-    It holds for motion about the rest shape. A strongly compressed body is stiffer, and a flattened
-    tetrahedron has no bound at all, so `recommended` leaves a margin. Pins are ignored: they can only make it
-    longer.
+    The estimate holds for small motion about the rest shape. A strongly compressed body is stiffer, and a
+    flattened tetrahedron has no stable substep at all, so `recommended` leaves a margin. The estimate ignores
+    pins, which can only increase the limit.
     Args:
         mesh: rest shape.
         material: constants that fit the mesh.
@@ -134,10 +135,11 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
 
 
 def _damped_limit(vibration: Vibration, undamped: float, u: Floats, start: Floats) -> float:
-    """Step h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
+    """Find the step h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
 
-    For a direction u, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is never below the one sought if K is
-    symmetric. The form at t h is at most t times that at h for t < 1, and at most t^2 times for t > 1.
+    For any direction u, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is never below this step if K is symmetric.
+    A step t h has at most t times the eigenvalue of h if t < 1, and at most t^2 times if t > 1. The last
+    correction uses this bound.
     """
     h, value = undamped, np.inf
     for _ in range(_DAMPING_PASSES):
@@ -153,7 +155,7 @@ def _scaled(start: Floats, u: Floats) -> Floats:
 
 
 def _touching_step(vibration: Vibration, u: Floats, h: float) -> float:
-    """Step h at which h^2 k + 2 h c is 4 in the direction u."""
+    """Return the step h at which h^2 u'Ku + 2 h u'Cu is 4, for u scaled to length 1."""
     u = u / np.linalg.norm(u)
     stiffness = float(np.vdot(u, vibration.apply(u)))
     damping = (float(np.vdot(u, vibration.apply(u, h))) - h * h * stiffness) / (2 * h)
@@ -161,17 +163,17 @@ def _touching_step(vibration: Vibration, u: Floats, h: float) -> float:
 
 
 def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tuple[float, Floats]:
-    """Bound of the largest eigenvalue, and its direction, by Arnoldi's method.
+    """Return an upper bound of an operator's largest eigenvalue, and its eigenvector, by Arnoldi's method.
 
-    It is Lanczos' method for symmetric operators. Laws along edges need not be symmetric; the result is then
-    the eigenvalue of largest magnitude.
+    For symmetric operators this is Lanczos' method. Operators of laws along edges can be asymmetric; the
+    result is then the largest magnitude of an eigenvalue.
     """
     shape, basis = start.shape, np.zeros((_MAX_ITERATIONS + 1, start.size))
     small = np.zeros((_MAX_ITERATIONS + 1, _MAX_ITERATIONS))
     basis[0] = (start / np.linalg.norm(start)).ravel()
     for k in range(1, _MAX_ITERATIONS + 1):
         image = apply(basis[k - 1].reshape(shape)).ravel()
-        for _ in range(2):  # twice, because of round-off
+        for _ in range(2):  # repeated, because round-off spoils the first orthogonalisation
             part = basis[:k] @ image
             image = image - part @ basis[:k]
             small[:k, k - 1] += part

@@ -11,19 +11,19 @@ from taichi_soft.core.serialisation import serialised
 @serialised("stress", "most")
 @dataclass(frozen=True)
 class Tearing:
-    """Tearing where the material is pulled beyond its strength (O'Brien and Hodgins 1999).
+    """Tearing of a body that is pulled beyond its strength (O'Brien and Hodgins 1999).
 
     After each step, the face between two tetrahedra tears if the largest principal stress of their mean
-    exceeds the strength: its vertices are split perpendicular to the pull, along the faces of the tetrahedra
-    around them. The stress is the Cauchy stress of the body's own law: see `Body.tet_stress`. A body tears as
-    long as its `spare_vertices` last. Pieces that fall off become bodies while slots are free, the largest
-    first. The others, and fragments of less than 2 % of the body, remain in it as separate parts. Frames keep
-    holding their vertices and copies of these. A body that is grabbed, joined to another one or driven by a
-    motor does not tear.
+    exceeds the strength. The vertices of the face are then split perpendicular to the pull, along faces of
+    the tetrahedra around them. The stress is the Cauchy stress of the body's own law: see `Body.tet_stress`.
+    A body tears until its `spare_vertices` are used up. Detached pieces become bodies while slots are free,
+    the largest first. Other pieces, and fragments of less than 2 % of the body, remain separate parts of the
+    body. Vertices attached to a frame, and their copies, stay attached. A body that is grabbed, joined to
+    another body or driven by a motor does not tear.
 
     Args:
         stress: tensile strength [Pa].
-        most: largest number of faces that one step tears in one body: the speed of a tear.
+        most: largest number of faces that tear per step in one body. It limits the speed of tears.
     Raises: OptionError for a value out of range.
     """
 

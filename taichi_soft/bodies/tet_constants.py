@@ -12,12 +12,12 @@ from taichi_soft.core.constants import LANES
 
 
 def write_tet_constants(fields: BodyFields, first_block: int, body: BodyArrays) -> None:
-    """Write the fields of `BodyFields.tet_constants`."""
+    """Write the fields of `BodyFields.tet_constants` for one body, from block `first_block` on."""
     if len(body.tet_vertices):
         for field, rows in fields.tet_constants(body):
             write_numbers(field, first_block * LANES * rows.shape[1], constant_blocks(rows))
 
 
 def constant_blocks(rows: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Constants of tetrahedra, (m, k), in the layout of their field: see `BodyFields`."""
+    """Return constants of tetrahedra, (m, k), in the layout of their field: see `BodyFields`."""
     return blocks_of(rows, rows.shape[1], 0).astype(np.float32)

@@ -17,9 +17,9 @@ Floats = NDArray[np.float64]
 
 
 class Vibration(ABC):
-    """K and C of a free body at rest, each scaled as M^-1/2 K M^-1/2.
+    """Stiffness K and damping C of a free body at rest, scaled by mass: M^-1/2 K M^-1/2, and C likewise.
 
-    Displacements are (n, 3, k): k of them at once, each times the root of the masses.
+    Displacements are (n, 3, k): k columns, each times the root of the masses.
     """
 
     def __init__(self, body: BodyDescription) -> None:
@@ -32,21 +32,21 @@ class Vibration(ABC):
         """True if C is not zero."""
 
     def diagonal(self) -> Floats:
-        """Approximate diagonal of K, (3 n,) [1/s^2], up to a factor: a preconditioner."""
+        """Approximate diagonal of K up to a factor, (3 n,) [1/s^2], for use as a preconditioner."""
         return np.ones(3 * len(self.root_mass))
 
     @abstractmethod
     def apply(self, u: Floats, h: float | None = None) -> Floats:
-        """K u [1/s^2]; with `h` [s], (h^2 K + 2 h C) u, which decides the stability of a substep h."""
+        """Return K u [1/s^2]; with `h` [s], (h^2 K + 2 h C) u, which determines if a substep h is stable."""
 
 
 def vibration_of(body: BodyDescription) -> Vibration:
-    """Vibrations of a body by its law."""
+    """Return the vibrations of a body, according to its law."""
     return TetVibration(body) if body.bonds is None else BondVibration(body)
 
 
 class TetVibration(Vibration):
-    """Vibrations with a law on tetrahedra: K is that of linear finite elements."""
+    """Vibrations for a law on tetrahedra: K is the stiffness matrix of linear finite elements."""
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
@@ -83,7 +83,7 @@ class TetVibration(Vibration):
         return np.asarray(total / self.root_mass)
 
     def energies(self, displaced: Floats) -> Floats:
-        """u^T K u of each tetrahedron for displacements (k, n, 3) [m]: twice their energy, (k, m) [J]."""
+        """Twice the elastic energy of each tetrahedron, (k, m) [J], for displacements (k, n, 3) [m]."""
         corners = displaced[:, self._tets.rows].reshape(len(displaced), -1, 12)
         return np.asarray(np.einsum("kti,tij,ktj->kt", corners, self._matrices, corners, optimize=True))
 
@@ -93,19 +93,20 @@ class TetVibration(Vibration):
         return np.asarray(self._tets.sum(diagonals) / self.root_mass**2).ravel()
 
     def element_bounds(self) -> Floats:
-        """Largest w^2 of every tetrahedron with its share of the masses of its vertices, (m,) [1/s^2].
+        """Largest squared frequency w^2 of each tetrahedron on its own, (m,) [1/s^2].
 
-        No w^2 of the body is above the largest of these (Irons and Treharne 1971). K_e = V b^T C b, where b
-        maps displacements to strain in Voigt's order, has for corner masses r V density / 4 the spectrum of
-        the 6x6 matrix 4 / density L^T (b r^-1 b^T) L with L L^T = C. The ratios r are 1 except in cages,
-        whose vertices carry more or less than a quarter of the adjacent tetrahedra.
+        No w^2 of the body exceeds the largest of these (Irons and Treharne 1971). A tetrahedron has corner
+        masses r V density / 4, where r is 1 except in cages: their vertices carry more or less than a quarter
+        of the adjacent tetrahedra. The stiffness of a tetrahedron is V b^T C b, where b maps displacements to
+        strain in Voigt's order. The squared frequencies are the eigenvalues of the 6x6 matrix
+        4 / density L^T (b r^-1 b^T) L with L L^T = C.
         """
         mesh, density = self.body.mesh, self.body.per_tet("density")
         assert isinstance(mesh, TetMesh)
         quarters = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
         ratios = np.repeat((self.body.masses / quarters)[mesh.tets], 3, axis=1)[:, None, :]
-        # Negligible beside the largest entry, but prevents round-off errors for Poisson's ratios near -1 and
-        # 1/2.
+        # Negligible relative to the largest entry, but C stays positive definite in spite of round-off for
+        # Poisson's ratios near -1 and 1/2.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
         gram = np.swapaxes(root, 1, 2) @ ((self.strains / ratios) @ np.swapaxes(self.strains, 1, 2)) @ root
@@ -113,7 +114,7 @@ class TetVibration(Vibration):
 
 
 class BondVibration(Vibration):
-    """Vibrations with a law along edges, by differences of forces: only these include how its planes turn."""
+    """Vibrations for a law along edges. Differences of forces include the rotation of its planes."""
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
@@ -122,7 +123,7 @@ class BondVibration(Vibration):
         self._offset = 1e-6 * float(body.mesh.edge_lengths.min())
         self._along, across = body.edge_damping, None
         if not body.model.has_simple_edges:
-            # The planes turn, so that each damping can act in any direction.
+            # The planes turn, so each damping constant can act in any direction.
             self._along = across = np.maximum(self._along, body.bonds.constants[:, 3] * body.bonds.is_bond)
         self._dampers = _EdgeDampers(body.mesh, self._along, across)
 
@@ -140,7 +141,7 @@ class BondVibration(Vibration):
         return np.asarray(total / self.root_mass)
 
     def _force_differences(self, displaced: Floats) -> Floats:
-        """Central differences of the forces at rest."""
+        """K times displacements, by central differences of the forces about the rest shape."""
         rest = self.body.mesh.vertices
         offset = self._offset / (np.abs(displaced).max() + 1e-300)
         zero_velocity = np.zeros_like(rest)
@@ -149,7 +150,7 @@ class BondVibration(Vibration):
 
 
 class _EdgeDampers:
-    """Dampers along edges, and across them if given [N s/m], (k,)."""
+    """Damping matrix of dampers along edges, and across them if given, (k,) [N s/m] each."""
 
     def __init__(self, mesh: BodyMesh, along: Floats, across: Floats | None = None) -> None:
         ends = mesh.vertices[mesh.edges]
@@ -162,14 +163,14 @@ class _EdgeDampers:
         self._edges = _Owners(mesh.edges, len(mesh.vertices))
 
     def apply(self, velocities: Floats) -> Floats:
-        """Damping C times velocities [m/s], (n, 3, k) [N]."""
+        """Return the damping matrix times velocities [m/s], (n, 3, k) [N]."""
         ends = velocities[self._edges.rows]
         force = self._matrices @ (ends[:, 0] - ends[:, 1])
         return self._edges.sum(np.stack([force, -force], axis=1))
 
 
 class _Owners:
-    """Sum rows, such as forces on the corners of tetrahedra, by vertex."""
+    """Sums of rows by vertex, such as forces on the corners of tetrahedra."""
 
     def __init__(self, rows: NDArray[np.int32], count: int) -> None:
         self.rows = rows
@@ -179,7 +180,7 @@ class _Owners:
         self._count = count
 
     def sum(self, forces: Floats) -> Floats:
-        """Sum (m, c, 3, k) to (n, 3, k)."""
+        """Sum the forces on c corners of m elements, (m, c, 3, k), by vertex, (n, 3, k)."""
         flat = forces.reshape(-1, *forces.shape[2:])[self._order]
         total = np.zeros((self._count, *forces.shape[2:]))
         total[self._present] = np.add.reduceat(flat, self._starts, axis=0)
@@ -187,7 +188,7 @@ class _Owners:
 
 
 def _strains(rest_inverses: Floats) -> Floats:
-    """b of each tetrahedron, from the displacements of its corners to strain in Voigt's order, (m, 6, 12)."""
+    """Matrix b of each tetrahedron, from corner displacements to strain in Voigt's order, (m, 6, 12)."""
     gradients = np.concatenate([-rest_inverses.sum(axis=1, keepdims=True), rest_inverses], axis=1)
     b = np.zeros((len(gradients), 6, 4, 3))
     for axis in range(3):

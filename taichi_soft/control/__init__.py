@@ -1,1 +1,1 @@
-"""A game's changes to bodies between two steps: check the arguments, then call one kernel."""
+"""Control of bodies between two steps. Each function checks its arguments, then calls one kernel."""

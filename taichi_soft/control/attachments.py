@@ -1,4 +1,4 @@
-"""Particles attached to a frame, and their load on it."""
+"""Attachments of particles to frames, and their load on the frames."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ from taichi_soft.core.types import Schedule
 class Attachment(Handle):
     """Particles of a body attached to a frame. Returned by `Body.attach`.
 
-    If the body is cut or torn, the particles and their copies stay attached; `particles` lists all. If it
-    falls apart, `body` is the largest piece with attached particles; other pieces get their own attachments,
-    listed in `Body.attachments`. If the level of detail changes, the nearest vertices are attached instead.
+    If the body is cut or torn, the particles and their copies stay attached; `particles` then contains both.
+    If the body falls apart, `body` becomes the largest piece with attached particles. Other pieces get their
+    own attachments, listed in `Body.attachments`. If the level of detail changes, the nearest vertices are
+    attached instead.
     """
 
     def __init__(
@@ -44,27 +45,27 @@ class Attachment(Handle):
 
     @property
     def is_attached(self) -> bool:
-        """False after release."""
+        """True until the attachment is released."""
         return self in self._frames.holding(self.body)
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """Force of the body on the frame, mean over the last step, (3,) [N].
+        """Mean force of the body on the frame during the last step, (3,) [N].
 
-        It includes the weight of the attached particles and the force that accelerates them. A frozen body
-        exerts no force: the result is 0, or the force of other bodies on the attached particles.
+        The force includes the weight of the attached particles and the force that accelerates them. A frozen
+        body exerts no force of its own: only forces of other bodies on the attached particles remain.
         Raises: StateError after release, or without `two_way`.
         """
         return self._load()[:3]
 
     @property
     def torque(self) -> NDArray[np.float64]:
-        """Torque of `force` about the frame's origin, (3,) [N m]. Raises: as `force`."""
+        """Mean torque about the frame's origin during the last step, (3,) [N m]. Raises: as `force`."""
         return self._load()[3:]
 
     @recorded
     def release(self) -> None:
-        """Release the particles; they keep their velocity. Raises: StateError if already released."""
+        """Release the particles, which keep their velocity. Raises: StateError if already released."""
         self._require_attached()
         body = self.body
         change(body, free_particles, rows_of(body, self.particles))
@@ -94,8 +95,8 @@ class Attachments(Slice):
     """All attachments of one world; `Frames` stores them by body."""
 
     name = "attachments"
-    prevents_cuts = False  # `share_attachments` keeps pieces attached
-    prevents_levels = False  # see `levels.reattaching`
+    prevents_cuts = False  # `share_attachments` keeps the pieces attached
+    prevents_levels = False  # `levels.reattaching` attaches the new vertices
 
     @property
     def _frames(self) -> Frames:
@@ -111,7 +112,7 @@ class Attachments(Slice):
             attachment.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Attach a free vertex to a frame, and read its load."""
+        """Compile the kernels, by attaching a free vertex to a frame and reading its load."""
         free = np.setdiff1d(np.arange(body.vertex_count), body.pinned)
         if not len(free):
             return
@@ -126,7 +127,7 @@ class Attachments(Slice):
         frame.remove()
 
     def entries(self) -> list[list[Any]]:
-        """List numbers of handle, body and frame, the flag `two_way`, and the particles."""
+        """List each attachment's serial number, body, frame, flag `two_way`, and particles."""
         frames, bodies = self._frames, sorted(self._frames.attachments, key=lambda body: body.index)
         return [
             [serial_of(a), body.index, frames.number_of(a.frame), a.two_way, a.particles.tolist()]
@@ -137,7 +138,7 @@ class Attachments(Slice):
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, bool, NDArray[np.int32]]]:
-        """Parse rows of `entries`. Raises: ValueError for a missing body or frame."""
+        """See `Slice.read`. Raises: ValueError for a missing body or frame."""
         rows = {row for row, (serial, _, _) in enumerate(earlier[Frames.name]) if serial != 0}
         found = []
         for serial, slot, number, two_way, particles in entries:
@@ -150,7 +151,7 @@ class Attachments(Slice):
         return found
 
     def restore(self, read: Any) -> None:
-        """Replace all attachments by those from `read`."""
+        """Replace all attachments by the attachments from `read`."""
         context, frames = self.context, self._frames
         frames.attachments.clear()
         for serial, slot, number, two_way, particles in read:
@@ -187,10 +188,11 @@ def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> A
 
 
 def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[np.int64]]]) -> None:
-    """Keep the attachments of a body that was cut.
+    """Keep particles attached after a cut: divide the attachments of a body among its pieces.
 
     Args:
-        pieces: the pieces, the largest first, each with the original vertex of each of its vertices, (n,).
+        body: body that was cut.
+        pieces: pieces, the largest first, each with the original of each of its vertices, (n,).
     """
     context = context_of(body)
     frames = context.of(Frames)
@@ -216,7 +218,7 @@ def attached_vertices(body: SoftBody) -> NDArray[np.int32]:
 
 
 def require_unattached(body: SoftBody, vertices: NDArray[np.int32]) -> None:
-    """Raise a StateError with the first of `vertices` that is attached to a frame."""
+    """Check that none of `vertices` is attached to a frame. Raises: StateError with the first that is."""
     held = np.intersect1d(vertices, attached_vertices(body))
     if len(held):
         raise StateError(

@@ -1,4 +1,4 @@
-"""Change a body between two steps. All control goes through `change` or `attempt`."""
+"""Functions that change a body between two steps. All control of bodies uses `change` or `attempt`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Rows32 = NDArray[np.float32]
 
 
 def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a kernel (state, *arguments) that changes `body` between two steps.
+    """Call `kernel(state, *arguments)`, which changes `body` between two steps, and wake the body.
 
     Raises: StateError before `World.build`.
     """
@@ -26,29 +26,29 @@ def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def attempt(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a kernel that can refuse the change. The caller wakes the body with `mark_modified` on success."""
+    """Call `kernel(state, *arguments)`, which can reject the change. On success, call `mark_modified`."""
     return context_of(body).built.attempt(kernel, *arguments)
 
 
 def mark_modified(body: SoftBody) -> None:
-    """Wake `body` after a successful attempt."""
+    """Wake `body` after a successful `attempt`."""
     context_of(body).built.mark_modified(body.index)
 
 
 def numbers(*values: Any) -> Rows32:
-    """Concatenate numbers and vectors to an array for kernels."""
+    """Concatenate numbers and vectors into one float32 array, for kernels."""
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
 
 
 def some_particles(body: SoftBody, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
-    """Check and sort vertex numbers of a body; None means all. Raises: OptionError, also if empty."""
+    """Check and sort vertex indices of a body; None means all. Raises: OptionError if invalid or empty."""
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
     return named_particles(body, particles, name)
 
 
 def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
-    """The same, but None is refused."""
+    """Check and sort vertex indices of a body. Raises: OptionError if invalid, empty or None."""
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
         raise OptionError(f"{name} is empty: give at least one vertex, from 0 to {body.vertex_count - 1}")
@@ -56,16 +56,16 @@ def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles
 
 
 def mass_of(body: SoftBody, vertices: NDArray[np.int32]) -> float:
-    """Mass of vertices of a body [kg], summed in order, as in the native library."""
+    """Total mass of some vertices of a body [kg]. It is summed in order, as in the native library."""
     return float(np.cumsum(body.masses[vertices])[-1])
 
 
 def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Indices of a body's vertices in the fields. Raises: StateError before `World.build`."""
+    """Return the rows of some vertices of a body in the fields. Raises: StateError before `World.build`."""
     return context_of(body).built.rows_of(body.index, vertices)
 
 
 def require_per_body(context: Context, what: str) -> None:
-    """Raise a StateError if the schedule does not support `what`."""
+    """Check that the schedule of a world supports the feature `what`. Raises: StateError."""
     if context.settings.schedule is Schedule.FLAT:
         raise StateError(FLAT.message(feature=what))

@@ -1,4 +1,4 @@
-"""Forces, gravity, damping and wind, which act during the next steps."""
+"""External forces, gravity, linear damping and wind. They act during the steps that follow."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
 ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
-"""Function (positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
+"""Function that returns accelerations, (n, 3) [m/s^2], for positions (n, 3) [m] and a time [s]."""
 
 MAX_ACCELERATION = 1e9
-"""Largest acceleration [m/s^2]; it exceeds the limit of valid velocities within 20 us."""
+"""Largest acceleration [m/s^2]. It reaches the limit of valid velocities within 20 us."""
 
 
 def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -> None:
@@ -83,17 +83,17 @@ def set_wind(context: Context, velocity: ArrayLike | None, density: float, drag:
 
 
 def require_field(field: Any) -> ForceField | None:
-    """Check that `field` is a function or None. Raises: OptionError."""
+    """Check that `field` is a function or None, and return it. Raises: OptionError."""
     if field is not None and not callable(field):
         raise OptionError(f"function must take (positions, time), or be None, got {field!r}")
     return field  # type: ignore[no-any-return]
 
 
 def apply_force_field(context: Context, field: ForceField) -> list[tuple[SoftBody, NDArray[np.float32]]]:
-    """Evaluate a force field for all moving bodies, then accelerate them.
+    """Evaluate a force field for all moving bodies, then accelerate them during the next step.
 
-    Returns: bodies and their accelerations, (n, 3) [m/s^2].
-    Raises: errors of the field; OptionError for an invalid result. Then no body is changed.
+    Returns: the bodies and their accelerations, (n, 3) [m/s^2].
+    Raises: errors of the field; OptionError for an invalid result. After an error, no body is changed.
     """
     rows = []
     for body in context.slots.occupants:
@@ -108,7 +108,7 @@ def apply_force_field(context: Context, field: ForceField) -> list[tuple[SoftBod
 
 
 def accelerate_bodies(rows: Sequence[tuple[SoftBody, Any]]) -> None:
-    """Accelerate bodies during the next step: accelerations of their vertices, float32 (n, 3) [m/s^2].
+    """Accelerate bodies during the next step. Each row is a body and float32 (n, 3) [m/s^2].
 
     Zero accelerations do not wake a body.
     """

@@ -1,9 +1,9 @@
-"""Ease in a new material while a body moves, so that a stiffer one adds no energy.
+"""Change the material of a moving body gradually, so that a stiffer material adds no energy.
 
-A stiffer material has more strain energy in a deformed body, which would throw it. So constants change along
-k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance falls as a parabola, and a loaded body moves to
-its new shape at a constant deceleration. While k grows, vibrations are damped like k^-`FADING`: a mode that
-is faster than the change keeps the energy E ~ k^(1/2 - FADING).
+A sudden change to a stiffer material would increase the strain energy of a deformed body and accelerate it.
+The constants therefore follow k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance decreases as a
+parabola, and a loaded body moves to its new shape with constant deceleration. While k grows, vibrations are
+damped like k^-`FADING`: the energy of a mode that is faster than the change follows k^(1/2 - FADING).
 """
 
 from __future__ import annotations
@@ -31,39 +31,39 @@ SHORTEST, PERIODS = 0.5, 8.0
 """Duration of a change: the larger of SHORTEST [s] and PERIODS / omega, omega of the slowest mode [rad/s]."""
 
 HELD = 6.4
-"""Ratio of a free beam's frequency to that of a beam held at one end (roots of the bending equation,
-(4.730 / 1.875)^2)."""
+"""Frequency of a free beam relative to a beam held at one end: (4.730 / 1.875)^2, from the roots of the
+bending equation."""
 
 FADING = 2.0
-"""Exponent of the stiffness in the damping of vibrations; it damps the slowest mode critically."""
+"""Exponent of the stiffness in the damping of vibrations. With it, the slowest mode is critically damped."""
 
 TIMES_A_STEP = 8.0
-"""Smallest number of times that vibrations are damped per step: see `kept_vibration`."""
+"""Smallest number of dampings of vibrations per step: see `kept_vibration`."""
 
 LIFT = 1e-4
-"""A change that adds less energy than lifting the body by this height [m] is immediate."""
+"""Height [m]: a change that adds less energy than lifting the body by it is immediate."""
 
 LARGEST_RATIO = 1e12
-"""Largest ratio of new to initial stiffness, because the old stiffness can be zero."""
+"""Upper limit of the ratio of new to initial stiffness, because the initial stiffness can be zero."""
 
 
 @dataclass(eq=False)
 class Easing:
     """A running change of material."""
 
-    constants: Floats  # current values in the fields: see `_constants`
-    ratio: float  # final over initial stiffness, the largest of all elements
-    seconds: float  # duration
+    constants: Floats  # present values in the fields: see `_constants`
+    ratio: float  # largest ratio of final to initial stiffness of all elements
+    seconds: float  # duration of the change [s]
     passed: float = 0.0  # elapsed time [s]
 
     @property
     def plain(self) -> list[Any]:
-        """Convert to plain data."""
+        """Return the change as plain data for a snapshot."""
         content = base64.b64encode(self.constants.tobytes()).decode()
         return [self.ratio, self.seconds, self.passed, content]
 
     def stiffness(self, passed: float) -> float:
-        """Relative stiffness of the element that changes most, after a time [s]."""
+        """Return the relative stiffness of the element that changes most, `passed` [s] after the start."""
         part = min(passed / self.seconds, 1.0)
         compliance = 1.0 - (1.0 - 1.0 / math.sqrt(self.ratio)) * part
         return 1.0 / (compliance * compliance)
@@ -75,13 +75,13 @@ class Easings(Slice):
     name, prevents_cuts, prevents_levels = "easings", False, False
 
     def __init__(self, context: Any) -> None:
-        """Start without entries."""
+        """Start without running changes."""
         super().__init__(context)
         self.by_body: dict[SoftBody, Easing] = {}
         self._left: list[SoftBody] = []  # bodies whose fields a snapshot is about to overwrite
 
     def begin(self, body: SoftBody, material: Any) -> None:
-        """Start to change a body's material."""
+        """Start to change the material of a body."""
         record, built = record_of(body), self.context.built
         before, energy = record.present or self._arrays(body), elastic_energy(body)
         self.release_body(body)
@@ -98,7 +98,7 @@ class Easings(Slice):
         write_stiffness(self.context.built.state, self._place(body), arrays)
 
     def _duration(self, body: SoftBody, before: BodyArrays) -> float:
-        """Duration of a change that begins with these constants [s]."""
+        """Return the duration [s] of a change of a body from the arrays `before` to its present arrays."""
         asset = present_asset(body)
         softer = _mean_modulus(asset.arrays) / max(_mean_modulus(before), 1e-30)
         heavier = float(before.mass.mean() / asset.arrays.mass.mean())
@@ -108,7 +108,7 @@ class Easings(Slice):
         return max(SHORTEST, PERIODS * slower * math.sqrt(softer * heavier) / asset.guessed_frequency)
 
     def advance(self, seconds: float) -> None:
-        """Advance all changes for the next step of `seconds` [s]."""
+        """Advance all changes to the end of the next step, of `seconds` [s]."""
         for body, easing in list(self.by_body.items()):
             before = easing.stiffness(easing.passed)
             easing.passed += seconds
@@ -124,7 +124,7 @@ class Easings(Slice):
             self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
 
     def finish(self, body: SoftBody) -> None:
-        """Finish a change immediately, because the caller has set the body's state."""
+        """Finish the change of a body's material, if any, immediately."""
         if body in self.by_body:
             self.release_body(body)
             arrays, place = self._arrays(body), self._place(body)
@@ -145,8 +145,9 @@ class Easings(Slice):
         """Continue a change in the pieces of a cut body.
 
         Args:
-            order: previous order of its tetrahedra in the fields.
-            pieces: the pieces, each with the original tetrahedron of each of its tetrahedra, (m,).
+            body: body that was cut.
+            order: order of its tetrahedra in the fields before the cut.
+            pieces: pieces, each with the original of each of its tetrahedra, (m,).
         """
         easing = self.by_body.get(body)
         self.release_body(body)
@@ -157,12 +158,12 @@ class Easings(Slice):
             self._go_on(piece, replace(easing, constants=rows[tets][self._arrays(piece).tet_order].ravel()))
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Call the kernels of a change."""
+        """Compile the kernels of a change, by calling them."""
         _ = present_asset(body).guessed_frequency
         _write(self.context.built.state, body, self._place(body), self._arrays(body), 0.0, 1.0)
 
     def entries(self) -> list[list[Any]]:
-        """List body, stiffness ratio, duration, elapsed time and current constants."""
+        """List each change's body, stiffness ratio, duration, elapsed time and present constants."""
         eased = sorted(self.by_body.items(), key=lambda item: item[0].index)
         return [[body.index, *easing.plain] for body, easing in eased]
 
@@ -173,7 +174,7 @@ class Easings(Slice):
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, Easing]]:
-        """Parse rows of `entries`. Raises: ValueError for a missing body or values that are not finite."""
+        """See `Slice.read`. Raises: ValueError for a missing body or values that are not finite."""
         found = []
         for slot, ratio, seconds, passed, content in entries:
             if not vertex_counts[below(slot, len(vertex_counts))]:
@@ -206,7 +207,7 @@ class Easings(Slice):
 
 
 def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: float, seconds: float) -> None:
-    """Write constants, and the damping rate of vibrations in a step [1/s]. Called like a kernel."""
+    """Write constants, and the damping rate of vibrations in the next step [1/s]. Called like a kernel."""
     write_stiffness(state, place, arrays)
     own, interval = present_asset(body).vibration_row(record_of(body).description)
     if rate > 0.0:
@@ -216,7 +217,7 @@ def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: flo
 
 
 def _parts(arrays: BodyArrays) -> list[Floats]:
-    """Constants that a law multiplies with a deformation, and edge constants of a pairwise law."""
+    """Return the constants that change: elastic constants, and the edge constants of a pairwise law."""
     parts = [arrays.lame]
     if arrays.stiffness.any():
         parts.append(arrays.stiffness)
@@ -228,7 +229,7 @@ def _parts(arrays: BodyArrays) -> list[Floats]:
 
 
 def _constants(arrays: BodyArrays) -> Floats:
-    """Concatenate `_parts`; for laws on tetrahedra, tetrahedron by tetrahedron."""
+    """Concatenate `_parts` to one array; for laws on tetrahedra, tetrahedron by tetrahedron."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         return np.concatenate(parts, axis=1).ravel()
@@ -236,7 +237,7 @@ def _constants(arrays: BodyArrays) -> Floats:
 
 
 def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
-    """Copy a body's arrays with other constants."""
+    """Return a body's arrays with `constants` in place of its `_constants`."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         rows = constants.reshape(len(arrays.lame), -1)
@@ -250,8 +251,11 @@ def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
 
 
 def _moduli(arrays: BodyArrays) -> Floats:
-    """Moduli for comparing elements, (m, k): bulk and shear modulus, or stiffness along an edge, or the
-    diagonal of an anisotropic material."""
+    """Return the moduli by which the stiffness of elements is compared, (m, k).
+
+    They are bulk and shear modulus (up to factors), stiffness along an edge, or the diagonal of an
+    anisotropic stiffness.
+    """
     if not len(arrays.lame):
         assert arrays.bonds is not None
         return arrays.bonds.constants[:, 1:2]
@@ -266,7 +270,7 @@ def _mean_modulus(arrays: BodyArrays) -> float:
 
 
 def _growth(before: BodyArrays, after: BodyArrays) -> float:
-    """Largest ratio of new to old stiffness of all elements; at least 1."""
+    """Return the largest ratio of new to old stiffness of all elements, at least 1."""
     old, new = _moduli(before), _moduli(after)
     grown = new > old
     return float(np.minimum(new[grown] / np.maximum(old[grown], 1e-300), LARGEST_RATIO).max(initial=1.0))

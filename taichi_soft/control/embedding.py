@@ -1,4 +1,4 @@
-"""Embedded points, which follow the vertices of a tetrahedron."""
+"""Points embedded in a body, which follow the vertices of a tetrahedron."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 FARTHEST = -0.5
-"""Smallest weight of a corner: points must lie in a tetrahedron that is scaled by three about its centre."""
+"""Smallest weight: a point must lie in the tetrahedron scaled by 3 about its centre."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Barycentric coordinates of n points among four vertices each; the weights of a point have the sum 1."""
+    """Barycentric coordinates of n points in four vertices each. The weights of a point sum to 1."""
 
     vertices: NDArray[np.int32]  # (n, 4)
     weights: Floats  # (n, 4)
 
 
 def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
-    """Embed points (n, 3) [m] in the tetrahedra of a body in its current shape. A point outside uses the
-    tetrahedron that it is least outside of.
+    """Embed points (n, 3) [m] in the tetrahedra of a body in its present shape.
 
-    Raises: OptionError with the name of the first point that is too far away, and for a body without
+    For a point outside the body, it chooses the tetrahedron with the largest smallest weight.
+    Raises: OptionError with the name of the first point that is too far away, or for a body without
         tetrahedra.
     """
     if len(body.tets) == 0:
@@ -45,19 +45,19 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
             f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
             "move the two together first, or give vertices in onto"
         )
-    weights[np.abs(weights) < 1e-4] = 0.0  # rounding must not involve other vertices
+    weights[np.abs(weights) < 1e-4] = 0.0  # round-off must not involve further vertices
     return Places(corners, weights / weights.sum(axis=1, keepdims=True))
 
 
 def embedded(points: Floats, x: Floats, tets: NDArray[np.int32]) -> tuple[NDArray[np.int32], Floats]:
-    """Vertices and barycentric coordinates of points (k, 3) in tetrahedra: see `embed_points`."""
+    """Return the vertices and barycentric coordinates of points (k, 3) in tetrahedra: see `embed_points`."""
     corners, weights = np.empty((len(points), 4), dtype=np.int32), np.empty((len(points), 4))
     embed_points(points, x, tets, corners, weights)
     return corners, weights
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:
-    """Embed vertices, each through the first tetrahedron that contains it, if any."""
+    """Embed vertices of a body, each in the first tetrahedron that contains it, if there is one."""
     corners = np.repeat(vertices[:, None], 4, axis=1)
     if len(body.tets):
         flat = body.tets.ravel()

@@ -1,4 +1,4 @@
-"""Frames that bodies are attached to, and the target velocities of all pinned particles before a step."""
+"""Frames to which bodies are attached, and the velocities of all pinned particles in the next step."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ class Frames(Slice):
     name = "frames"
 
     def __init__(self, context: Context) -> None:
-        """Start without frames, but with one row, because kernels do not take empty arrays."""
+        """Start without frames, but with one row of poses, because kernels do not accept empty arrays."""
         super().__init__(context)
-        self.attachments: dict[SoftBody, list[Any]] = {}  # by body, in order
-        self.rows: list[Frame | None] = []  # None after removal; the next frame takes the first free row
+        self.attachments: dict[SoftBody, list[Any]] = {}  # attachments of each body, in order of creation
+        self.rows: list[Frame | None] = []  # None after removal; a new frame gets the first free row
         self.present = np.zeros((1, 12), dtype=np.float32)
-        self.coming = self.present.copy()  # at the end of the next step
-        self.past = self.present.copy()  # before the last step
-        self.has_work = False  # a pinned particle has a target, or has just reached it
+        self.coming = self.present.copy()  # poses at the end of the next step
+        self.past = self.present.copy()  # poses before the last step
+        self.has_work = False  # True if a pinned particle has a target or has just reached it
 
     @property
     def handles(self) -> list[Frame]:
-        """Existing frames, by row."""
+        """All frames, in the order of their rows."""
         return [frame for frame in self.rows if frame is not None]
 
     def add(self, frame: Frame, pose: NDArray[np.float32]) -> int:
-        """Add a frame. Returns: its row."""
+        """Add a frame with its pose. Return its row."""
         number = self.rows.index(None) if None in self.rows else len(self.rows)
         if number == len(self.rows):
             self.rows.append(frame)
@@ -54,30 +54,32 @@ class Frames(Slice):
         return number
 
     def number_of(self, frame: Any) -> int:
-        """Return the row of a frame. Raises: OptionError for a frame of another world; StateError if it was
-        removed."""
+        """Return the row of a frame.
+
+        Raises: OptionError for a frame of another world; StateError if the frame was removed.
+        """
         if not isinstance(frame, Frame) or frame._frames is not self:
             raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
         frame._require_alive()
         return frame._number
 
     def holding(self, body: SoftBody) -> list[Any]:
-        """Attachments of a body."""
+        """Return the attachments of a body."""
         return self.attachments.get(body, [])
 
     def attachments_to(self, frame: Frame) -> list[Any]:
-        """Attachments to a frame, body by body."""
+        """Return the attachments to a frame, in the order of their bodies' slots."""
         bodies = sorted(self.attachments, key=lambda body: body.index)
         return [each for body in bodies for each in self.attachments[body] if each.frame is frame]
 
     def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
-        """Set the velocities of pinned particles for the next step."""
+        """Set the velocities of pinned particles for the next step of `dt` [s]."""
         if self.has_work:
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
         self.past, self.present = self.present, self.coming.copy()
 
     def displacement(self, body: SoftBody) -> float:
-        """Largest distance that frames moved a particle in the last, undone step [m]."""
+        """Return the largest distance [m] that frames moved a particle in the last step, which was undone."""
         x, longest = body.positions().astype(np.float64), 0.0
         for each in self.holding(body):
             (a, start), (b, end) = (
@@ -88,20 +90,20 @@ class Frames(Slice):
         return longest
 
     def entries(self) -> list[list[Any]]:
-        """List the handle number of each row (0 if free) and both poses."""
+        """List the serial number (0 if free), the present pose and the next pose of each row."""
         return [
             [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
             for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)
         ]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
-        """Handle numbers of the rows in use."""
+        """Return the serial numbers of the rows in use."""
         return [serial for serial, _, _ in entries if serial != 0]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
-        """Parse rows of `entries`. Raises: ValueError for a pose out of range."""
+        """See `Slice.read`. Raises: ValueError for a pose out of range."""
         found = []
         for serial, *poses in entries:
             present, coming = (vector_of(pose, 12) for pose in poses)
@@ -111,11 +113,11 @@ class Frames(Slice):
         return found
 
     def things(self, read: Any) -> dict[str, int]:
-        """As `Slice.things`: frames."""
+        """Return the number of rows for frames: see `Slice.things`."""
         return {FRAME: len(read)}
 
     def restore(self, read: Any) -> None:
-        """Replace all frames by those from `read`. Pins get their velocities before the next step."""
+        """Replace all frames by the frames from `read`. Pins get their velocities before the next step."""
         self.rows = [None] * len(read)
         self.present = np.zeros((max(len(read), 1), 12), dtype=np.float32)
         self.coming = self.present.copy()
@@ -133,7 +135,7 @@ class Frames(Slice):
 
 
 class Frame(Handle):
-    """A pose that the game moves: a bone, a vehicle, a hand. Returned by `World.add_frame`."""
+    """A pose that the game moves, such as a bone, a vehicle or a hand. Returned by `World.add_frame`."""
 
     def __init__(self, frames: Frames, position: ArrayLike, rotation: Any) -> None:
         """Use `World.add_frame` instead."""
@@ -142,7 +144,7 @@ class Frame(Handle):
 
     @classmethod
     def _at(cls, frames: Frames, number: int) -> Frame:
-        """Make a handle to an existing frame."""
+        """Make a handle for the frame in row `number`."""
         frame = cls.__new__(cls)
         frame._frames, frame._number = frames, number
         return frame
@@ -154,7 +156,7 @@ class Frame(Handle):
 
     @property
     def is_alive(self) -> bool:
-        """False after it was removed, or the world was restored to a state without it."""
+        """True until the frame is removed, or the world is restored to a state without it."""
         rows = self._frames.rows
         return self._number < len(rows) and rows[self._number] is self
 
@@ -166,25 +168,25 @@ class Frame(Handle):
 
     @property
     def position(self) -> NDArray[np.float32]:
-        """Position of its origin after the last step, (3,) [m]."""
+        """Position of the frame's origin after the last step, (3,) [m]."""
         self._require_alive()
         return np.array(self._frames.present[self._number, 9:])
 
     @property
     def rotation(self) -> NDArray[np.float32]:
-        """Its axes after the last step, as columns, (3, 3)."""
+        """Rotation matrix of the frame after the last step, with its axes as columns, (3, 3)."""
         self._require_alive()
         return np.array(self._frames.present[self._number, :9].reshape(3, 3))
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Move the frame to a pose over the next step. It stays there until it is moved again.
+        """Move the frame to a pose during the next step. It stays there until it is moved again.
 
         Attached bodies are dragged along. A body that is dragged farther than its size in one step fails: use
         `teleport` for jumps.
         Args:
-            position: position of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its rotation.
+            position: new position of the origin, (3,) [m].
+            rotation: new rotation, as a matrix (3, 3) or quaternion (x, y, z, w); None: unchanged.
         Raises: OptionError for invalid numbers.
         """
         self._require_alive()
@@ -200,12 +202,12 @@ class Frame(Handle):
     ) -> None:
         """Jump to a pose, and move every attached body as a whole by the same rigid motion.
 
-        Interpolated frames and the targets of pins jump too. Joined bodies and grabs do not move. An earlier
-        `move_to` is discarded. Parts that are then below the floor or inside a collider are pushed out, and
-        the body fails if that is far.
+        The previous positions for interpolation and the targets of pins jump too. Bodies joined to the
+        attached bodies do not move, nor do grabs. An earlier `move_to` is discarded. Parts that are then
+        below the floor or inside a collider are pushed out; if they are pushed far, the body fails.
         Args:
-            position: position of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its rotation.
+            position: new position of the origin, (3,) [m].
+            rotation: new rotation, as a matrix (3, 3) or quaternion (x, y, z, w); None: unchanged.
             keep_velocity: True rotates velocities with the bodies, False stops them.
         Raises: OptionError for invalid numbers or a body that would be out of range; StateError for a body
             that is also attached to another frame.
@@ -228,7 +230,7 @@ class Frame(Handle):
 
     @recorded
     def remove(self) -> None:
-        """Remove the frame from the world and release its attachments; particles keep their velocity."""
+        """Remove the frame from the world and release its attachments. The particles keep their velocity."""
         self._require_alive()
         for attachment in self._frames.attachments_to(self):
             attachment.release()

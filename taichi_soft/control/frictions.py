@@ -1,4 +1,4 @@
-"""Change the friction between bodies, and of a floor that is not a collider."""
+"""Change the friction of bodies, and of a floor that is not a collider."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def set_friction(body: SoftBody, friction: float) -> None:
 
 
 def give_friction(state: Any, body: SoftBody, friction: float | None) -> None:
-    """Store and write the friction of a body; None takes its asset's. Called like a kernel."""
+    """Store and write the friction of a body; None: its asset's friction. Called like a kernel."""
     record = record_of(body)
     record.friction = None if friction == body.asset.contact.friction else friction
     if state.capacity.contact.soft:

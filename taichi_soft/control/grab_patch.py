@@ -1,4 +1,4 @@
-"""The part of a body that a grab holds, and the largest force on it."""
+"""Patch of a grab: the part of a body that the grab pulls, and the largest force on it."""
 
 from __future__ import annotations
 
@@ -13,30 +13,28 @@ from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
-"""Radius of a patch over the diagonal of the body, about the size of a hand's grip."""
+"""Radius of a patch relative to the diagonal of the body, about the size of a hand's grip."""
 
 FARTHEST_PULL = 0.5
-"""Largest displacement of a patch over its radius, by the estimate below. Elements then stretch by a quarter
-to a third, which is stable with the longest stable substeps; four times as much is not."""
+"""Largest estimated displacement of a patch relative to its radius. Elements then stretch by a quarter to a
+third, which is stable with the longest stable substeps; a displacement four times as large is not."""
 
 LIMITS = np.array([PATCH_SIZE, 1.2, 1e-6, FARTHEST_PULL])
-"""Numbers that the kernel takes: the second is the least radius over the distance of the farthest corner, the
-third the least falloff of a vertex in a patch."""
+"""Constants for `shape_patch`. The second is the smallest radius relative to the distance of the farthest
+corner, the third the smallest falloff of a vertex in a patch."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Vertices around a point, with their shares of the force, which have the sum 1."""
+    """Vertices around a grabbed point, with their fractions of the force, which sum to 1."""
 
     vertices: NDArray[np.int32]
     shares: NDArray[np.float64]
-    strength: (
-        float  # force that moves it by `FARTHEST_PULL` of its radius relative to the rest of the body [N]
-    )
+    strength: float  # force that moves the patch by `FARTHEST_PULL` times its radius [N]
 
 
 def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """Make the patch around a rest point, given in barycentric coordinates of three or four vertices."""
+    """Return the patch around a point at rest, given by weights of three or four corners."""
     elements, stiffness = elements_of(body)
     rows, strength = np.empty((len(body.masses), 2)), np.empty(1)
     x = np.ascontiguousarray(body.mesh.vertices)
@@ -46,7 +44,7 @@ def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDA
 
 
 def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Point with barycentric coordinates (k,) among corners (k, 3), in float64."""
+    """Return the point with barycentric coordinates `weights` (k,) in corners (k, 3), in float64."""
     point = np.zeros(3)
     for corner, weight in zip(corners.astype(np.float64), weights.tolist(), strict=True):
         point += weight * corner
@@ -54,10 +52,10 @@ def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArra
 
 
 def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Vertices and stiffness of each element, which resist the patch's motion.
+    """Return the vertices of each element, and its stiffness against the motion of a patch.
 
-    Returns: springs (e, 2) and k / 3 [N/m], as a third of them lies along any direction; or tetrahedra (m, 4)
-    and V mu [N m].
+    Springs (e, 2) have k / 3 [N/m], because a third of them acts along any direction. Tetrahedra (m, 4) have
+    V mu [N m].
     """
     mesh: Any = body.mesh
     if isinstance(body.material, SpringMaterial):
@@ -67,15 +65,15 @@ def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.fl
 
 
 def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
-    """Smallest shear modulus of each tetrahedron, (m,) [Pa]."""
+    """Return the smallest of the three shear moduli of each tetrahedron, (m,) [Pa]."""
     moduli = body.stiffness_matrices()
     return np.asarray(moduli[:, range(3, 6), range(3, 6)].min(axis=1))
 
 
 def wave_speed(body: BodyDescription) -> float:
-    """Lower bound of the wave speed in a body [m/s].
+    """Return a lower bound of the wave speed in a body [m/s].
 
-    sqrt(mu / density); for springs, a sqrt(k / m) with the mean edge a and the mean mass m.
+    It is sqrt(mu / density); for springs, a sqrt(k / m) with the mean edge a and the mean mass m.
     """
     mesh: Any = body.mesh
     if isinstance(body.material, SpringMaterial):

@@ -1,4 +1,4 @@
-"""Grab a body and pull it."""
+"""Grabs, which pull bodies to a target."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, vector_of
 
 WEIGHTS = 10.0
-"""Default largest force, in weights of the body on Earth."""
+"""Default largest force of a grab, relative to the weight of the body on Earth."""
 
 HIGHEST_SPEED = 50.0
-"""Largest speed of a grabbed body [m/s]; faster than any hand."""
+"""Largest speed that a grab gives a body [m/s]; faster than any hand."""
 
 
 class Grab(Handle):
@@ -57,17 +57,17 @@ class Grab(Handle):
 
     @property
     def is_held(self) -> bool:
-        """False after release, or after the body was removed."""
+        """True until the grab is released or its body is removed."""
         return self.body.is_alive and context_of(self.body).of(Grabs).by_number.get(self._number) is self
 
     @property
     def point(self) -> NDArray[np.float64]:
-        """Target of the grab, (3,) [m]."""
+        """Target of the grabbed point, (3,) [m]."""
         return np.array(self._point)
 
     @property
     def force(self) -> NDArray[np.float32]:
-        """Force on the body in the last substep, (3,) [N]; 0 while the body is frozen.
+        """Force of the grab on the body in the last substep, (3,) [N]; 0 while the body is frozen.
 
         Raises: StateError after release.
         """
@@ -76,10 +76,10 @@ class Grab(Handle):
 
     @recorded
     def move(self, point: ArrayLike) -> None:
-        """Move the target to `point`.
+        """Move the target of the grab.
 
         Args:
-            point: target of the grabbed point, (3,) [m].
+            point: new target of the grabbed point, (3,) [m].
         Raises: StateError after release.
         """
         target = as_vector(point, "point", "m")
@@ -103,7 +103,7 @@ class Grabs(Numbered[Grab]):
     """All grabs of one world, by number."""
 
     name = "grabs"
-    prevents_levels = False  # see `hold_at`
+    prevents_levels = False  # `hold_at` moves the grab to the new level
     most, advice_verb = MOST_GRABS, "release"
 
     def release_body(self, body: SoftBody) -> None:
@@ -112,10 +112,10 @@ class Grabs(Numbered[Grab]):
             grab.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Grab a body that has a surface, move it and release it."""
+        """Compile the kernels, by grabbing a body that has a surface, and moving and releasing the grab."""
         if len(body.surface) == 0:
             return
-        with contextlib.suppress(StateError):  # all grabs are in use, so the kernels are compiled
+        with contextlib.suppress(StateError):  # if all grabs are in use, the kernels are compiled already
             grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)
             grab.move(grab.point)
             _ = grab.force
@@ -124,21 +124,21 @@ class Grabs(Numbered[Grab]):
             grab.release()
 
     def entries(self) -> list[list[Any]]:
-        """List numbers of handle, grab and body, and the targets."""
+        """List each grab's serial number, index, body and target."""
         return [
             [serial_of(grab), number, grab.body.index, grab.point.tolist()]
             for number, grab in sorted(self.by_number.items())
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """As `Slice.row_counts`: grabs up to the last one in use."""
+        """See `Slice.row_counts`. Grabs count up to the last one in use."""
         used = max((int(number) for _, number, _, _ in entries), default=-1) + 1
         return {ALL_GRABS: MOST_GRABS, USED_GRABS: used, PATCHES: used * PATCH_ROWS}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, NDArray[np.float64]]]:
-        """Parse rows of `entries`. Raises: ValueError for a missing body."""
+        """See `Slice.read`. Raises: ValueError for a missing body."""
         found = []
         for serial, number, slot, point in entries:
             if not vertex_counts[below(slot, len(vertex_counts))]:
@@ -147,7 +147,7 @@ class Grabs(Numbered[Grab]):
         return found
 
     def restore(self, read: Any) -> None:
-        """Replace all grabs by those from `read`."""
+        """Replace all grabs by the grabs from `read`."""
         self.by_number.clear()
         for serial, number, slot, point in read:
             body = self.context.slots.slots[slot]
@@ -159,7 +159,7 @@ class Grabs(Numbered[Grab]):
 
 
 def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
-    """Check frequency [Hz] and largest force [N] of a grab. Raises: OptionError."""
+    """Check and return the frequency [Hz] and the largest force [N] of a grab. Raises: OptionError."""
     hertz = as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
     if max_force is None:
         return hertz, None
@@ -174,7 +174,7 @@ def grab_at(
     frequency: float,
     max_force: float | None,
 ) -> Grab:
-    """Implement `Body.grab`; `point` is the initial target, None for the grabbed point itself."""
+    """Implement `Body.grab`. `point` is the initial target; None: the position of the grabbed point."""
     if len(body.surface) == 0:
         raise MeshError(f"body {body.index} has no surface to grab")
     number = as_count(triangle, "triangle", 0, len(body.surface) - 1)
@@ -203,7 +203,7 @@ def grab_at(
 
 
 def place_of(grab: Grab) -> NDArray[np.float64]:
-    """Grabbed point in the rest shape of the body, (3,) [m]."""
+    """Return the grabbed point in the rest shape of the body, (3,) [m]."""
     body, (corners, row) = grab.body, _read(grab)
     rows = rows_of(body, np.arange(body.vertex_count, dtype=np.int32))
     order = np.argsort(rows)
@@ -213,9 +213,9 @@ def place_of(grab: Grab) -> NDArray[np.float64]:
 
 
 def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
-    """Move a grab to the body's current tetrahedra, around a point of the rest shape, (3,) [m].
+    """Move a grab to the body's present tetrahedra, around a point `place` of the rest shape, (3,) [m].
 
-    Target, spring, largest force and the force of the last substep are kept.
+    The target, the spring, the largest force and the force in the last substep do not change.
     """
     body, (_, row) = grab.body, _read(grab)
     (corners,), (weights,) = embedded(place[None], body.mesh.vertices, body.tets)
@@ -226,7 +226,7 @@ def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
 
 
 def _read(grab: Grab) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Read corners and numbers of a grab, in the layout of `write_grab`."""
+    """Return the corners and numbers of a grab, in the layout of `write_grab`."""
     corners, row = np.empty(CORNERS, dtype=np.int32), np.empty(FORCE.stop, dtype=np.float32)
     read_grab(context_of(grab.body).built.state, grab._number, corners, row)
     return corners, row

@@ -1,6 +1,6 @@
-"""Impulses: instantaneous changes of momentum. Velocities change at once, positions with the next step.
+"""Impulses: instantaneous changes of momentum. Velocities change at once, positions in the next step.
 
-The share of a pinned particle goes to the constraint that holds it.
+Pinned particles do not move: the constraint that holds them absorbs their part of an impulse.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
 LARGEST_IMPULSE = 1e20
-"""Largest impulse [N s] and force [N], whose squares still fit float32."""
+"""Largest valid impulse [N s] and force [N]."""
 
 
 def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | None) -> None:

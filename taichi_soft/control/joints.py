@@ -45,8 +45,8 @@ from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below
 
 DRAW = 0.25
-"""Largest closing speed of a gap, over the wave speed in the body times the square root of the held fraction
-of its mass. At this speed, elements stretch by about a quarter at most."""
+"""Largest closing speed of a gap, relative to the wave speed in the body times the square root of the held
+fraction of its mass. At this speed, elements stretch by at most about a quarter."""
 
 
 class Joint(Handle):
@@ -66,7 +66,7 @@ class Joint(Handle):
 
     @property
     def is_attached(self) -> bool:
-        """False after release, or after one of the two bodies was removed."""
+        """True until the joint is released or one of its two bodies is removed."""
         return self.body.is_alive and self._joints.by_number.get(self._number) is self
 
     @property
@@ -75,7 +75,7 @@ class Joint(Handle):
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """Force of `other` on `body`, mean over the last step, (3,) [N]; 0 if either body froze in it.
+        """Mean force of `other` on `body` during the last step, (3,) [N]; 0 if a body froze in that step.
 
         Raises: StateError after release.
         """
@@ -87,7 +87,7 @@ class Joint(Handle):
 
     @recorded
     def release(self) -> None:
-        """Release the particles; they keep their velocity.
+        """Release the particles, which keep their velocity.
 
         Raises: StateError if already released.
         """
@@ -113,11 +113,11 @@ class Joints(Numbered[Joint]):
 
     @property
     def rows_in_use(self) -> int:
-        """Number of particles of all joints."""
+        """Total number of held particles of all joints."""
         return sum(len(joint.particles) for joint in self.by_number.values())
 
     def holding(self, body: SoftBody) -> list[Joint]:
-        """Joints of a body, on either side."""
+        """Return the joints of which a body is either side."""
         return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
     def release_body(self, body: SoftBody) -> None:
@@ -126,32 +126,32 @@ class Joints(Numbered[Joint]):
             joint.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Join two bodies, if possible."""
+        """Compile the kernels, by joining two bodies for a step, if possible."""
         context = self.context
         if other is None or not context.built.program.has_contact:
             return
-        with contextlib.suppress(StateError):  # all joints are in use
+        with contextlib.suppress(StateError):  # if all joints are in use
             joint = self.join(body, other, [0], [0])
             step()
             _ = joint.force, body.velocities()
             joint.release()
 
     def entries(self) -> list[list[Any]]:
-        """List numbers of handle, joint and both bodies, and the held particles."""
+        """List each joint's serial number, index, two bodies and held particles."""
         return [
             [serial_of(joint), number, joint.body.index, joint.other.index, joint.particles.tolist()]
             for number, joint in sorted(self.by_number.items())
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """As `Slice.row_counts`."""
+        """See `Slice.row_counts`."""
         rows = sum(len(particles) for *_, particles in entries)
         return {ALL_JOINTS: MOST_JOINTS, USED_JOINT_ROWS: rows, JOINT_ENDS: rows * ENDS}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, int, NDArray[np.int32]]]:
-        """Parse rows of `entries`. Raises: ValueError for missing bodies, or in a world without joints."""
+        """See `Slice.read`. Raises: ValueError for missing bodies, or in a world without joints."""
         found = []
         for serial, number, body, other, particles in entries:
             a, b = (below(slot, len(vertex_counts)) for slot in (body, other))
@@ -163,7 +163,7 @@ class Joints(Numbered[Joint]):
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raise a ValueError if the fields differ from the result of `read`."""
+        """Check that the fields agree with `read`. Raises: ValueError."""
         if not self.context.built.program.has_contact:
             return
         fields = self.context.built.state.joints
@@ -182,7 +182,7 @@ class Joints(Numbered[Joint]):
             forget_held(self.context.built.state)
 
     def restore(self, read: Any) -> None:
-        """Replace all joints by those from `read`."""
+        """Replace all joints by the joints from `read`."""
         self.by_number.clear()
         for serial, number, a, b, particles in read:
             body, other = (self.context.slots.slots[slot] for slot in (a, b))
@@ -232,7 +232,7 @@ class Joints(Numbered[Joint]):
 def _find_places(
     body: SoftBody, other: SoftBody, particles: ArrayLike, onto: ArrayLike | None
 ) -> tuple[NDArray[np.int32], Places]:
-    """Return vertices of `body` and their embedding in `other`. Raises: OptionError."""
+    """Return the held vertices of `body` and their embedding in `other`. Raises: OptionError."""
     vertices = named_particles(body, particles)
     if onto is None:
         points = body.positions()[vertices].astype(np.float64)
@@ -247,13 +247,13 @@ def _find_places(
 
 
 def _draw_speed(body: SoftBody, other: SoftBody, vertices: NDArray[np.int32], places: Places) -> float:
-    """Largest closing speed of a gap between two bodies [m/s]."""
+    """Return the largest closing speed of a gap between two bodies [m/s]."""
     holders = np.unique(places.vertices[places.weights != 0.0])
     slowest = min(_follow_speed(body, vertices), _follow_speed(other, holders))
     return DRAW * slowest
 
 
 def _follow_speed(body: SoftBody, held: NDArray[np.int32]) -> float:
-    """Largest speed at which held particles of a body can follow [m/s]."""
+    """Return the largest speed at which a body can follow its held particles [m/s]."""
     share = mass_of(body, held) / mass_of(body, some_particles(body, None))
     return wave_speed(record_of(body).description) * float(np.sqrt(share))

@@ -1,4 +1,4 @@
-"""Motors: rotate a part of a body about an axis, or push it along the axis, towards a speed."""
+"""Motors, which rotate a part of a body about an axis, or push it along an axis, at a target speed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from taichi_soft.core.math.rotations import length_of
 from taichi_soft.core.serialisation import below, indices_below, vector_of
 
 LARGEST_LIMIT = 1e12
-"""Largest limit of torque [N m] and force [N]."""
+"""Largest valid limit of a motor's torque [N m] or force [N]."""
 
 
 @dataclass
@@ -47,19 +47,19 @@ class Drive:
 
     turns: bool  # True: rotates about the axis, False: pushes along it
     is_fixed: bool  # True: the axis keeps its direction, False: it rotates with the particles
-    axis: NDArray[np.float64]  # of unit length, (3,), in space or in the rest shape
-    point: NDArray[np.float64] | None  # on the axis, (3,) [m]; None for the centre of the particles
-    speed: float  # [rad/s] or [m/s]
-    limit: float  # [N m] or [N]
+    axis: NDArray[np.float64]  # unit vector, (3,), in world axes, or in the rest shape if not fixed
+    point: NDArray[np.float64] | None  # point on the axis, (3,) [m]; None: centre of the particles
+    speed: float  # target speed [rad/s] or [m/s]
+    limit: float  # largest torque [N m] or force [N]
 
     @property
     def unit(self) -> str:
-        """Unit of its speed."""
+        """Unit of the motor's speed."""
         return "rad/s" if self.turns else "m/s"
 
 
 THINNEST = 1e-3
-"""Smallest width of the driven part over its length for which its rotation about that length is defined."""
+"""Smallest ratio of width to length of the driven part for which its rotation about its length is defined."""
 
 
 class Motor(Handle):
@@ -78,27 +78,27 @@ class Motor(Handle):
 
     @property
     def is_mounted(self) -> bool:
-        """False after the motor or its body was removed."""
+        """True until the motor or its body is removed."""
         return self.body.is_alive and self._motors.by_number.get(self._number) is self
 
     @property
     def turns(self) -> bool:
-        """True if it rotates its particles about the axis, False if it pushes them along it."""
+        """True if the motor rotates its particles about the axis, False if it pushes them along the axis."""
         return self._drive.turns
 
     @property
     def speed(self) -> float:
-        """Target speed [rad/s], or [m/s] if it pushes."""
+        """Target speed [rad/s], or [m/s] if the motor pushes."""
         return self._drive.speed
 
     @property
     def limit(self) -> float:
-        """Largest torque [N m], or force [N] if it pushes."""
+        """Largest torque [N m], or largest force [N] if the motor pushes."""
         return self._drive.limit
 
     @property
     def measured_speed(self) -> float:
-        """Speed of its particles about the axis [rad/s] or along it [m/s]; 0 while the body is frozen.
+        """Measured speed about the axis [rad/s] or along it [m/s]; 0 while the body is frozen.
 
         Raises: StateError after removal.
         """
@@ -108,7 +108,7 @@ class Motor(Handle):
 
     @property
     def effort(self) -> float:
-        """Torque [N m] or force [N] of the motor, mean over the last step; 0 while the body is frozen.
+        """Mean torque [N m] or force [N] of the motor during the last step; 0 while the body is frozen.
 
         Raises: StateError after removal.
         """
@@ -122,24 +122,24 @@ class Motor(Handle):
         """Set the target speed.
 
         Args:
-            speed: about the axis [rad/s], or along it [m/s] if it pushes. Negative values reverse it.
+            speed: speed about the axis [rad/s], or along it [m/s] if the motor pushes; can be negative.
         Raises: OptionError for a number out of range; StateError after removal.
         """
         self._set(_as_speed(speed, self._drive.turns), self.limit)
 
     @recorded
     def set_limit(self, limit: float) -> None:
-        """Set the limit of the torque or force; with 0 the particles coast.
+        """Set the limit of the torque or force. With 0, the motor exerts none.
 
         Args:
-            limit: largest torque [N m], or force [N] if it pushes; 0 or more.
+            limit: largest torque [N m], or largest force [N] if the motor pushes; 0 or more.
         Raises: as `set_speed`.
         """
         self._set(self.speed, _as_limit(limit, "limit"))
 
     @recorded
     def remove(self) -> None:
-        """Remove the motor; the particles keep their velocities. Raises: StateError if already removed."""
+        """Remove the motor. The particles keep their velocities. Raises: StateError if already removed."""
         self._require_mounted()
         motors = self._motors
         del motors.by_number[self._number]
@@ -167,7 +167,7 @@ class Motors(Numbered[Motor]):
 
     @property
     def rows_in_use(self) -> int:
-        """Number of particles of all motors."""
+        """Total number of particles of all motors."""
         return sum(len(motor.particles) for motor in self.by_number.values())
 
     def release_body(self, body: SoftBody) -> None:
@@ -176,10 +176,10 @@ class Motors(Numbered[Motor]):
             motor.remove()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Add a motor to a body, and read its effort."""
-        with contextlib.suppress(OptionError):  # one particle has no width, but the kernel is compiled
+        """Compile the kernels, by adding a motor to a body and reading its effort."""
+        with contextlib.suppress(OptionError):  # one particle has no width, but the kernel gets compiled
             _rest_axis(body, np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, 1.0]))
-        with contextlib.suppress(StateError):  # all motors are in use, so the kernels are compiled
+        with contextlib.suppress(StateError):  # if all motors are in use, the kernels are compiled already
             motor = self.add(body, [0], (0.0, 0.0, 1.0), 0.0, None, 0.0, True, None)
             motor.set_speed(1.0)
             step()
@@ -187,7 +187,7 @@ class Motors(Numbered[Motor]):
             motor.remove()
 
     def rows(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
-        """All motors in the layout of `write_motors`, with concatenated particles."""
+        """Return all motors in the layout of `write_motors`."""
         wholes, reals, particles, first = [], [], [], 0
         for number, motor in sorted(self.by_number.items()):
             drive, end = motor._drive, first + len(motor.particles)
@@ -203,7 +203,7 @@ class Motors(Numbered[Motor]):
         )
 
     def entries(self) -> list[list[Any]]:
-        """List numbers of handle, motor and body, the particles, and the settings."""
+        """List each motor's serial number, index, body, particles and settings."""
         return [
             [
                 *(serial_of(motor), number, motor.body.index, motor.particles.tolist()),
@@ -215,13 +215,13 @@ class Motors(Numbered[Motor]):
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """As `Slice.row_counts`: motors up to the last one in use."""
+        """See `Slice.row_counts`. Motors count up to the last one in use."""
         return {USED_MOTORS: max((int(number) for _, number, *_ in entries), default=-1) + 1}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, NDArray[np.int32], Drive]]:
-        """Parse rows of `entries`. Raises: ValueError for a missing body or invalid settings."""
+        """See `Slice.read`. Raises: ValueError for a missing body or invalid settings."""
         found = []
         for serial, number, slot, particles, turns, is_fixed, axis, point, speed, limit in entries:
             count = vertex_counts[below(slot, len(vertex_counts))]
@@ -243,7 +243,7 @@ class Motors(Numbered[Motor]):
         return found
 
     def restore(self, read: Any) -> None:
-        """Replace all motors by those from `read`."""
+        """Replace all motors by the motors from `read`."""
         had_any = bool(self.by_number)
         self.by_number.clear()
         for serial, number, slot, particles, drive in read:
@@ -318,9 +318,9 @@ def _as_limit(limit: Any, name: str) -> float:
 
 
 def _rest_axis(body: SoftBody, vertices: NDArray[np.int32], axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Axis in the rest state, of particles that have rotated since.
+    """Transform the direction of an axis from the present state of particles to their rest state.
 
-    Raises: OptionError if particles are on a line, so that their rotation about it is undefined.
+    Raises: OptionError if the particles lie on a line, so that their rotation about it is undefined.
     """
     rest, now = body.mesh.vertices[vertices], body.positions()[vertices].astype(np.float64)
     found = np.empty(4)

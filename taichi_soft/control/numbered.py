@@ -1,4 +1,4 @@
-"""Slices with a fixed number of handles; a new one takes the lowest free index."""
+"""Base of slices with a fixed number of handles, in which a new handle gets the lowest free index."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Kind = TypeVar("Kind", bound=Handle)
 
 
 class Numbered(Slice, Generic[Kind]):
-    """Base of grabs, joints and motors: all of one world, by index."""
+    """Base class of `Grabs`, `Joints` and `Motors`: all handles of one world, by index."""
 
     most = 0  # largest number of handles
-    advice_verb = ""  # verb of the advice if all are in use
+    advice_verb = ""  # verb of the advice in the error if all handles are in use
 
     def __init__(self, context: Context) -> None:
         """Start without handles."""
@@ -24,19 +24,19 @@ class Numbered(Slice, Generic[Kind]):
 
     @property
     def handles(self) -> list[Kind]:
-        """All handles, by index."""
+        """All handles, in the order of their indices."""
         return [each for _, each in sorted(self.by_number.items())]
 
     def holding(self, body: SoftBody) -> list[Kind]:
-        """Handles of a body, by index."""
+        """Return the handles of a body, in the order of their indices."""
         return [each for each in self.handles if each.body is body]  # type: ignore[attr-defined]
 
     def holds(self, body: SoftBody) -> bool:
-        """True if a body has handles."""
+        """True if a body has handles of this slice."""
         return bool(self.holding(body))
 
     def free_number(self) -> int:
-        """Lowest free index. Raises: StateError if all are in use."""
+        """Return the lowest free index. Raises: StateError if all are in use."""
         free = next((number for number in range(self.most) if number not in self.by_number), None)
         if free is None:
             raise StateError(

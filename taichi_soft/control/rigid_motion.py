@@ -1,4 +1,4 @@
-"""Set the velocity of a whole body, or move it, as a rigid body."""
+"""Set the velocity of a whole body, or move the body, as if it were rigid."""
 
 from __future__ import annotations
 

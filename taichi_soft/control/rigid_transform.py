@@ -1,4 +1,4 @@
-"""Move whole bodies by a rigid motion, keeping their deformation."""
+"""Move whole bodies by a rigid motion, without changing their deformation."""
 
 from __future__ import annotations
 
@@ -20,10 +20,16 @@ Floats = NDArray[np.float64]
 def jump_to(
     body: SoftBody, center: Floats, turn: Floats, *, lowest: float, keep: bool
 ) -> tuple[float, float, float]:
-    """Rotate a body about its centre of mass and move it to `center`, with its velocity rotated or stopped.
+    """Rotate a body about its centre of mass, and move it so that this centre is at `center` [m].
 
-    Returns: its new lowest and highest height and largest coordinate [m]. If the first is below `lowest` or
-        the last is out of range, nothing was changed; otherwise the caller must call `mark_modified`.
+    Args:
+        body: body to move.
+        center: new centre of mass, (3,) [m].
+        turn: rotation matrix, (3, 3).
+        lowest: smallest allowed height [m].
+        keep: True rotates the velocities, False stops the body.
+    Returns: lowest height, highest height and largest coordinate of the moved body [m]. If the first is below
+        `lowest` or the last is out of range, nothing was changed; else the caller must call `mark_modified`.
     """
     found = np.empty(3)
     attempt(body, jump, body.index, np.array([*center, lowest, float(keep)]), turn, found)
@@ -32,9 +38,9 @@ def jump_to(
 
 
 def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, *, keep: bool) -> None:
-    """Move bodies by the rigid motion that maps the point `start` to `end` [m], and wake bodies on them.
+    """Rotate bodies by `turn` about the point `start`, move this point to `end` [m], and wake nearby bodies.
 
-    Raises: OptionError if one of them would be out of range. Then nothing is changed.
+    Raises: OptionError if a body would be out of range. In that case, no body is moved.
     """
     centers = [turned((body.center_of_mass() - start)[None], turn)[0] + end for body in bodies]
     for body, center in zip(bodies, centers, strict=True):

@@ -1,7 +1,8 @@
 """Write named arrays to one file that the native library reads.
 
-    32 bytes   magic, version (u32), number of entries (u32), bytes of all entries (u64), their CRC-32 (u32),
-    0 entries    length of the name, type, dimensions, 0 (u32 each); shape (u64 each); the name; the data
+    header     magic (8 bytes), version (u32), number of entries (u32), size of all entries (u64) [bytes],
+               CRC-32 of all entries (u32), 0 (u32)
+    entries    length of the name, type, number of dimensions, 0 (u32 each); shape (u64 each); name; data
 
 Names and data are padded to multiples of 8 bytes. All values are little-endian.
 """
@@ -22,7 +23,7 @@ TYPES = {np.dtype(name): code for code, name in enumerate(("u1", "<i4", "<i8", "
 
 
 def written(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """Serialise arrays of the types in `TYPES`."""
+    """Return the content of a file with these arrays, whose types must be in `TYPES`."""
     parts = []
     for name, array in arrays.items():
         text, whole = name.encode(), np.ascontiguousarray(array)
@@ -35,7 +36,7 @@ def written(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 def words(texts: Sequence[str]) -> NDArray[np.uint8]:
-    """Encode texts as an array of zero-terminated strings."""
+    """Return texts as one array of zero-terminated UTF-8 strings."""
     return np.frombuffer(b"".join(text.encode() + b"\0" for text in texts), dtype=np.uint8)
 
 

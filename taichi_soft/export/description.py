@@ -1,4 +1,4 @@
-"""Describe a world for its world file: all named arrays except kernels."""
+"""Describe a world as named arrays for its world file; kernels are separate."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ from taichi_soft.solver.context import WorldContext
 Arrays = dict[str, NDArray[Any]]
 
 _ALWAYS, _OF_JOINTS, _OF_MOTORS = range(3)
-"""Rows of a snapshot's field: all, or those of joints or of motors. `scene.hpp` has the same codes."""
+"""Codes for the rows of a field in a snapshot: all, of joints, or of motors. `scene.hpp` has the same."""
 
 
 def description_of(
     context: WorldContext, meshes: Sequence[ExportedMesh], names: Mapping[str, Sequence[str]], axes: Any
 ) -> Arrays:
-    """Return arrays by name; `engine_adapter/native/src/scene.cpp` reads them."""
+    """Return all arrays of a world, by name. `engine_adapter/native/src/scene.cpp` reads them."""
     arrays: Arrays = {
         "host_axes": np.asarray(axes, dtype=np.float64),
         **{f"names/{kind}": words(each) for kind, each in names.items()},
@@ -111,7 +111,7 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = row_counts(context, write_manifest(context)["slices"])
-    # The game adds grabs and motors. Joints and motors have the rows that they use.
+    # All grabs and motors, because a game can add some. The last three count per row in use.
     rows |= {USED_GRABS: MOST_GRABS, PATCHES: MOST_GRABS * PATCH_ROWS, ALL_MOTORS: MOST_MOTORS}
     rows |= {USED_MOTORS: MOST_MOTORS, MOTOR_PARTICLES: 1, USED_JOINT_ROWS: 1, JOINT_ENDS: ENDS}
     whose = {MOTOR_PARTICLES: _OF_MOTORS, USED_JOINT_ROWS: _OF_JOINTS, JOINT_ENDS: _OF_JOINTS}
@@ -157,7 +157,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
 
 
 def _held(context: WorldContext) -> Arrays:
-    """Pins of bodies in terms of the finest level, slot by slot: see `BodyRecord.held`."""
+    """Return the pins of all bodies as vertices of the finest level, by slot: see `BodyRecord.held`."""
     bodies = context.slots.slots
     held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
     rows = [np.zeros(0) if each is None else each for each in held]
@@ -196,7 +196,7 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
 
 
 def _target_of(row: ColliderRow) -> list[float]:
-    """1 if the collider has a target, else 0; then the pose of the target."""
+    """Return 1 and the pose of a collider's target, or only zeros if it has no target."""
     return [0.0] * 8 if row.target is None else [1.0, *np.concatenate(row.target).tolist()]
 
 
@@ -210,7 +210,7 @@ def _of_frames(context: WorldContext) -> Arrays:
 
 
 def _attached(context: WorldContext) -> Arrays:
-    """By particle: 1 if its frame reports its load, and the number of its attachment from 1, or 0."""
+    """Return for each particle 1 if its load is recorded, and the number of its attachment from 1, or 0."""
     count = context.layout.particle_count
     feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)
     for body, held in context.of(Frames).attachments.items():

@@ -1,4 +1,4 @@
-"""Axes of the engines that a world can be exported for."""
+"""Coordinate axes of the engines for which a world can be exported."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ AXES = {
     "unity": ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
     "unreal": ((100, 0, 0), (0, -100, 0), (0, 0, 100)),
 }
-"""By name: matrix from our positions [m], z up and right-handed, to the engine's.
+"""Matrices by name, from positions in this package [m] (z up, right-handed) to positions in the engine.
 
-"z-up": ours, for Blender, Panda3D. "y-up": right-handed, for Godot, glTF, three.js. "unity": y up,
-left-handed. "unreal": z up, left-handed, centimetres.
+"z-up": unchanged, for Blender and Panda3D. "y-up": y up, right-handed, for Godot, glTF and three.js. "unity":
+y up, left-handed. "unreal": z up, left-handed, in centimetres.
 """
 
 
 def axes_of(name: str) -> Floats:
-    """Return the matrix (3, 3) of a name. Raises: OptionError for a name that is not in `AXES`."""
+    """Return the matrix (3, 3) for a name in `AXES`. Raises: OptionError for any other name."""
     if name not in AXES:
         raise OptionError(f"axes must be one of {', '.join(AXES)}, got {name!r}")
     return np.array(AXES[name], dtype=np.float64)

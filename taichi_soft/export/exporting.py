@@ -1,4 +1,4 @@
-"""Write a built world as a folder for the native library, completely or not at all."""
+"""Write a built world as a folder for the native library. If this fails, no part of it remains."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.world import World, context_of_world, force_field_of
 
 WORLD, KERNELS = "world.tsw", "kernels"
-"""Names of files in the folder."""
+"""Names of the world file, and of the folder with the machine code of the kernels."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class ExportReport:
     path: Path  # path of the folder
     size: int  # total size of the files [bytes]
     kernels: int  # number of kernels
-    names: dict[str, list[str]]  # of bodies, assets, colliders, frames, joints, motors, meshes
+    names: dict[str, list[str]]  # names by kind: bodies, assets, colliders, frames, joints, motors, meshes
 
 
 def export_world(
@@ -56,17 +56,17 @@ def export_world(
 
     After an export, this process cannot use Taichi or its worlds any more. Start a new process.
     Args:
-        path: path of the folder; an earlier export there is replaced.
-        axes: of the engine, see `AXES`.
-        names: names of bodies, assets, colliders, frames, joints and motors for the game; others get names
-            with their index, such as body3.
-        platforms: platforms from `PLATFORMS`; by default this machine's.
-        static: write objects to link into the game, for systems that forbid loading code: see
-            `ts_scene_load_linked`.
-        world: a built world in the initial state of the game.
+        world: built world in the initial state of the game.
+        path: path of the folder. An earlier export there is replaced.
+        axes: axes of the engine, a name in `AXES`.
+        names: names for bodies, assets, colliders, frames, joints and motors in the game. Objects without a
+            name get one with their index, such as body3.
+        platforms: names in `PLATFORMS`; None: the platform of this machine.
+        static: True writes object files to link into the game, for systems that forbid loading code at run
+            time: see `ts_scene_load_linked`.
     Raises: StateError for a world that is not built; OptionError for a path that is in use or cannot be
-        written, for an unknown platform, for static with the web, and for features that the native library
-        does not support, by name; MissingExtraError without llvmlite or zig.
+        written, for an unknown platform, for `static` with the platform "web", or for features that the
+        native library does not support; MissingExtraError if llvmlite or zig is not installed.
     """
     path, matrix, platforms = Path(path), axes_of(axes), platforms_of(platforms)
     if static and "web" in platforms:
@@ -90,7 +90,7 @@ def export_world(
 
 
 def _made_unique(names: list[str]) -> list[str]:
-    """Make names unique: append a number to repeated names."""
+    """Return the names with a number appended to repeated ones, so that they are unique."""
     found: list[str] = []
     for i, name in enumerate(names):
         found.append(f"{name}#{i}" if name in found else name)

@@ -1,4 +1,4 @@
-"""Memory layout of a world's fields."""
+"""Memory layout of the fields of a world."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from taichi_soft.export.kernels.root import read_root
 from taichi_soft.solver.state import State
 
 FLOAT, WHOLE = 0, 1
-"""Types of numbers, all of 4 bytes."""
+"""Codes for the types of numbers in fields: float32 and int32."""
 
 
 @dataclass(frozen=True)
 class FieldPlace:
     """Layout of a field: element i starts at `offset + stride * i` and has `width` numbers."""
 
-    offset: int  # from the start of the layout [bytes]
+    offset: int  # offset from the start of the memory [bytes]
     stride: int
     count: int
     width: int
@@ -30,13 +30,13 @@ class FieldPlace:
 
 
 def places_of(state: State) -> dict[str, FieldPlace]:
-    """Layouts of all fields with contiguous elements, by name; names of a slice's fields have a dot."""
+    """Return the layouts of all fields with contiguous elements, by name, such as `grabs.body`."""
     places = {name: place_of(field) for name, _, field in state.fields}
     return {name: place for name, place in places.items() if place is not None}
 
 
 def place_of(field: Any) -> FieldPlace | None:
-    """Layout of a field, or None if its elements are not contiguous."""
+    """Return the layout of a field, or None if the numbers of an element are not contiguous."""
     components = [each.ptr.snode() for each in field.vars]
     first = components[0]
     dense = first.parent
@@ -56,7 +56,7 @@ def place_of(field: Any) -> FieldPlace | None:
 
 
 def image_of(state: State) -> NDArray[np.uint8]:
-    """Copy the memory of all fields."""
+    """Return a copy of the memory of all fields."""
     found = np.zeros(1, dtype=np.uint64)
     read_root(state, found)
     place = place_of(state.particle_position)

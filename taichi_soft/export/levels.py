@@ -22,7 +22,7 @@ _ROWS = list(signature(write_body).parameters)[5:]
 
 
 def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arrays:
-    """Arrays that kernels write into a slot when a body takes this level of an asset."""
+    """Return the arrays to write into a slot when its body changes to this level of an asset, by name."""
     state, arrays = context.built.state, asset.arrays
     found: Arrays = {f"slot/{name}": rows for name, rows in zip(_ROWS, body_rows(arrays), strict=True)}
     found["slot/kind"] = kind_numbers(state, asset)
@@ -39,14 +39,14 @@ def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arr
 
 
 def constant_names(context: WorldContext) -> list[str]:
-    """Names of the fields with constants of tetrahedra."""
+    """Return the names of the fields with constants of tetrahedra."""
     state = context.built.state
     fields = [field for field, _ in state.tet_constants(context.layout.bodies[0])]
     return [name for name, each in vars(state).items() if any(each is field for field in fields)]
 
 
 def passage_arrays(asset: SoftBodyAsset) -> Arrays:
-    """Arrays for the transition between each pair of an asset's levels."""
+    """Return the arrays for the transition between each pair of an asset's levels, by name."""
     found: Arrays = {}
     levels = range(len(asset.levels))
     for source, target in ((i, j) for i in levels for j in levels if i != j):

@@ -1,8 +1,7 @@
-"""Compile kernels to machine code: Taichi writes LLVM assembly, which is compiled and linked for each
-platform.
+"""Compile kernels to machine code for each platform, from the LLVM assembly that Taichi writes.
 
-Only the LLVM of Taichi 1.7.4 reads this assembly; llvmlite 0.44 has the same one. `ziglang` links for all
-platforms.
+Only the LLVM version of Taichi 1.7.4 can read this assembly; llvmlite 0.44 contains the same version.
+`ziglang` links for all platforms.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.export.web import for_web, web_sources
 
 TABLE = "taichi_soft_kernels"
-"""Symbol of a file's kernel table: rows of a name and a function, `ts_linked_kernel` of the C library."""
+"""Symbol of a file's kernel table, whose rows are `ts_linked_kernel` of the C library: name and function."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A target of LLVM and zig."""
+    """A target platform for LLVM and zig."""
 
     triple: str  # LLVM's target triple
     target: str  # zig's target
@@ -44,7 +43,7 @@ class Platform:
 
     @property
     def is_web(self) -> bool:
-        """True if the native library is linked with the kernels."""
+        """True for WebAssembly, for which the native library is linked into the same file as the kernels."""
         return self.file == "web"
 
 
@@ -63,24 +62,24 @@ PLATFORMS = {
         Platform("wasm32-unknown-unknown", "wasm32-wasi", "generic", "web", "+simd128,+nontrapping-fptoint"),
     ),
 }
-"""Platforms by their name in `taichi-soft export --for`."""
+"""Targets of each platform, by its name in `taichi-soft export --for`."""
 
 _TARGET_LINES = re.compile(r"^target (?:datalayout|triple).*\n", re.MULTILINE)
 _PROCESSOR = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _PART = re.compile(r"^define void @(\w+_kernel_(\d+)_\w+)\((%struct\.RuntimeContext[.\d]*\*)", re.MULTILINE)
 
 _FUNCTION = "taichi_soft_kernel_"
-"""Prefix of functions that run all parts of a kernel."""
+"""Prefix of the names of functions that run all parts of a kernel."""
 
 _WINDOWS = """
 int _fltused = 0;
 int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1; }
 """
-"""Symbols that Windows requires in every library."""
+"""LLVM assembly of the symbols that Windows requires in every library."""
 
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
-    """Check names of platforms and remove repeats; None is this machine's. Raises: OptionError."""
+    """Check names of platforms and return them without repeats; None: this machine's. Raises: OptionError."""
     if names is None:
         known = {"amd64": "x64", "x86_64": "x64", "aarch64": "arm64", "win32": "windows", "darwin": "macos"}
         system, machine = (known.get(each, each) for each in (sys.platform, platform.machine().lower()))
@@ -93,7 +92,7 @@ def platforms_of(names: Sequence[str] | None) -> list[str]:
 
 @dataclass(frozen=True)
 class CompiledKernels:
-    """Files of machine code, and the stamp that ties them to a world file."""
+    """Files of machine code, and the stamp that identifies the world file to which they belong."""
 
     stamp: str  # the library compares it with the stamp in the world file
     files: list[Path]  # one or more per platform
@@ -105,11 +104,12 @@ def compile_kernels(
     """Compile kernels for platforms.
 
     Args:
-        texts: folder with a file NAME.ll per kernel.
+        texts: folder with the assembly of each kernel in a file NAME.ll.
+        names: names of the kernels.
         platforms: names from `PLATFORMS`.
         folder: folder for the output.
-        world: None for shared libraries; a name for objects to link into a game, which becomes part of the
-            table's symbol.
+        world: None: write shared libraries. A name: write object files to link into a game; the name becomes
+            part of the table's symbol.
     """
     llvm = _llvm()
     sources = {name: _source_of(name, (texts / f"{name}.ll").read_text()) for name in names}
@@ -137,7 +137,7 @@ def _llvm() -> Any:
 
 
 def _source_of(name: str, text: str) -> str:
-    """Make a kernel's assembly portable, and add a function that runs its parts in order."""
+    """Return a kernel's assembly without its platform, and with a function that runs its parts in order."""
     text = _PROCESSOR.sub("", _TARGET_LINES.sub("", text))
     parts = sorted((int(number), part, context) for part, number, context in _PART.findall(text))
     for number, part, _ in parts:
@@ -151,7 +151,7 @@ def _source_of(name: str, text: str) -> str:
 
 
 def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
-    """Write the kernel table as LLVM assembly: the stamp, rows of a name and a function, and a null row."""
+    """Return the kernel table as LLVM assembly: the stamp, rows of a name and a function, and a null row."""
     lines, rows = [], []
     for i, text in enumerate([stamp, *names]):
         kind = f"[{len(text) + 1} x i8]"
@@ -179,17 +179,17 @@ def _object_of(llvm: Any, sources: Mapping[str, str], table: str, target: Platfo
         module = llvm.parse_assembly(for_web(source) if target.is_web else source)
         module.triple, module.data_layout = whole.triple, whole.data_layout
         whole.link_in(module)
-    for name in sources:  # allows several worlds in one game
+    for name in sources:  # so that a game can link several worlds
         whole.get_function(_FUNCTION + name).linkage = "internal"
     return bytes(machine.emit_object(whole))
 
 
 def _linked(target: Platform, code: Path) -> Path:
-    """Link an object file to a library next to it."""
+    """Link an object file to a library in the same folder. Return its path."""
     linked = code.with_name(target.file + target.end)
     if target.is_web:
         return _zig(linked, "c++", "-target", target.target, *web_sources(), code)
-    # zig provides compiler runtime functions such as memset: no system library is linked.
+    # zig provides runtime functions such as memset, so no system library is linked.
     given: list[str | Path] = ["cc", "-target", target.target, "-shared", "-nostdlib", "-lcompiler_rt", code]
     given.append("-Wl,-dead_strip" if target.end == ".dylib" else "-Wl,--gc-sections")
     if target.end == ".dll":
@@ -201,7 +201,7 @@ def _linked(target: Platform, code: Path) -> Path:
 
 
 def _zig(linked: Path, *given: str | Path) -> Path:
-    """Run zig's compiler."""
+    """Run zig's compiler with the output `linked`. Return its path."""
     command = [sys.executable, "-m", "ziglang", *map(str, given), "-s", "-o", str(linked)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:

@@ -22,16 +22,16 @@ CREASE = 40.0
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Input of the kernel that writes a mesh."""
+    """Array arguments of the kernel that writes a render mesh."""
 
     is_skin: bool
     is_serial: bool
     ints: NDArray[np.int32]
-    floats: NDArray[np.float32]  # of a skin
+    floats: NDArray[np.float32]  # unused unless the mesh is a skin
 
     @property
     def kernel(self) -> tuple[str, Any]:
-        """Name in the world file, and the kernel."""
+        """Name of the kernel in the world file, and the kernel."""
         name, kernel = (
             ("write_skin", write_skin) if self.is_skin else ("write_render_mesh", write_render_mesh)
         )
@@ -44,20 +44,20 @@ class ExportedMesh:
 
     name: str
     asset: int
-    level: int  # level of detail that it shows; -1 for all
+    level: int  # level of detail for which the mesh is drawn; -1: all
     vertex_count: int
     triangles: NDArray[np.int32]  # (m, 3)
-    tables: list[Table]  # one, or one per level
-    uv: NDArray[np.float32]  # (k, 2), or empty
+    tables: list[Table]  # one for a surface, one per level for a skin
+    uv: NDArray[np.float32]  # texture coordinates, (k, 2), or empty
 
     @property
     def is_skin(self) -> bool:
-        """True for a skin, which is shown at every level."""
+        """True for a skin, which is drawn at every level of detail."""
         return self.tables[0].is_skin
 
 
 def meshes_of(number: int, asset: SoftBodyAsset, name: str) -> list[ExportedMesh]:
-    """Render meshes of an asset: its skins, or else the surfaces of its levels that have triangles."""
+    """Return the render meshes of an asset: its skins, or else the surfaces of its levels."""
     found = []
     for i, skin in enumerate(asset.skins):
         surface = skin.surface

@@ -1,4 +1,4 @@
-"""Kernels of a world file, with the arguments that they are compiled for."""
+"""Kernels of a world file, with the arguments for which they are compiled."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _SERIAL = {
     "read_touches": read_touches,
     "read_root": read_root,
 }
-"""Kernels of every world, by name."""
+"""Kernels that every world needs, by name."""
 
 _OF_CONTACT = {
     "write_joint": write_joint,
@@ -66,7 +66,7 @@ _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind"
 
 
 def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels:
-    """All kernels that the native library calls in this world, by name."""
+    """Return all kernels that the native library calls in a world, by name, with their arguments."""
     state, program = context.built.state, context.built.program
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     found["step"] = _example(step_islands, state=state, program=program)

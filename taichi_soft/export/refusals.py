@@ -1,4 +1,4 @@
-"""Features that the native library does not support: why, and what to do instead."""
+"""Features that the native library does not support, with reasons and alternatives."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SKIPS = (
 
 
 def require_native(context: WorldContext, *, has_force_field: bool) -> None:
-    """Raise an OptionError that lists all unsupported features, with reasons and alternatives."""
+    """Check that the native library supports a world. Raises: OptionError with all unsupported features."""
     found = _of_world(context, has_force_field) + _of_assets(context) + _of_bodies(context)
     if found:
         raise OptionError(f"the native library does not run this world: {'; '.join(found)}")

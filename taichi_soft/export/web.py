@@ -1,4 +1,4 @@
-"""Build a WebAssembly module of kernels and the native library, and the package for a page."""
+"""Build a WebAssembly module from kernels and the native library, and the JavaScript package for a page."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ leave:
   ret void
 }}
 """
-"""One part of a loop, the same as in Taichi's runtime, but with the struct offsets of the target."""
+"""Assembly of a function that runs one part of a loop: as in Taichi's runtime, but with other offsets."""
 
 
 def for_web(source: str) -> str:
-    """Convert a kernel's assembly to 32-bit pointers: Taichi's loop runner has struct offsets for 64 bits."""
+    """Return a kernel's assembly for 32-bit pointers; Taichi's loop runner has struct offsets for 64 bits."""
     if not _LOOP.search(source):
         return source
     (closure,), (context,) = set(_CLOSURE.findall(source)), set(_CONTEXT.findall(source))
@@ -77,10 +77,10 @@ def for_web(source: str) -> str:
 
 
 def web_sources() -> list[str | Path]:
-    """Compiler arguments of the native library, which is linked with a world's kernels."""
+    """Return the compiler arguments for the native library, which is linked with a world's kernels."""
     native = _HERE / "native"
     return [
-        # Optimise the library for size, and the standard library's functions that kernels call for speed.
+        # Optimise the native library for size, but standard functions that kernels call for speed.
         *("-mexec-model=reactor", "-std=c++17", "-O2", "-Xclang", "-Os", "-msimd128", "-ffp-contract=off"),
         *(
             "-fno-exceptions",
@@ -95,6 +95,6 @@ def web_sources() -> list[str | Path]:
 
 
 def write_package(folder: Path) -> None:
-    """Copy the JavaScript package and its types next to a world."""
+    """Copy the JavaScript package and its type declarations to the folder of a world."""
     for file in sorted((_HERE / "web").glob("*.[jt]s")):
         shutil.copyfile(file, folder / file.name)

@@ -1,1 +1,1 @@
-"""Snapshots of a world as bytes, and recordings of calls."""
+"""Snapshots of a world as bytes, and recordings of calls and steps."""

@@ -1,4 +1,4 @@
-"""The part of a world's state outside its fields, as plain data: time, bodies by slot, entries of slices."""
+"""Manifest: the state of a world outside its fields, as plain data. It contains time, bodies and slices."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from taichi_soft.fracture.cutting import require_room
 from taichi_soft.solver.context import WorldContext
 
 _MAX_COUNT = 1 << 53
-"""Upper limit of counts of steps or handles, and of times [s]."""
+"""Largest valid number of steps or handles, and largest valid time [s]."""
 
 
 def write_manifest(context: WorldContext) -> dict[str, Any]:
-    """The state of a world outside its fields, as plain data."""
+    """Return the manifest of a world: its state outside the fields, as plain data."""
     return {
         "steps": context.clock.steps,
         "time": context.clock.time,
@@ -57,7 +57,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
 
 @dataclass
 class BodyEntry:
-    """The body that a slot will hold."""
+    """A body of a manifest, which will occupy a slot."""
 
     serial: int
     first_step: int
@@ -65,9 +65,9 @@ class BodyEntry:
     part: CutMesh | None
     level: int  # level of detail
     held: NDArray[np.int64] | None  # see `BodyRecord`
-    friction: float | None  # None for the friction of the asset
+    friction: float | None  # None: the asset's friction
     description: BodyDescription
-    arrays: BodyArrays | None  # of a cut body
+    arrays: BodyArrays | None  # None unless the body is cut
 
 
 @dataclass
@@ -78,16 +78,18 @@ class Manifest:
     time: float
     last_dt: float
     gravity: NDArray[np.float64]  # (3,) [m/s^2]
-    friction: float  # of the floor
+    friction: float  # friction of the floor
     handles: int
     bodies: list[BodyEntry | None]
-    slices: dict[str, Any]  # result of `read` of each slice
+    slices: dict[str, Any]  # result of `Slice.read` by name of the slice
 
 
 def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]) -> dict[int, CutMesh]:
-    """Read the meshes of cut bodies, by slot.
+    """Read the meshes of cut bodies. Return them by slot.
 
-    Args: bodies: entries of the manifest. rows: words of all cut meshes, one after another.
+    Args:
+        bodies: entries of bodies in the manifest.
+        rows: words of all cut meshes, concatenated.
     Raises: as `read_manifest`.
     """
     parts: dict[int, CutMesh] = {}
@@ -106,9 +108,9 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
 
 
 def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int, CutMesh]) -> Manifest:
-    """Read and check the data of `write_manifest`.
+    """Read a manifest from the data of `write_manifest`, and check it against a world.
 
-    Raises: SnapshotError, or what Python raises for invalid data.
+    Raises: SnapshotError, or another exception of Python for invalid data.
     """
     if len(plain["bodies"]) != len(context.slots.slots):
         raise ValueError("it has another number of bodies")
@@ -131,7 +133,7 @@ def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int,
 
 
 def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
-    """Check the serial numbers of handles. Raises: ValueError for duplicates and numbers out of range."""
+    """Check the serial numbers of handles. Raises: ValueError for duplicates or numbers out of range."""
     numbers = [entry[0] for entry in plain["bodies"] if entry is not None]
     for each in context.slices:
         numbers += each.serials(plain["slices"][each.name])

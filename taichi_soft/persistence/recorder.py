@@ -1,8 +1,9 @@
-"""Flight recorder: the calls and steps of the last ticks, and the snapshot before them.
+"""Flight recorder: records the calls and steps of the last ticks, and a snapshot of the state before them.
 
-A recording holds at least the requested number of ticks, and less than twice as many: the recorder takes a
-snapshot once per that number, and keeps the last two segments. Ticks that `restore` undid are removed. A
-recording is plain data that contains its assets and shapes, so that `replay` can rebuild the world anywhere.
+A recording contains at least the requested number of ticks, but less than twice as many: the recorder takes a
+snapshot each time that number of ticks has passed, and keeps the last two segments. It removes ticks that
+`restore` undid. A recording is plain data and contains its assets and shapes, so that `replay` can rebuild
+the world on any machine.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ MARK, VERSION = b"TSOFTREC", 1
 
 MAX_CONTENT = 1 << 28
 """Largest uncompressed size of a recording without its snapshot [bytes]. Compressed data can be a thousand
-times smaller, so without this limit a small file could fill the memory."""
+times smaller: without this limit, a small file could fill the memory."""
 
 FieldAccelerations = list[tuple[int, NDArray[np.float32]]]
-"""Accelerations of a force field in one step: serial number of each body, (n, 3) [m/s^2]."""
+"""Accelerations by a force field in one step: for each body, serial number and rows (n, 3) [m/s^2]."""
 
 
 @dataclass
@@ -46,7 +47,7 @@ class _Segment:
 
     snapshot: bytes
     entries: list[list[Any]] = field(default_factory=list)  # calls and steps
-    marks: dict[bytes, int] = field(default_factory=dict)  # entries before each snapshot, by its name
+    marks: dict[bytes, int] = field(default_factory=dict)  # number of entries before each snapshot, by name
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -57,7 +58,7 @@ class _Segment:
         self.marks[name_of_sealed(snapshot)] = len(self.entries)
 
     def rewind(self, name: bytes) -> None:
-        """Remove the entries after the snapshot of that name."""
+        """Remove the entries after the snapshot of a given name."""
         end = self.marks[name]
         del self.entries[end:]
         self.marks = {name: at for name, at in self.marks.items() if at <= end}
@@ -68,18 +69,24 @@ class Recorder:
     """Records the calls and steps of one world."""
 
     def __init__(self, context: WorldContext, ticks: int, path: Path) -> None:
-        """Start recording a built world. Args: path: file that is written when a body freezes."""
+        """Start to record a built world.
+
+        Args:
+            context: context of the world.
+            ticks: smallest number of ticks to keep.
+            path: file to write when a body freezes.
+        """
         self._ticks, self._path = ticks, path
         self._before: _Segment | None = None
         self._present = _Segment(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
-        self.field_accelerations: FieldAccelerations = []  # of a force field in the coming step
+        self.field_accelerations: FieldAccelerations = []  # by the force field in the next step
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call and record it, unless it is refused or nested in another recorded call."""
+        """Make a call and record it, unless it raises or is nested in a recorded call. Return its result."""
         if self._is_inside:
             return method(handle, *arguments, **options)
         copied = [
@@ -97,9 +104,9 @@ class Recorder:
     def record_step(
         self, context: WorldContext, seconds: float, substeps: int, *, has_failure: bool
     ) -> list[str]:
-        """Record a step and the hash of the state after it. Write the recording if a body froze in it.
+        """Record a step and the hash of the state after it. Write the recording to its file if a body froze.
 
-        Returns: lines for the user.
+        Returns: lines to report to the user.
         """
         field_accelerations = [[serial, rows] for serial, rows in self.field_accelerations]
         self.field_accelerations = []
@@ -119,11 +126,14 @@ class Recorder:
         return f"`taichi-soft replay {file}` replays the steps before it"
 
     def record_snapshot(self, snapshot: bytes) -> None:
-        """Record that a snapshot was taken now."""
+        """Record that a snapshot was taken of the present state."""
         self._present.mark(snapshot)
 
     def rewind(self, context: WorldContext, snapshot: bytes) -> None:
-        """Remove what `World.restore` undid; restart the recording if the snapshot was not taken in it."""
+        """Remove the entries that `World.restore` undid.
+
+        Restart the recording if the snapshot was taken before it or in another world.
+        """
         name = name_of_sealed(snapshot)
         self.field_accelerations = []
         if name in self._present.marks:
@@ -135,7 +145,7 @@ class Recorder:
             self._before, self._present = None, _Segment(take_snapshot(context))
 
     def content(self, context: WorldContext) -> bytes:
-        """The recording up to now, as bytes."""
+        """Return the recording up to the present state, as bytes."""
         first = self._before or self._present
         entries = [*(self._before.entries if self._before else []), *self._present.entries]
         shapes = {name: plain_of(shape) for name, shape in context.colliders.shapes.items()}
@@ -169,7 +179,10 @@ class Recorder:
 
 
 def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
-    """Read a recording. Returns: assets, options and entries; the snapshot before. Raises: SnapshotError."""
+    """Read a file of a recording. Raises: SnapshotError.
+
+    Returns: assets, options and entries; the snapshot before them.
+    """
     file = as_path(path)
     try:
         data = file.read_bytes()
@@ -181,7 +194,7 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read a file saved by a web page: a recording, with the visitor's entries in place of its steps."""
+    """Read a file that a web page saved: a recording, and entries of the visitor that replace its steps."""
     try:
         played = json.loads(data)
         made_of, snapshot = _read_sealed(base64.b64decode(played["start"], validate=True))
@@ -196,7 +209,7 @@ def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read the data of `Recorder.save`."""
+    """Read the bytes of `Recorder.content`. Return content and snapshot as `read_recording`."""
     parts = unseal(data, MARK, VERSION, "recording")
     try:
         content, snapshot = parts
@@ -211,7 +224,7 @@ def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _world_options(context: WorldContext) -> dict[str, Any]:
-    """Arguments of `World` that are not in the snapshot."""
+    """Return the arguments of `World`, as plain data: a snapshot does not contain them."""
     chosen = context.settings
     names = (
         "restitution",
@@ -234,7 +247,7 @@ def _world_options(context: WorldContext) -> dict[str, Any]:
 
 
 def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
-    """Arguments of `SoftBodyAsset`."""
+    """Return the arguments of `SoftBodyAsset`, as plain data."""
     names = ("law", "strain", "flips", "damping_model", "spare_vertices")
     return {
         "mesh": plain_of(asset.mesh),
@@ -250,7 +263,7 @@ def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
 
 
 def _copied(value: Any) -> Any:
-    """Copy of an argument, independent of later changes by the caller."""
+    """Copy an argument, so that later changes by the caller do not affect it."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if isinstance(value, (list, tuple)):
@@ -259,7 +272,7 @@ def _copied(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """An argument as plain data; handles by serial number, assets and shapes by digest."""
+    """Convert an argument to plain data: handles to serial numbers, assets and shapes to digests."""
     if isinstance(value, Handle):
         return {"handle": serial_of(value)}
     if isinstance(value, SoftBodyAsset):

@@ -1,4 +1,4 @@
-"""Restore the bodies of a manifest: reuse handles that callers hold, and create the others."""
+"""Restore the bodies of a manifest: reuse the handles that callers have, and create the others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from taichi_soft.solver.state import State
 
 
 def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
-    """Set time and bodies to those of a manifest, except for the fields and slices. Cannot fail."""
+    """Set the time and bodies of a world from a manifest, but not its fields and slices. Cannot fail."""
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings
@@ -31,7 +31,7 @@ def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
 
 
 def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEntry | None) -> None:
-    """Fill a slot with the body of an entry, with its material."""
+    """Fill a slot with the body of an entry, or empty it for None."""
     present = context.slots.slots[slot]
     if present is not None and (entry is None or serial_of(present) != entry.serial):
         _remove(context, state, present)
@@ -40,7 +40,7 @@ def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEnt
         return
     if present is not None and _content_of(present) != (name_of(entry.part), entry.level):
         refill_slot(context, state, slot, entry.level, entry.arrays)
-        record_of(present).friction = None  # the asset's, since the refill
+        record_of(present).friction = None  # refilling the slot has restored the asset's friction
     if present is None:
         present = _insert(context, state, slot, entry)
     record = record_of(present)
@@ -57,7 +57,7 @@ def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEnt
 
 
 def _content_of(body: SoftBody) -> tuple[str, int]:
-    """Name of the cut mesh and level of detail in a body's slot."""
+    """Return the name of the cut mesh and the level of detail of the body in a slot."""
     record = record_of(body)
     return name_of(record.part), record.level
 
@@ -74,7 +74,7 @@ def _remove(context: WorldContext, state: State, body: SoftBody) -> None:
 
 
 def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) -> SoftBody:
-    """Insert a body into a free slot, with the handle that a caller holds or a new one."""
+    """Insert a body into a free slot. Return its handle: the one that a caller has, or a new one."""
     asset = context.slots.assets[slot]
     if entry.part is not None or context.layout.bodies[slot] is not asset.levels[entry.level].arrays:
         refill_slot(context, state, slot, entry.level, entry.arrays)
@@ -92,5 +92,5 @@ def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) ->
 
 
 def _description_in_slot(body: SoftBody, entry: BodyEntry) -> BodyDescription:
-    """Description of the body in a slot before it gets its own material."""
+    """Return the description of a body before its own material is applied."""
     return present_asset(body).description if entry.part is None else entry.description

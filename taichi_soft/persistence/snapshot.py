@@ -1,10 +1,10 @@
 """Convert the state of a world between two steps to bytes and back.
 
-A snapshot has four parts. The *structure* describes how the world was built; a world of another structure
-refuses the snapshot. The *manifest* holds the state outside the fields: time, gravity, the body in each slot,
-and the entries of each slice (colliders, frames, joints ...). The *words* hold the contents of the fields,
-bit by bit (see `persistence.kernels.packing`), and the meshes of cut bodies (see `bodies.cut_mesh`). The last
-part is the state of the events (see `events.event_state`).
+A snapshot has four parts. The *structure* describes how the world was built; a world with another structure
+rejects the snapshot. The *manifest* contains the state outside the fields: time, gravity, the body in each
+slot, and the entries of each slice (colliders, frames, joints ...). The *words* contain exact copies of the
+fields (see `persistence.kernels.packing`) and the meshes of cut bodies (see `bodies.cut_mesh`). The last part
+is the state of the events (see `events.event_state`).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def take_snapshot(context: WorldContext) -> bytes:
 
 
 def _structure(context: WorldContext) -> bytes:
-    """Structure of a world, from `structure_of`, cached."""
+    """Return the structure of a world from `structure_of`, and cache it."""
     if not context.structure:
         context.structure = structure_of(context)
     return context.structure
@@ -72,7 +72,12 @@ def bodies_hash(context: WorldContext) -> str:
 
 
 def row_counts(context: WorldContext, entries: dict[str, list[list[Any]]]) -> dict[str, int]:
-    """Number of rows of each group of fields in a snapshot, for the entries of the slices in a manifest."""
+    """Return the number of rows of each group of fields in a snapshot.
+
+    Args:
+        context: context of the world.
+        entries: entries of the slices in the manifest, by name.
+    """
     scene, slots = context.layout, len(context.slots.slots)
     counts = {
         WORLD: 1,
@@ -87,14 +92,14 @@ def row_counts(context: WorldContext, entries: dict[str, list[list[Any]]]) -> di
 
 
 def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
-    """Layout of the words of each group of fields."""
+    """Return the layout of the words in a snapshot, from `row_table`."""
     return row_table(context.built.state, row_counts(context, entries))
 
 
 def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = False) -> None:
     """See `World.restore`.
 
-    Args: keeps_events: True if no step was made since, so that the queued events stay.
+    Args: keeps_events: True keeps the queued events, if no step was made since the snapshot.
     """
     state = context.built.state
     structure, content, rows, event_part = _four_parts(unseal(data, MARK, VERSION, "snapshot"))
@@ -135,7 +140,7 @@ def _four_parts(parts: list[memoryview]) -> list[memoryview]:
 
 
 def _require_words(context: WorldContext, manifest: Manifest, table: Words, words: Words) -> None:
-    """Check the fields. Raises: SnapshotError for indices out of range and for values that are not finite."""
+    """Check the values of fields in a snapshot. Raises: SnapshotError for invalid indices or values."""
     state = context.built.state
     things = {
         "": 0,
@@ -163,13 +168,13 @@ def _require_words(context: WorldContext, manifest: Manifest, table: Words, word
 
 
 def _field_rows(table: Words, words: Words, state: State, field: Any) -> NDArray[Any]:
-    """Values of a slice's field in a snapshot, (rows, width), in the field's type."""
+    """Return the values of a field in a snapshot, (rows, width), as integers or float32."""
     rows = _rows(table, words, state, field)
     return rows if field.dtype == ti.i32 else rows.view(np.float32)
 
 
 def _rows(table: Words, words: Words, state: State, requested: Any) -> Words:
-    """Words of a field in a snapshot, (rows, width)."""
+    """Return the words of a field in a snapshot, (rows, width)."""
     for (count, width, begin), group in zip(table.tolist(), state.kept.values(), strict=False):
         for field, column, size in group:
             if field is requested:

@@ -15,8 +15,8 @@ from taichi_soft.solver.context import WorldContext
 
 
 def structure_of(context: WorldContext) -> bytes:
-    """Structure of a world, as JSON."""
-    # Gravity and the floor's friction can change, and are in the manifest.
+    """Return the structure of a world, as JSON."""
+    # Without gravity and the floor's friction: they can change, so they are in the manifest.
     settings = {
         name: as_plain(value)
         for name, value in asdict(context.settings).items()
@@ -27,7 +27,7 @@ def structure_of(context: WorldContext) -> bytes:
         {
             "package": _package_version(),
             "slices": [each.name for each in context.slices],
-            # The sizes of the fields follow from the bodies, and can be larger in a reused set of fields.
+            # Without the sizes of fields: they follow from the bodies, and can be larger in reused fields.
             "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
             "soft_contact": context.contact.soft,
             "sleep_speed": context.contact.sleep_speed,
@@ -45,7 +45,7 @@ def _package_version() -> str:
 
 
 def asset_digest(asset: SoftBodyAsset) -> str:
-    """Digest of an asset's mesh, material and options."""
+    """Return a digest of an asset's mesh, material and options."""
     described = asset.description
     model = described.model
     parts = [model.law.name, model.strain, model.flips, model.damping_model]

@@ -12,7 +12,7 @@ from taichi_soft.elements.kernels.elastic import lane_forces
 
 @ti.func
 def _add_tet_forces(state: ti.template(), model: ti.template(), body):
-    """Add the forces of tetrahedra. Returns the first that failed (block times `LANES` plus lane), or -1."""
+    """Add the forces of tetrahedra. Return the first that failed (block times `LANES` plus lane), or -1."""
     failed = -1
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
@@ -29,7 +29,7 @@ def _add_tet_forces(state: ti.template(), model: ti.template(), body):
 
 @ti.func
 def _add_bond_forces(state: ti.template(), model: ti.template(), body):
-    """Add the forces of bonds. Returns the first edge that failed, or -1."""
+    """Add the forces of bonds. Return the first edge that failed, or -1."""
     failed = -1
     if ti.static(model.reads_expansion):
         accumulate_pressures(state, body)
@@ -47,8 +47,8 @@ def _add_bond_forces(state: ti.template(), model: ti.template(), body):
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, element by element.
 
-    Returns the first tetrahedron (block times `LANES` plus lane), or edge for forces along edges, with an end
-    out of range or a force that is not finite, or -1.
+    Returns: the first tetrahedron (block times `LANES` plus lane), or edge for laws along edges, that has a
+        particle out of range or a force that is not finite; -1 if there is none.
     """
     failed = -1
     for m, model in ti.static(enumerate(program.models)):
@@ -64,7 +64,7 @@ def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), b
 def compute_body_forces(
     state: ti.template(), program: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=2)
 ):
-    """Internal forces on the particles of one body at their present positions [N], in kernel order."""
+    """Write the present internal forces on the particles of one body, (n, 3) [N], in kernel order."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         accumulate_forces_one_by_one(state, program, body)

@@ -1,6 +1,6 @@
 """Faces of a deformed surface: the triangles of a body, or its vertices if it has none.
 
-A vertex counts as a triangle of no size. Rays cannot hit it, but it has a nearest point like any other.
+A vertex counts as a triangle of zero size: rays cannot hit it, but queries for nearest points find it.
 """
 
 from taichi_soft.bodies.status import ABSENT
@@ -8,7 +8,7 @@ from taichi_soft.core.math.triangle import solid_angle
 from taichi_soft.core.runtime import ti
 
 INSIDE = 6.283
-"""Solid angle [sr] above which a point counts as inside: half of the 4 pi of a closed surface."""
+"""Solid angle [sr] above which a point counts as inside: half of 4 pi, the angle inside a closed surface."""
 
 
 @ti.func
@@ -25,7 +25,7 @@ def face_count(state: ti.template(), body):
 
 @ti.func
 def face_particles(state: ti.template(), body, face):
-    """Particles of a triangle, or three times that of a vertex."""
+    """Three particles of a face; for a vertex, three times the same particle."""
     triangles = state.body_triangles[body]
     particles = ti.Vector.one(ti.i32, 3)
     if triangles[1] > triangles[0]:
@@ -57,7 +57,7 @@ def box_around(state: ti.template(), body):
 
 @ti.func
 def is_inside(state: ti.template(), body, x):
-    """True if a body's surface, mirrored or not, winds around a point by more than half."""
+    """True if a point is inside a body, by the solid angle of its surface, which can be mirrored."""
     total = x.x * 0.0
     for face in range(face_count(state, body)):
         a, b, c = face_corners(state, body, face, x)
@@ -67,9 +67,10 @@ def is_inside(state: ti.template(), body, x):
 
 @ti.func
 def write_result(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
-    """Write a result: distance, weights, point, unit normal (`away` if the face has none), body and face.
+    """Write a result to a row of `out`: distance, weights, point, unit normal, body and face.
 
-    All of them are float32, which counts 16 million faces exactly.
+    The normal is along `away` if the face has no area. All values are float32, which represents numbers of up
+    to 16 million faces exactly.
     """
     v = face_particles(state, body, face)
     x = ti.static(state.particle_position)

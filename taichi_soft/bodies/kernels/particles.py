@@ -8,7 +8,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def save_particle(state: ti.template(), p):
-    """Save the state of a particle before the step, to interpolate from and to fall back to."""
+    """Save the state of a particle before the step, for interpolation and for retries."""
     state.prev_position[p] = state.particle_position[p]
     state.prev_velocity[p] = state.particle_velocity[p]
 
@@ -40,7 +40,7 @@ def gravity_on(state: ti.template(), body):
 
 @ti.func
 def particle_is_valid(state: ti.template(), p):
-    """1 if position and velocity are within their limits, else 0."""
+    """1 if position and velocity of a particle are within their limits, else 0."""
     in_range = is_within(state.particle_position[p], POSITION_LIMIT)
     return in_range & is_within(state.particle_velocity[p], VELOCITY_LIMIT)
 
@@ -53,11 +53,11 @@ def moves(state: ti.template(), p):
 
 @ti.func
 def inv_mass_of(state: ti.template(), p):
-    """Inverse mass [1/kg]; zero if the body does not move."""
+    """Inverse mass of a particle [1/kg]; zero if its body does not move."""
     return state.particle_inv_mass[p] * moves(state, p)
 
 
 @ti.func
 def velocity(state: ti.template(), p):
-    """Velocity [m/s]; zero if the body does not move: a frozen body keeps the velocities that failed."""
+    """Velocity of a particle [m/s]; zero if its body does not move: a frozen body stores invalid ones."""
     return state.particle_velocity[p] * moves(state, p)

@@ -1,7 +1,7 @@
-"""Plastic flow: the rest shape of a tetrahedron follows the part of its deformation that is beyond yield.
+"""Plastic flow: the rest shape of a tetrahedron follows the part of the deformation beyond the yield point.
 
-Flow turns the rest shape A0 into Fp A0, stored as its inverse A0^-1 P, where P = Fp^-1 is symmetric and has
-determinant 1. P is computed from it, so that only `tet_rest_inverse` changes. See `Plasticity`.
+Flow changes the rest shape A0 to Fp A0. Only the inverse A0^-1 P is stored, in `tet_rest_inverse`; P = Fp^-1
+is symmetric, has determinant 1, and is recomputed from the inverse. See `Plasticity`.
 """
 
 from taichi_soft.bodies.status import ACTIVE
@@ -23,10 +23,10 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 _ITERATIONS = 12
-"""Iterations of the search for the strain at yield; from twice the strain, eight are exact to float32."""
+"""Iterations of the search for the strain at yield. For twice that strain, eight are exact to float32."""
 
 _MAX_STRAIN = 1e6
-"""Strain above which nothing flows: the body is diverging."""
+"""Strain above which a tetrahedron does not flow, because its body is diverging."""
 
 
 @ti.func
@@ -49,7 +49,7 @@ def _equivalent(v):
 
 @ti.func
 def _excess(logarithms, limit):
-    """Fraction of the logarithmic strains' deviator that is beyond yield, 0 to 1."""
+    """Fraction of the deviator of logarithmic strains that is beyond the yield strain `limit`, 0 to 1."""
     deviator = _deviator(logarithms)
     mean = logarithms - deviator
     kept = logarithms.x * 0.0 + 1.0
@@ -61,9 +61,10 @@ def _excess(logarithms, limit):
 
 @ti.func
 def _limited(columns, maximum):
-    """Symmetric matrix of determinant 1 with the stretches of M up to the maximum, as columns.
+    """Symmetric matrix of determinant 1 with the stretches of M, limited to the maximum strain, as columns.
 
-    M is such a matrix times a rotation, which has no effect in an isotropic material.
+    M, given as columns, is such a matrix times a rotation. The rotation has no effect in an isotropic
+    material.
     """
     squares, axes = symmetric_eigen(outer_square(columns))
     logarithms = _deviator(0.5 * log_each(ti.max(squares, 1e-30)))
@@ -89,7 +90,7 @@ def _flow_tet(state: ti.template(), block, lane, plasticity, dt):
         flowed = product(inverse, from_axes(exp_each(-part * _deviator(logarithms)), axes))
         original = _original_inverse_of(state, block, lane)
         scale = 1.0 / determinant(original)
-        rest = transposed(cofactor(original))  # A0 over `scale`
+        rest = transposed(cofactor(original))  # A0 / scale
         P = _limited(product((rest[0] * scale, rest[1] * scale, rest[2] * scale), flowed), plasticity[3])
         new = product(original, P)
         for column in ti.static(range(3)):
@@ -99,14 +100,14 @@ def _flow_tet(state: ti.template(), block, lane, plasticity, dt):
 
 @ti.func
 def flow_block(state: ti.template(), body, block, dt):
-    """Apply plastic flow to the tetrahedra of one block for a time [s]."""
+    """Apply plastic flow to the tetrahedra of one block for a duration `dt` [s]."""
     for lane in range(LANES):
         _flow_tet(state, block, lane, state.body_plasticity[body], dt)
 
 
 @ti.func
 def flow_body(state: ti.template(), body, dt):
-    """Apply plastic flow to the tetrahedra of one body for a time [s], in one thread."""
+    """Apply plastic flow to the tetrahedra of one body for a duration `dt` [s], in one thread."""
     if state.body_status[body] == ACTIVE and state.body_plasticity[body][2] > 0.0:
         blocks = state.body_blocks[body]
         for block in range(blocks[0], blocks[1]):
@@ -123,7 +124,7 @@ def restore_shape(state: ti.template(), body):
 
 @ti.kernel
 def read_rest_inverses(state: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=3)):
-    """Present A^-1 of each tetrahedron, (m, 3, 3) [1/m], in kernel order."""
+    """Write the present A^-1 of each tetrahedron of a body to `out`, (m, 3, 3) [1/m], in kernel order."""
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = state.body_blocks[body][0] + t // LANES, t % LANES

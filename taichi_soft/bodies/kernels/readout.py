@@ -7,7 +7,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Positions of all bodies [m], interpolated by `alpha` from the previous step (0) to the last one (1).
+    """Write positions of all bodies [m], interpolated by `alpha` from the previous step (0) to the last (1).
 
     Rows of absent bodies are unchanged.
     """
@@ -29,7 +29,7 @@ def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dt
 def read_velocities(
     state: ti.template(), begin: ti.i32, count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Velocities of one body as the integrator stores them [m/s]."""
+    """Write the velocities of one body [m/s] as the integrator stores them."""
     ti.loop_config(serialize=True)
     for i in range(count):
         v = state.particle_velocity[state.particle_of_vertex[begin + i]]
@@ -44,7 +44,7 @@ def write_motion(
     positions: ti.types.ndarray(ndim=2),
     velocities: ti.types.ndarray(ndim=2),
 ):
-    """Set positions of the particles of one body, and velocities of the same time."""
+    """Set the positions [m] of one body's particles, and their velocities [m/s] at that time."""
     i = 0
     while i < positions.shape[0]:
         p = state.particle_of_vertex[state.body_particles[body][0] + i]

@@ -8,17 +8,17 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Vertices in the ring around a render vertex: room for eight triangles, or in the first blocks for six. Most
-render vertices have six."""
+"""Numbers of vertices in the ring around a render vertex: enough for eight triangles, and for six in the
+first blocks. Most render vertices have six."""
 
 STRIDE = (1 + RING) * LANES
-"""Table entries of a block."""
+"""Number of table entries of a block."""
 
 BLOCK_BITS = (1 << 24) - 1
-"""Mask that leaves block numbers unchanged: it shows the compiler that index arithmetic cannot overflow."""
+"""Mask that leaves block numbers unchanged. It proves to the compiler that indices cannot overflow."""
 
 NO_LENGTH = 1e-37
-"""Squared norm [m^4] of a sum of triangles below which it has no direction: the limit of float32."""
+"""Squared norm [m^4] of a sum of triangle normals below which it has no direction, near float32's limit."""
 
 
 @ti.func
@@ -28,7 +28,7 @@ def _row(rows: ti.template(), i):
 
 @ti.func
 def drawn_position(state: ti.template(), first, vertex, alpha):
-    """Position of a vertex between two steps [m]; `first` is the body's first particle."""
+    """Position of a vertex [m], interpolated by `alpha`; `first` is the body's first particle."""
     p = state.particle_of_vertex[first + vertex]
     before, after = state.prev_position[p], state.particle_position[p]
     x = before + alpha * (after - before)
@@ -44,7 +44,7 @@ def _block_count(positions: ti.template()):
 
 @ti.func
 def _sum_of_ring(positions: ti.template(), table: ti.template(), place, length: ti.template()):
-    """Sum of the triangles in the ring of a render vertex: twice their areas times their normals."""
+    """Sum over the triangles around a render vertex: twice the area times the normal of each [m^2]."""
     a = _row(positions, table[place])
     one = _row(positions, table[place + LANES]) - a
     n = ti.Vector.zero(ti.f32, 3)
@@ -65,8 +65,9 @@ def write_render_mesh(
     positions: ti.types.ndarray(dtype=ti.f32, ndim=1),
     normals: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Positions [m] and unit normals of render vertices, interpolated by `alpha` from the previous step (0)
-    to the last one (1).
+    """Write positions [m] and unit normals of render vertices.
+
+    They are interpolated by `alpha` from the previous step (0) to the last one (1).
 
     Args:
         table: see `render_table`.
@@ -85,7 +86,7 @@ def write_render_mesh(
         nx, ny = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
         nz = ti.Vector.zero(ti.f32, LANES)
         small = table[_block_count(positions) * (STRIDE + 1) + positions.shape[0] // 3 + 1]
-        # Reads arrays and writes only local ones, so that LLVM vectorises it in one pass.
+        # These loops read arrays and write only local ones, so that LLVM vectorises them in one pass.
         if block < small:
             for lane in range(LANES):
                 j = lane & (LANES - 1)
@@ -96,7 +97,7 @@ def write_render_mesh(
                 j = lane & (LANES - 1)
                 n = _sum_of_ring(positions, table, (block & BLOCK_BITS) * STRIDE + j, RING)
                 nx[j], ny[j], nz[j] = n.x, n.y, n.z
-        # The few triangles that are in no ring.
+        # The few further triangles, which are in no ring.
         row = _block_count(positions) * STRIDE + positions.shape[0] // 3 + block
         for number in range((table[row + 1] - table[row]) // 3):
             place = table[row] + 3 * number

@@ -1,4 +1,4 @@
-"""Vertices and normals of an artist's mesh that a body carries."""
+"""Vertices and normals of an artist's mesh that is bound to a body."""
 
 import numpy as np
 
@@ -6,23 +6,23 @@ from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
 FRAME = 12
-"""Numbers per frame of a vertex of the body: the deformation gradient F by columns, and the position less F X
-/ 2, with the position X at rest."""
+"""Numbers stored for each vertex of the body: the deformation gradient F by columns, and x - F X / 2 with the
+position x and the rest position X."""
 
 ROW = 10
-"""Numbers per vertex of the skin: four weights, the target, and the normal at rest."""
+"""Numbers per skin vertex: four weights, the position q (see `bodies.skin`), and the normal at rest."""
 
 LANES = 16
-"""Vertices of the skin that are stored and computed side by side."""
+"""Number of skin vertices that are stored and computed together."""
 
 NO_LENGTH = 1e-30
-"""Squared norm of a normal below which it has no direction, at float32's limit."""
+"""Squared norm of a normal below which it has no direction, near float32's limit."""
 
 
 def interleaved(rows: np.ndarray) -> np.ndarray:
-    """Rows (k, n) in the order of the kernel: the first numbers of `LANES` rows, then the second, and so on.
+    """Return rows (k, n) in kernel order: the first numbers of `LANES` rows, then the second ones, and so on.
 
-    The last block is padded with 0. The result is (blocks n LANES,).
+    The last block is padded with 0. The result is flat, with `LANES` n numbers for each block.
     """
     blocks = -(-len(rows) // LANES)
     padded = np.zeros((blocks * LANES, rows.shape[1]), dtype=rows.dtype)
@@ -48,14 +48,16 @@ def write_skin(
     positions: ti.types.ndarray(dtype=ti.f32, ndim=1),
     normals: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Positions [m] and unit normals, interpolated by `alpha` from the previous step (0) to the last one (1).
+    """Write positions [m] and unit normals of skin vertices.
+
+    They are interpolated by `alpha` from the previous step (0) to the last one (1).
 
     Args:
         count: number of vertices of the body.
-        ints: where the neighbours of each of these begin, and the last end; the neighbours; and the four
-            vertices of the body that carry each vertex of the skin, `interleaved`.
-        floats: the row of each neighbour in the gradient; the body's vertices at rest; and `ROW` numbers for
-            each vertex of the skin, `interleaved`.
+        ints: concatenation of: index of the first neighbour of each of these vertices, and of the end; the
+            neighbours; the four vertices of the body that carry each skin vertex, `interleaved`.
+        floats: concatenation of: row of each neighbour (see `gradient_rows`); the body's vertices at rest;
+            `ROW` numbers for each skin vertex, `interleaved`.
         frames: work array, (FRAME count,).
         positions, normals: (3 k,).
     """
@@ -78,7 +80,7 @@ def write_skin(
         rows = 3 * (edges + count) + ROW * LANES * block
         corners = count + 1 + edges + 4 * LANES * block
         drawn = ti.Vector.zero(ti.f32, 6 * LANES)
-        for lane in range(LANES):  # reads arrays and writes only a local one, so that LLVM vectorises it
+        for lane in range(LANES):  # reads arrays and writes only local ones, so that LLVM vectorises it
             frame = ti.Vector.zero(ti.f32, FRAME)
             for c in ti.static(range(4)):
                 start, weight = FRAME * ints[corners + LANES * c + lane], floats[rows + LANES * c + lane]

@@ -1,1 +1,1 @@
-"""Kernels that write control inputs to the fields, and functions of the substep that apply them."""
+"""Kernels that write control inputs to the fields, and functions that apply them in a substep."""

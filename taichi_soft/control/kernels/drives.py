@@ -1,8 +1,8 @@
-"""External forces of a step: applied forces, linear damping, wind; and the load on pins.
+"""External forces of a step: applied forces, linear damping and wind; and the load on pinned particles.
 
-All except gravity change velocities for their exact duration, so that their impulse over a step is exact.
-Under leapfrog, half a substep's impulse comes before the first kick and the other half after the last one,
-because velocities are at half substeps.
+All of them act on the velocities for their exact duration, so that their impulse over a step is exact. With
+leapfrog, velocities are at half substeps: half a substep's impulse is applied before the first kick, and the
+other half after the last kick.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -14,7 +14,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def apply_external_forces(state: ti.template(), body, seconds):
-    """Apply forces and linear damping to the velocities of one body for `seconds`."""
+    """Change the velocities of one body by applied forces and linear damping during `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:
         keep = exp(-seconds * state.body_damping[body])
@@ -31,10 +31,10 @@ def apply_external_forces(state: ti.template(), body, seconds):
 
 @ti.real_func
 def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
-    """Apply wind to the velocities of one body for `h` [s], triangle by triangle.
+    """Change the velocities of one body by wind during `h` [s], triangle by triangle.
 
-    A vertex receives its third of 1/4 rho c_d A |v_n| v_n implicitly, so that it never exceeds the wind's
-    speed along the normal.
+    A vertex gets a third of the force 1/4 rho c_d A |v_n| v_n of a triangle. The integration is implicit, so
+    that a vertex never exceeds the wind's speed along the normal.
     """
     wind = state.wind[None]
     drives = state.body_drives[body]
@@ -50,7 +50,7 @@ def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
             n = across / twice_area
             sum = state.particle_velocity[a] + state.particle_velocity[b] + state.particle_velocity[c]
             flow = ti.abs((wind.xyz - sum / 3.0).dot(n))
-            drag = wind.w * twice_area * flow / 24.0  # per vertex [kg/s]
+            drag = wind.w * twice_area * flow / 24.0  # force per normal velocity on a vertex [kg/s]
             for i in range(3):
                 p = corners[i]
                 inv_mass = state.particle_inv_mass[p]
@@ -64,7 +64,7 @@ def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
 
 @ti.real_func
 def add_reactions(state: ti.template(), body: ti.i32, seconds: ti.f32):
-    """Accumulate the impulse of internal forces and gravity on pinned particles during `seconds` [N s]."""
+    """Accumulate the impulse of internal forces and gravity on pinned particles [N s] during `seconds`."""
     if state.body_drives[body] & FEELS_REACTION != 0:
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
@@ -76,7 +76,7 @@ def add_reactions(state: ti.template(), body: ti.i32, seconds: ti.f32):
 
 @ti.func
 def _open_pushes(state: ti.template(), body):
-    """Clear forces of an earlier step before the first force of this step."""
+    """Clear the applied forces of an earlier step, before the first force for the next step is added."""
     if state.body_drives[body] & PUSHED == 0:
         state.body_drives[body] = state.body_drives[body] | PUSHED
         particles = state.body_particles[body]
@@ -91,10 +91,10 @@ def add_push(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     acceleration: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Accelerate `particles` of one body during the next step by (3,) [m/s^2]."""
+    """Accelerate `particles` of one body during the next step by `acceleration`, (3,) [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
-        if state.body_status[body] == SKIPPING:  # a force field does not act on a skipping body
+        if state.body_status[body] == SKIPPING:  # a body with an applied force must not skip the step
             state.body_status[body] = ACTIVE
         _open_pushes(state, body)
         a = ti.Vector([acceleration[0], acceleration[1], acceleration[2]])
@@ -105,7 +105,7 @@ def add_push(
 
 @ti.kernel
 def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Accelerate every vertex of one body during the next step by a row [m/s^2]."""
+    """Accelerate every vertex of one body during the next step by its row of `accelerations` [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _open_pushes(state, body)
@@ -117,13 +117,13 @@ def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarr
 
 @ti.kernel
 def write_gravity_scale(state: ti.template(), body: ti.i32, scale: ti.f32):
-    """Write the factor on gravity of one body."""
+    """Write the factor by which gravity is multiplied for one body."""
     state.body_gravity_scale[body] = scale
 
 
 @ti.kernel
 def write_linear_damping(state: ti.template(), body: ti.i32, rate: ti.f32):
-    """Write the damping rate of one body's velocities [1/s]."""
+    """Write the linear damping rate of one body [1/s]."""
     state.body_damping[body] = rate
     _set_bit(state, body, DAMPED, int(rate > 0.0))
 
@@ -136,7 +136,7 @@ def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
 
 @ti.kernel
 def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)) -> ti.i32:
-    """Write velocity [m/s] and density times drag coefficient [kg/m^3], (4,). Returns 1 if they changed."""
+    """Write the wind: velocity [m/s], density times drag coefficient [kg/m^3]. Return 1 if it changed."""
     given = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
     differs = int((given != state.wind[None]).any())
     state.wind[None] = given

@@ -1,4 +1,4 @@
-"""Embedding of points in tetrahedra, in 64-bit floats."""
+"""Embed points in tetrahedra, in float64."""
 
 from taichi_soft.control.kernels.grab_patch import dot
 from taichi_soft.core.math.rows import row_at
@@ -13,14 +13,14 @@ def embed_points(
     corners: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f64, ndim=2),
 ):
-    """Find the tetrahedron of each point. A point outside uses the one that it is least outside of.
+    """Find the tetrahedron of each point: of all tetrahedra, the one with the largest smallest weight.
 
     Args:
-        points: (k, 3) [m].
+        points: points to embed, (k, 3) [m].
         x: positions of the vertices, (n, 3) [m].
-        tets: their vertices, (m, 4). Tetrahedra without volume are skipped.
-        corners: (k, 4), gets the vertices of the tetrahedron of each point.
-        weights: (k, 4), gets its barycentric coordinates, -1e30 if no tetrahedron has a volume.
+        tets: vertices of each tetrahedron, (m, 4). Tetrahedra without volume are skipped.
+        corners: (k, 4), receives the vertices of each point's tetrahedron.
+        weights: (k, 4), receives the barycentric coordinates; -1e30 if no tetrahedron has a volume.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

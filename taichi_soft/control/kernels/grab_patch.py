@@ -1,4 +1,4 @@
-"""The part of a body that a grab holds, in 64-bit floats."""
+"""Find the patch of a grab, in float64: the part of a body that the grab pulls."""
 
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
 from taichi_soft.core.math.rows import row_at
@@ -7,7 +7,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def dot(a, b):
-    """Scalar product, summed in order."""
+    """Scalar product of two vectors, with a fixed order of summation."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
@@ -21,9 +21,9 @@ def _count_within(patch: ti.template(), distance):
 
 @ti.func
 def _distance_of_last(patch: ti.template(), radius):
-    """Find the least distance up to which there are more vertices than a patch has, by bisection.
+    """Find the smallest distance within which there are more vertices than a patch can have, by bisection.
 
-    The bits of floats of 0 or more have the order of the floats.
+    The bisection uses the bits of the floats, which have the same order as non-negative floats.
     """
     lowest, highest = ti.cast(0, ti.i64), ti.bit_cast(radius, ti.i64)
     while lowest < highest:
@@ -37,7 +37,7 @@ def _distance_of_last(patch: ti.template(), radius):
 
 @ti.func
 def _square_of_slope(x: ti.template(), elements: ti.template(), patch: ti.template(), e):
-    """Square of the falloff's slope in a tetrahedron, or of its rise along a spring."""
+    """Squared gradient of the falloff in a tetrahedron, or its squared difference along a spring."""
     first = elements[e, 0]
     rise, is_near = ti.Vector.zero(ti.f64, 3), patch[first, 0] != 0.0
     for i in ti.static(range(3)):
@@ -67,22 +67,22 @@ def shape_patch(
     patch: ti.types.ndarray(dtype=ti.f64, ndim=2),
     strength: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Find the patch round a point at rest.
+    """Find the patch around a point at rest, and its strength.
 
-    Its strength is `FARTHEST_PULL` of its radius times the least force per distance that holds back vertices
-    which are each moved by its falloff w. That is twice the energy of that shape per distance squared: the
-    sum of V mu |grad w|^2 in tetrahedra, of k (w_i - w_j)^2 / 3 in springs.
+    The strength is `FARTHEST_PULL` times the radius of the patch, times its stiffness. The stiffness is the
+    force per distance if each vertex moves by its falloff w. It is twice the energy of that deformation per
+    squared distance: the sum of V mu |grad w|^2 in tetrahedra, or of k (w_i - w_j)^2 / 3 in springs.
 
     Args:
-        corners: vertices between which the point lies, three or four.
-        weights: its barycentric coordinates.
-        limits: as `control.grab_patch.LIMITS`.
-        x: rest positions, (n, 3) [m].
-        masses: of vertices, (n,) [kg].
+        corners: three or four vertices between which the point lies.
+        weights: barycentric coordinates of the point in `corners`.
+        limits: constants `control.grab_patch.LIMITS`.
+        x: positions of the vertices at rest, (n, 3) [m].
+        masses: masses of the vertices, (n,) [kg].
         elements: vertices of springs (e, 2) or tetrahedra (e, 4).
-        stiffness: of them, k / 3 [N/m] or V mu [N m], (e,).
-        patch: (n, 2), gets the falloff of each vertex, 0 for one outside, and its share of a pull.
-        strength: (1,), gets the strength [N].
+        stiffness: stiffness of each element, k / 3 [N/m] or V mu [N m], (e,).
+        patch: (n, 2), receives the falloff of each vertex, 0 outside the patch, and its fraction of a pull.
+        strength: (1,), receives the strength [N].
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

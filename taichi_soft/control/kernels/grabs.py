@@ -1,9 +1,9 @@
 """Grabs: their fields, and springs that pull a patch of a body's surface to a target.
 
-Each is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper use the velocity after the
-pull, so that the grab does not overshoot for any stiffness. Each particle of the patch has a share of the
-force; the shares have the sum 1. A force above the strength of the patch acts on the whole body in
-proportion to mass, which causes no deformation.
+A grab is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper use the velocity after the
+pull, so that the grab does not overshoot for any stiffness. Each particle of the patch gets a fraction of the
+force. The part of a force above the strength of the patch acts on the whole body in proportion to mass, which
+causes no deformation.
 
 Groups of fields: writes grabs.
 """
@@ -17,17 +17,17 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_inertia
 
 MOST_GRABS, PATCH_ROWS = 16, 128
-"""Largest number of grabs of a world, and of particles of a grab."""
+"""Largest number of grabs of a world, and largest number of particles of a grab."""
 
 CORNERS = 4
-"""Corners of a grabbed point's element: a triangle, or a tetrahedron after a change of level of detail."""
+"""Number of corners of a grabbed point's element: a triangle, or a tetrahedron after a change of level."""
 
 PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
-"""Columns of `write_grab` and `read_grab`."""
+"""Columns of weights, limits and force in the numbers of `write_grab` and `read_grab`."""
 
 
 ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
-"""Groups of rows in a snapshot."""
+"""Names of groups of rows in a snapshot."""
 
 
 class GrabFields(FieldGroup):
@@ -40,15 +40,15 @@ class GrabFields(FieldGroup):
     corners = declare(
         MOST_GRABS, ti.i32, CORNERS, start=0, keep=USED_GRABS, below=Below(PARTICLE), native=True
     )
-    weights = declare(  # of the corners
+    weights = declare(  # weights of the corners
         MOST_GRABS, REAL, CORNERS, start=0, keep=USED_GRABS, most=FINITE, native=True
     )
     target = declare(MOST_GRABS, REAL, 3, unit="m", start=0, keep=USED_GRABS, most=FINITE, native=True)
     spring = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)  # `write_grab`
     limits = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
-    # In the last substep.
+    # Force on the body in the last substep.
     force = declare(MOST_GRABS, REAL, 3, unit="N", start=0, keep=USED_GRABS, native=True)
-    count = declare(  # rows of the patch
+    count = declare(  # number of rows of the patch
         MOST_GRABS, ti.i32, start=0, keep=USED_GRABS, below=Below(beside=PATCH_ROWS + 1), native=True
     )
     particle = declare(
@@ -59,7 +59,7 @@ class GrabFields(FieldGroup):
 
 @ti.func
 def _stretch(state: ti.template(), g):
-    """Vector from a grab's target to its point [m], limited to the longest stretch."""
+    """Vector from a grab's target to the grabbed point [m], limited to the longest stretch."""
     corners, weights = state.grabs.corners[g], state.grabs.weights[g]
     point = ti.Vector.zero(state.real, 3)
     for i in ti.static(range(CORNERS)):
@@ -70,11 +70,11 @@ def _stretch(state: ti.template(), g):
 
 @ti.func
 def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
-    """Change of the whole body's velocity by the force above the patch's strength [m/s].
+    """Change of velocity of the whole body by the part of the force above the patch's strength [m/s].
 
     Args:
         wanted: force of spring and damper at the resulting velocity [N].
-        drag: decrease of that force with the velocity [N s/m].
+        drag: decrease of that force per velocity [N s/m].
     """
     on_patch, on_all, inv_mass = state.grabs.limits[g].x, state.grabs.limits[g].y, state.grabs.limits[g].z
     force = wanted / (1.0 + h * drag * inv_mass)
@@ -84,9 +84,10 @@ def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
 
 @ti.real_func
 def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
-    """Apply the grabs of one body to its velocities for `h` [s].
+    """Change the velocities of one body by its grabs during `h` [s].
 
-    It uses the velocities after the forces of this substep, so that it includes resisting forces.
+    The springs use the velocities after a kick of `kick` [s] by the forces of this substep, so that the pull
+    includes resisting forces.
     """
     if state.body_drives[body] & GRABBED != 0:
         gravity = gravity_on(state, body)
@@ -126,7 +127,7 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
 
 @ti.func
 def add_grabs(state: ti.template(), body, h):
-    """Add the grabs of one body to the system of implicit Euler and to its right-hand side."""
+    """Add the grabs of one body to the matrix and right-hand side of implicit Euler's system."""
     if state.body_drives[body] & GRABBED != 0:
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
@@ -174,15 +175,15 @@ def write_grab(
     patch: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shares: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Write a new grab, or change the particles of a grab.
+    """Write a new grab, or new particles of an existing grab.
 
     Args:
-        corners: particles of the element of the grabbed point, (4,).
-        numbers: their weights; target [m]; stiffness [N/m], damping [N s/m] and longest stretch [m] of the
-            spring; largest force on the patch and in total [N]; 1 / mass of the body [1/kg]; force in the
-            last substep [N].
-        patch: particles, at most `PATCH_ROWS`.
-        shares: shares of the force, one per particle.
+        corners: particles of the grabbed point's element, (4,).
+        numbers: (16,): weights of the corners; target [m]; stiffness [N/m], damping [N s/m] and longest
+            stretch [m] of the spring; largest force on the patch and in total [N]; 1 / mass of the body
+            [1/kg]; force in the last substep [N].
+        patch: particles of the patch, at most `PATCH_ROWS`.
+        shares: fraction of the force on each of these particles.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -210,7 +211,7 @@ def write_grab_target(state: ti.template(), g: ti.i32, target: ti.types.ndarray(
 
 @ti.kernel
 def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
-    """Remove a grab."""
+    """Remove a grab of a body."""
     others = 0
     state.grabs.body[g] = 0
     ti.loop_config(serialize=True)
@@ -227,7 +228,7 @@ def read_grab(
     corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
     numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Read corners and numbers of a grab in the layout of `write_grab`, (4,) and (16,)."""
+    """Read the corners and numbers of a grab, (4,) and (16,), in the layout of `write_grab`."""
     for k in ti.static(range(CORNERS)):
         corners[k] = state.grabs.corners[g][k]
         numbers[k] = state.grabs.weights[g][k]

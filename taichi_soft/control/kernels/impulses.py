@@ -1,6 +1,7 @@
 """Impulses on particles between two steps, as immediate changes of velocity.
 
-Leapfrog's velocities are half a substep behind; the change is added to them.
+Leapfrog stores velocities half a substep earlier than positions; the change is added to the stored
+velocities.
 """
 
 from taichi_soft.bodies.status import ABSENT
@@ -11,7 +12,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def falloff(distance2, radius2):
-    """Smooth falloff: 1 at the centre, 0 from the radius on, with zero slope at both."""
+    """Smooth falloff from 1 at the centre to 0 at the radius, with zero slope at both; 0 beyond."""
     rest = ti.max(1.0 - distance2 / radius2, 0.0)
     return rest * rest
 
@@ -28,7 +29,7 @@ def add_velocity(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     change: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Add (3,) [m/s] to the velocities of `particles`, except pinned ones."""
+    """Add `change`, (3,) [m/s], to the velocities of `particles`, except pinned ones."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         _change_velocity(state, particles[i], ti.Vector([change[0], change[1], change[2]]))
@@ -83,7 +84,7 @@ def add_radial_impulse(
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Push all bodies away from a point, each in proportion to its fraction of mass in range.
+    """Push all bodies away from a point, each in proportion to the fraction of its mass in range.
 
     Args:
         place: centre [m], radius [m], impulse on a body at the centre [N s]: (5,).

@@ -3,14 +3,14 @@
 A joint holds particles of one body at points embedded in tetrahedra of another.
 
 In every substep, Gauss-Seidel sweeps over the rows apply impulses that equalise the velocities of each
-particle and its point. This removes energy and never adds any, for all masses, and has no stiffness that
-could be too high. Sweeps alternate their direction: with one direction, the remaining errors would act as
-non-conservative forces, and bodies would flutter.
+particle and its point. For any masses, this never adds energy, and it has no stiffness that could be too
+high. Sweeps alternate their direction: with one direction, the remaining errors would act as non-conservative
+forces, and bodies would flutter.
 
 Remaining gaps are closed no faster than the bodies can follow.
 
-The impulse on the point is distributed so that it acts at the particle's position. So momentum and angular
-momentum are conserved even with a gap.
+The impulse on the point is distributed so that it acts at the particle's position. Momentum and angular
+momentum are therefore conserved even with a gap.
 
 Groups of fields: reads islands; writes joints.
 """
@@ -23,29 +23,29 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
-"""Largest number of joints of a world, and of particles of all joints."""
+"""Largest number of joints of a world, and largest number of held particles of all joints."""
 
 ENDS = 5
-"""Particles of a row: the held one, and four of the other body. The sum of their positions times their
-weights, 1 and four with the sum -1, is the gap between the particle and its point."""
+"""Number of particles of a row: the held particle, with weight 1, and four particles of the other body, whose
+weights sum to -1. The weighted sum of their positions is the gap between the held particle and its point."""
 
 SWEEPS = 6
-"""Sweeps over all rows of an island per substep, an even number. Rows without shared particles need one."""
+"""Number of sweeps over all rows of an island per substep, even. Rows without common particles need one."""
 
 CLOSE = 30.0
-"""Closing rate of a gap [1/s]. At higher rates, conflicting rows, as of a fine mesh held by a coarse one,
+"""Closing rate of a gap [1/s]. At higher rates, conflicting rows, such as between a fine and a coarse mesh,
 would shake light bodies."""
 
 MOST_SHIFT = 0.5
-"""Largest change of the weights that moves an impulse to the particle's position. With larger gaps, relative
+"""Largest change of the weights that moves an impulse to the particle's position. If a gap is larger relative
 to the tetrahedron, the joint does not conserve angular momentum exactly."""
 
 
 MOST_WEIGHT = 1e3
-"""Largest weight of an end that a snapshot may have."""
+"""Largest weight of an end that is valid in a snapshot."""
 
 ALL_JOINTS, USED_JOINT_ROWS, JOINT_ENDS = "joints", "rows of joints", "ends of joints"
-"""Groups of rows in a snapshot."""
+"""Names of groups of rows in a snapshot."""
 
 
 class JointFields(FieldGroup):
@@ -67,16 +67,16 @@ class JointFields(FieldGroup):
     impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
-    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # of the last impulse
+    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # fraction of the impulse
     # Impulse on the first end in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap
-    is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if it is the first end of a row
+    is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if the particle is the first end of a row
 
 
 @ti.func
 def _open_row(state: ti.template(), r, h, draw_speed):
-    """Compute the impulse shares and the target closing speed of one row for this substep."""
+    """Compute a row's `share` and `approach` for this substep."""
     at = r * ENDS
     gap = ti.Vector.zero(ti.f32, 3)
     for k in range(at, at + ENDS):
@@ -126,7 +126,7 @@ def _solve_row(state: ti.template(), j, r):
 
 @ti.func
 def _turned(i, first, last, back):
-    """Index i, or its mirror image for a backward sweep."""
+    """Return index i for a forward sweep, or the mirrored index for a backward sweep."""
     return ti.select(back == 1, first + last - 1 - i, i)
 
 
@@ -139,7 +139,7 @@ def solve_joints(
     Args:
         is_first: 1 in the first substep of a step.
         common: mean velocity of the bodies of the island [m/s].
-    Returns: the highest speed of a particle of a joint [m/s], absolute and relative to `common`.
+    Returns: highest speed of the joints' particles [m/s], absolute and relative to `common`.
     """
     first, last = state.islands.first[island], state.islands.first[island + 1]
     is_joined, member = 0, first
@@ -181,7 +181,7 @@ def solve_joints(
 
 @ti.func
 def are_joined(state: ti.template(), a, b):
-    """1 if a joint connects two bodies."""
+    """1 if a joint connects the bodies a and b, else 0."""
     found = 0
     if state.body_drives[a] & state.body_drives[b] & JOINED != 0:
         for j in range(MOST_JOINTS):
@@ -204,7 +204,7 @@ def mark_held(state: ti.template(), is_held):
 
 @ti.kernel
 def forget_held(state: ti.template()):
-    """Unmark all particles before joints change; each step marks them again."""
+    """Unmark all held particles, before joints change. Each step marks them again."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)
@@ -224,9 +224,12 @@ def write_joint(
     """Write a new joint.
 
     Args:
-        first: first row, after those of all other joints.
-        particles: held particle of `body` and four particles of `other`, (n, 5).
-        weights: their weights, 1 and four with the sum -1, (n, 5).
+        j: index of the joint.
+        body, other: body whose particles are held, and body that holds them.
+        first: first row of the joint, after the rows of all other joints.
+        draw_speed: largest closing speed of a gap [m/s].
+        particles: held particle of `body` and four particles of `other` in each row, (n, 5).
+        weights: weights of these particles, 1 and four that sum to -1, (n, 5).
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -248,7 +251,7 @@ def write_joint(
 
 @ti.kernel
 def end_joint(state: ti.template(), j: ti.i32):
-    """Remove a joint, and close the gap in the rows."""
+    """Remove a joint, and move later rows forward into its rows."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)
@@ -278,7 +281,7 @@ def end_joint(state: ti.template(), j: ti.i32):
 
 @ti.kernel
 def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Read the impulse of a joint on its first body in the last step, (3,) [N s]."""
+    """Write the impulse of a joint on its first body in the last step to `impulse`, (3,) [N s]."""
     for k in ti.static(range(3)):
         impulse[k] = state.joints.impulse[j][k]
 
@@ -287,7 +290,7 @@ def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarra
 def add_joint_forces(
     state: ti.template(), body: ti.i32, h: ti.f32, forces: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Add the forces of joints on the particles of one body in the last substep of `h` [s] to (n, 3) [N]."""
+    """Add the forces of joints on one body's particles in the last substep, of `h` [s], to `forces` [N]."""
     ti.loop_config(serialize=True)
     for j in range(MOST_JOINTS):
         ends = state.joints.bodies[j]

@@ -1,4 +1,4 @@
-"""Motors: their fields, and how they drive a part of a body about or along an axis.
+"""Motors: their fields, and functions that rotate or push a part of a body.
 
 A motor moves its particles by one pattern d: d = a x (x - c) [m] for a rotation about the axis a through c,
 and d = a for a push along the axis. With velocities v after the forces of a substep of h seconds
@@ -8,8 +8,8 @@ and d = a for a push along the axis. With velocities v after the forces of a sub
     v += J / I d
 
 The pattern is a rigid motion, so a motor deforms only the region between its particles and the rest of the
-body. The particles have the target speed after the substep's forces, unless that exceeds the limit. An axis
-that rotates with the particles keeps its position in the rest shape.
+body. After the forces of the substep, the particles have the target speed, unless this needs more than the
+limit. An axis that rotates with the particles is fixed in the rest shape.
 
 Groups of fields: writes motors.
 """
@@ -23,28 +23,28 @@ from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import ti
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
-"""Largest number of motors of a world, and of particles of all motors."""
+"""Largest number of motors of a world, and largest number of particles of all motors."""
 
 ALL_MOTORS, USED_MOTORS, MOTOR_PARTICLES = "motors", "used motors", "particles of motors"
-"""Groups of rows in a snapshot."""
+"""Names of groups of rows in a snapshot."""
 
 MOST_CHANGE = 0.25
-"""Largest change of a particle's velocity per substep, over the speed of sound in its body. Faster changes
-would tear the particles off the rest of the body."""
+"""Largest change of a particle's velocity per substep, relative to the speed of sound in its body. Faster
+changes would separate the particles from the rest of the body."""
 
 
 @ti.dataclass
 class MotorRow:
-    """One motor."""
+    """Data of one motor."""
 
     body: ti.i32  # index plus 1, 0 if unused
     first: ti.i32  # first row in `MotorFields.particle`, and the row after the last
     end: ti.i32
     turns: ti.i32  # 1: rotates particles about its axis, 0: pushes them along it
     is_fixed: ti.i32  # 1: the axis keeps its direction, 0: it rotates with the particles
-    has_point: ti.i32  # 1: it passes through a point, 0: through the centre of the particles
-    axis: ti.math.vec3  # of unit length, in space or in the rest shape
-    point: ti.math.vec3  # [m]
+    has_point: ti.i32  # 1: the axis passes through `point`, 0: through the centre of the particles
+    axis: ti.math.vec3  # unit vector, in world axes, or in the rest shape if not fixed
+    point: ti.math.vec3  # point on the axis [m]
     speed: ti.f32  # target [rad/s] or [m/s]
     limit: ti.f32  # largest torque [N m] or force [N]
 
@@ -63,17 +63,17 @@ class MotorFields(FieldGroup):
         native=True,
     )
     particle = declare(MOTOR_ROWS, ti.i32, native_keep=MOTOR_PARTICLES, below=Below(PARTICLE), native=True)
-    is_driven = declare(BODY, ti.i32, start=0, native=True)  # 1 if a motor drives it
-    # In the last step, times the lever of a motor that turns.
+    is_driven = declare(BODY, ti.i32, start=0, native=True)  # 1 if a motor drives the body
+    # Impulse in the last step; for a motor that rotates, angular impulse [N m s].
     impulse = declare(MOST_MOTORS, ti.f32, unit="N s", start=0, keep=USED_MOTORS, most=FINITE, native=True)
 
 
 @ti.func
 def _axis_now(state: ti.template(), motor):
-    """Current point on the axis of a motor [m], and its direction.
+    """Present point on the axis of a motor [m], and direction of the axis.
 
-    An axis that rotates with the particles uses the rotation nearest to sum m x r^T, with current x and rest
-    r relative to their centres.
+    An axis that rotates with the particles follows the rotation nearest to sum m x r^T, with the present
+    positions x and the rest positions r of the particles relative to their centres.
     """
     first = state.motors.particle[motor.first]
     x0, r0 = state.particle_position[first], state.rest_position[first]
@@ -106,7 +106,7 @@ def _pattern(state: ti.template(), motor, p, point, axis):
 
 @ti.func
 def _run_motor(state: ti.template(), motor, h, kick):
-    """Apply a motor. Returns: its impulse [N m s] or [N s]."""
+    """Apply a motor to the velocities during `h` [s]. Return its impulse [N m s] or [N s]."""
     gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
     point, axis = _axis_now(state, motor)
     inertia, momentum, longest = point.x * 0.0, point.x * 0.0, point.x * 0.0
@@ -128,7 +128,7 @@ def _run_motor(state: ti.template(), motor, h, kick):
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
         change = ti.max(-most, ti.min(motor.speed - speed, most))
         pushed = inertia * change
-        # Otherwise the body diverges.
+        # Larger values mean that the body diverges.
         if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18 and ti.abs(pushed) < 1e18:
             row = motor.first
             while row < motor.end:
@@ -145,8 +145,8 @@ def _run_motor(state: ti.template(), motor, h, kick):
 def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32):
     """Apply the motors of one body for a substep of `h` [s].
 
-    They use the velocities after a kick of `kick` [s], so that they include resisting forces. If `kick` is 0,
-    forces are computed later, and they include gravity only.
+    The motors use the velocities after a kick of `kick` [s], so that they include resisting forces. If `kick`
+    is 0, forces are computed later, and the motors include only gravity.
 
     Args:
         is_first: 1 in the first substep of a step.
@@ -158,7 +158,7 @@ def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_f
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
                 if motor.speed != 0.0 and motor.limit > 0.0 and state.body_calm_time[body] != 0.0:
-                    state.body_calm_time[body] = 0.0  # keeps a slow start from counting as rest
+                    state.body_calm_time[body] = 0.0  # a slow start must not count as rest
 
 
 @ti.kernel
@@ -171,9 +171,9 @@ def write_motors(
     """Replace all motors.
 
     Args:
-        rows: index, body, first row, row after the last, `turns`, `is_fixed` and `has_point` of each, (k, 7).
-        numbers: axis, point [m], target speed and limit of each, (k, 8).
-        particles: particles of all rows.
+        rows: index, body, first row, end row, `turns`, `is_fixed` and `has_point` of each motor, (k, 7).
+        numbers: axis, point [m], target speed and limit of each motor, (k, 8).
+        particles: particles of all motors, concatenated.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -212,7 +212,7 @@ def write_drive(state: ti.template(), number: ti.i32, speed: ti.f32, limit: ti.f
 
 @ti.kernel
 def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
-    """Read the speed of a motor's particles about its axis [rad/s] or along it [m/s]."""
+    """Return the speed of a motor's particles about its axis [rad/s] or along it [m/s]."""
     inertia, momentum = 0.0, 0.0
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -242,13 +242,13 @@ def find_rest_axis(
     axis: ti.types.ndarray(dtype=ti.f64, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Find the axis in the rest state, of particles that have rotated since.
+    """Transform the direction of an axis from the present state of particles to their rest state.
 
     Args:
-        rest, now: positions of the particles, (n, 3) [m].
-        weights: their masses, with the sum 1.
-        axis: current direction, (3,).
-        found: (4,), gets the direction at rest, and the width of the particles over their length.
+        rest, now: positions of the particles at rest and at present, (n, 3) [m].
+        weights: masses of the particles, scaled to the sum 1.
+        axis: present direction, (3,).
+        found: (4,), receives the direction at rest, and the ratio of width to length of the particles.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

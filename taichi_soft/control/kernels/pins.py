@@ -1,6 +1,7 @@
 """Pinned particles: their inverse mass is zero, and their velocity is prescribed.
 
-`particle_aim` is its motion in the next step; with a frame, the target is given in the frame's axes.
+`particle_aim` encodes the motion of a pinned particle in the next step. For particles attached to a frame,
+the target is in the frame's axes.
 """
 
 from taichi_soft.bodies.status import (
@@ -21,7 +22,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Pin particles at their positions, at rest."""
+    """Pin particles at their present positions, with zero velocity."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]
@@ -34,7 +35,7 @@ def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32
 
 @ti.kernel
 def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Restore the mass of pinned particles; they keep their velocity."""
+    """Unpin particles: restore their inverse mass. They keep their velocity."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]
@@ -44,7 +45,7 @@ def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i3
 
 @ti.kernel
 def read_pinned(state: ti.template(), begin: ti.i32, pinned: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Write 1 for each pinned vertex of one body, in the caller's order."""
+    """Write 1 for each pinned vertex of one body and 0 for others, in the caller's order."""
     ti.loop_config(serialize=True)
     for i in range(pinned.shape[0]):
         pinned[i] = int(state.particle_inv_mass[state.particle_of_vertex[begin + i]] == 0.0)
@@ -57,11 +58,11 @@ def write_targets(
     targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Write the positions of pinned particles at the end of the next step [m].
+    """Write targets of pinned particles: their positions at the end of the next step [m].
 
     Args:
-        found: (1,), receives the index in `particles` of the first one that is not pinned (then nothing is
-            changed), or -1.
+        found: (1,), receives -1, or the index in `particles` of the first particle that is not pinned; in
+            that case, nothing is changed.
     """
     loose = -1
     ti.loop_config(serialize=True)
@@ -88,7 +89,10 @@ def attach_particles(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     places: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Attach particles of one body to a frame at `places` in its axes [m]; `feels` records their load."""
+    """Attach particles of one body to a frame at `places` in the frame's axes [m].
+
+    If `feels` is 1, record the load of the body's pins.
+    """
     i = 0
     while i < particles.shape[0]:
         p = particles[i]
@@ -118,7 +122,7 @@ def read_reaction(
     origin: ti.types.ndarray(dtype=ti.f32, ndim=1),
     load: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Read the impulse on `particles` in the last step [N s], and its moment about a point [N m s], (6,)."""
+    """Write the impulse on `particles` in the last step [N s], and its moment about `origin` [N m s]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         center = ti.Vector([origin[0], origin[1], origin[2]])
@@ -137,11 +141,11 @@ def read_reaction(
 def aim_pinned(
     state: ti.template(), body_count: ti.i32, dt: ti.f32, frames: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ) -> ti.i32:
-    """Set the velocity of pinned particles that moves them to their targets in a step of `dt` [s].
+    """Set the velocities that move pinned particles to their targets in a step of `dt` [s].
 
     Args:
         frames: poses of all frames after the step: rotation matrix by rows, and position [m], (f, 12).
-    Returns: number of bodies that need another call before the following step.
+    Returns: number of bodies for which this must be called again before the following step.
     """
     waiting = 0
     ti.loop_config(serialize=True)
@@ -172,7 +176,7 @@ def aim_pinned(
 
 @ti.func
 def _aim(state: ti.template(), p, dt, frames: ti.template()):
-    """Set the velocity of one pinned particle. Returns: 1 if it needs another call."""
+    """Set the velocity of one pinned particle. Return 1 if it needs another call after the step, else 0."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
     if aim >= WITH_FRAME:
@@ -188,7 +192,7 @@ def _aim(state: ti.template(), p, dt, frames: ti.template()):
 
 @ti.func
 def in_world(frames: ti.template(), frame, local):
-    """Transform a point from a frame's axes to the world's [m]."""
+    """Transform a point from a frame's axes to world axes [m]."""
     return ti.Vector(
         [
             frames[frame, 3 * i] * local.x

@@ -1,4 +1,4 @@
-"""Loads of a body on frames, grabs and joints.
+"""Clear the loads of a body on frames, grabs and joints.
 
 Groups of fields: writes grabs, joints.
 """
@@ -10,7 +10,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def forget_loads(state: ti.template(), body):
-    """Clear the loads of a step that was undone because the body failed; otherwise they stay NaN."""
+    """Clear the loads of a step that was undone because the body failed: they can be NaN."""
     zero = ti.Vector.zero(state.real, 3)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):

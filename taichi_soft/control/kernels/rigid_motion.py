@@ -1,4 +1,4 @@
-"""Move a whole body, or set its velocity, as a rigid body between two steps."""
+"""Move a whole body, or set its velocities, as if it were rigid, between two steps."""
 
 from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
@@ -8,7 +8,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def _center_of_mass(state: ti.template(), body):
-    """Centre of mass in float64 [m]."""
+    """Centre of mass of a body [m], in float64."""
     particles = state.body_particles[body]
     moment, mass = ti.Vector.zero(ti.f64, 3), ti.cast(0.0, ti.f64)
     p = particles[0]
@@ -31,7 +31,7 @@ def write_rigid_velocity(
     motion: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Set the velocities of one body, except pinned particles, to a rigid motion.
+    """Set the velocities of one body, except for pinned particles, to a rigid motion.
 
     Args:
         motion: velocity of the centre of mass [m/s], angular velocity [rad/s]: (6,).
@@ -72,14 +72,14 @@ def jump(
     turn: ti.types.ndarray(dtype=ti.f64, ndim=2),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Rotate one body about its centre of mass and move it, together with its previous positions and the
-    targets of its pins.
+    """Rotate one body about its centre of mass and move it.
 
+    Previous positions and the targets of pins move too.
     Args:
-        place: new centre [m], smallest allowed height [m], factor on the velocity: (5,).
+        place: new centre of mass [m], smallest allowed height [m], factor of the velocities: (5,).
         turn: rotation matrix (3, 3).
-        found: receives the lowest and the highest height and the largest coordinate [m], (3,). If they are
-            out of bounds, nothing is changed.
+        found: receives the lowest height, the highest height and the largest coordinate of the moved body
+            [m], (3,). If the body would be too low or out of range, nothing is changed.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

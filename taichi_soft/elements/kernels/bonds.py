@@ -13,7 +13,7 @@ from taichi_soft.elements.laws.volume_springs import expansion
 
 @ti.func
 def lane_pressure(state: ti.template(), block, lane):
-    """Pressure E nu dV / V0 of one tetrahedron on its edges [Pa]."""
+    """Pressure of one tetrahedron on its edges [Pa]: its expansion modulus, E nu, times dV / V0."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     growth = expansion(
         state.particle_position[p0],
@@ -27,7 +27,7 @@ def lane_pressure(state: ti.template(), block, lane):
 
 @ti.func
 def store_block_pressures(state: ti.template(), number):
-    """Store the pressures of a block's tetrahedra, for their edges to read."""
+    """Store the pressures of a block's tetrahedra, which `ring_tension` reads."""
     block = number & BLOCK_BITS
     pressure = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -55,7 +55,7 @@ def accumulate_pressures(state: ti.template(), body):
 
 @ti.func
 def _corner(state: ti.template(), k, origin):
-    """Corner of a Voronoi face relative to `origin` [m]."""
+    """Corner of a Voronoi face, from ring row `k`, relative to `origin` [m]."""
     members, weights = state.ring_members[k], state.ring_weights[k]
     arm = state.particle_position[members[0]] * weights[0] - origin
     for i in ti.static(range(1, 4)):
@@ -79,7 +79,7 @@ def _voronoi_normal(state: ti.template(), e, center):
 
 @ti.func
 def _subface_normal(state: ti.template(), e, xp, r):
-    """Area vector of the subfaces of an edge, and its rest direction as carried along (4.4.1)."""
+    """Area vector of an edge's subfaces, and its rest direction as carried by the tetrahedra (4.4.1)."""
     total, carried = r * 0.0, r * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -92,7 +92,7 @@ def _subface_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def _fitted_normal(state: ti.template(), e, xp, r):
-    """Normal of the plane that best fits the particles around an edge, and its carried direction (4.4.2)."""
+    """Normal of the plane that best fits the particles around an edge, and the carried direction (4.4.2)."""
     total, carried = r * 0.0, r * 0.0
     s0, s1, s2 = r * 0.0, r * 0.0, r * 0.0
     ring = state.edge_ring[e]
@@ -104,13 +104,13 @@ def _fitted_normal(state: ti.template(), e, xp, r):
         s0 += arm * arm.x
         s1 += arm * arm.y
         s2 += arm * arm.z
-    count = ti.max(ring[1] - ring[0], 3)  # with two, the centre of the edge is the third
+    count = ti.max(ring[1] - ring[0], 3)  # the centre of the edge is the third point if there are two
     return plane_normal(count, total, (s0, s1, s2), r), carried
 
 
 @ti.func
 def _split_normal(state: ti.template(), e, xp, r):
-    """Normal of a ring that is split twice, of any length, and its carried direction (4.4.2)."""
+    """Normal of a ring that is split twice, not normalised, and the carried direction (4.4.2)."""
     one, other, carried = r * 0.0, r * 0.0, r * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -140,7 +140,7 @@ def _tilted_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def bond_frame_of(state: ti.template(), law: ti.template(), e):
-    """Second end of an edge minus the first [m], unit direction of tension, and the compared direction."""
+    """Frame of an edge: second end minus first [m], unit normal of its plane, and the compared direction."""
     xp = state.particle_position[state.edge_vertices[e][0]]
     r = state.particle_position[state.edge_vertices[e][1]] - xp
     normal, compared = r, r
@@ -159,7 +159,7 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def stored_frame_of(state: ti.template(), law: ti.template(), e):
-    """`bond_frame_of` from the last evaluation of forces: computing it again costs as much as the forces."""
+    """Result of `bond_frame_of`, read from the last evaluation of forces unless it is quick to compute."""
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)
     else:
@@ -170,7 +170,7 @@ def stored_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def ring_tension(state: ti.template(), e):
-    """Pull of the tetrahedra around an edge on its ends [N], gathered from their pressures."""
+    """Pull on the ends of an edge by the tetrahedra around it [N], from their stored pressures."""
     pressure = state.edge_damping[e] * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):

@@ -1,4 +1,4 @@
-"""Forces between the two ends of each edge, by pairwise laws or by damping alone: load, call, store."""
+"""Forces between the two ends of each edge, by pairwise laws or by damping alone."""
 
 from taichi_soft.core.constants import HALF, LANES, ROW_BITS
 from taichi_soft.core.math.tensors import widened
@@ -10,7 +10,7 @@ from taichi_soft.elements.laws.springs import damped_pull, spring_tension
 
 @ti.func
 def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_velocity, tension):
-    """Force on the first end of an edge whose law uses only its ends and a given tension [N]."""
+    """Force on the first end of an edge [N], for laws that use only its two ends and a `tension` [N]."""
     if ti.static(model.has_bonds):
         pull = spring_tension(r, state.edge_bond[e]) + tension
         return damped_pull(r, relative_velocity, pull, state.edge_damping[e])
@@ -20,7 +20,7 @@ def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_vel
 
 @ti.func
 def edge_force_of(state: ti.template(), model: ti.template(), e):
-    """Force on the first end of edge `e` [N]; the second gets the opposite."""
+    """Force on the first end of edge `e` [N]; the opposite force acts on the second end."""
     if ti.static(model.has_simple_edges):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
         tension = state.edge_damping[e] * 0.0
@@ -40,9 +40,10 @@ def edge_force_of(state: ti.template(), model: ti.template(), e):
 
 @ti.func
 def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
-    """Add the forces of up to `LANES` edges, each half with one first end, vectorised as in `elastic`.
+    """Add the forces of a block of up to `LANES` edges, vectorised as in `elastic`.
 
-    The edges that follow, of the same body or its spare rows, are computed too but do not count.
+    The edges of each half of the block have the same first end. The kernel also computes the forces of the
+    rows after the block, which belong to the same body or are spare, but discards them.
     """
     p = state.edge_vertices[first][0]
     p_later = state.edge_vertices[first + ti.select(count > HALF, HALF, 0)][0]
@@ -60,7 +61,7 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
         force = _simple_force(state, model, e, r, relative_velocity, tension)
         for i in ti.static(range(3)):
             forces[lane, i] = ti.select(lane < count, force[i], 0.0)
-        forces[lane, 3] = 0.0  # written too: gaps in the rows would prevent vector stores
+        forces[lane, 3] = 0.0  # also written, because gaps in the rows would prevent vector stores
     for half in ti.static(range(2)):
         total = ti.Vector.zero(state.real, 4)
         for i in range(HALF):
@@ -68,7 +69,7 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
             q = state.edge_vertices[first + lane][1]
             force = ti.Vector([forces[lane, axis] for axis in ti.static(range(4))])
             total += force
-            # Not `+=`, which Taichi makes atomic: one thread owns the body.
+            # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
             state.particle_force[q] = state.particle_force[q] - force
         first_end = (p, p_later)[half]
         state.particle_force[first_end] = state.particle_force[first_end] + total

@@ -1,9 +1,9 @@
 """Elastic forces of tetrahedra: load values, call the law, store corner forces.
 
 The lanes of a block run in one loop that reads fields and writes only local arrays. LLVM's loop vectoriser
-then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). It
-needs two things that are easy to lose. The loop must not store to a field, which could overlap what the next
-lane reads. And index arithmetic must provably not overflow, which masking by `BLOCK_BITS` shows.
+then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). It has
+two requirements. The loop must not write to a field, because the next lane could read the same memory. And
+index arithmetic must provably not overflow, which masking by `BLOCK_BITS` ensures.
 """
 
 from taichi_soft.core.constants import LANES
@@ -14,7 +14,7 @@ from taichi_soft.elements.laws.damping import tet_mean_damping_forces
 from taichi_soft.elements.laws.force_model import flipped_forces, upright_forces
 
 BLOCK_BITS = (1 << 22) - 1
-"""Mask that leaves every block number unchanged: 33 million tetrahedra are more than fit into memory."""
+"""Mask that leaves every block number unchanged: memory cannot hold its 33 million tetrahedra."""
 
 
 @ti.func
@@ -37,7 +37,7 @@ def rest_inverse_of(state: ti.template(), block, lane):
 
 @ti.func
 def stiffness_of(state: ti.template(), block, lane):
-    """The 21 constants of a tetrahedron in the form of `anisotropic_stress`."""
+    """Stiffness of an anisotropic tetrahedron [Pa], in the form that `anisotropic_stress` needs."""
     base = block * 21 * LANES + lane
     c = [state.tet_stiffness[base + k * LANES] for k in ti.static(range(21))]
     return (
@@ -53,7 +53,7 @@ def stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def elasticity_of(state: ti.template(), model: ti.template(), block, lane):
-    """Elasticity of a tetrahedron: lambda and mu, or its stiffness [Pa]."""
+    """Elasticity of a tetrahedron [Pa]: lambda and mu, or `stiffness_of` for an anisotropic material."""
     if ti.static(model.is_anisotropic):
         return stiffness_of(state, block, lane)
     else:
@@ -116,7 +116,7 @@ def _compute_block_forces(
 ):
     """Write the forces of a block's tetrahedra on their corners [N] to four matrices (LANES, 4).
 
-    The last column is zero. The matrices are arguments because Taichi copies returned ones.
+    The last column is zero. The matrices are arguments because Taichi would copy returned matrices.
     """
     volumes = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -126,7 +126,7 @@ def _compute_block_forces(
             g1[lane, i] = f1[i]
             g2[lane, i] = f2[i]
             g3[lane, i] = f3[i]
-        # Written too: gaps in the rows would prevent vector stores.
+        # Also written, because gaps in the rows would prevent vector stores.
         g0[lane, 3] = 0.0
         g1[lane, 3] = 0.0
         g2[lane, 3] = 0.0
@@ -134,7 +134,7 @@ def _compute_block_forces(
         if ti.static(model.repairs_flips):
             volumes[lane] = volume6
     if ti.static(model.repairs_flips):
-        # Flips are rare, so they are corrected here and cost the loop above nothing.
+        # Flips are rare, so a separate loop corrects them and the loop above stays fast.
         for lane in range(LANES):
             if volumes[lane] < 0.0:
                 f0, f1, f2, f3 = _flipped_forces_of(state, model, block, lane)
@@ -159,16 +159,15 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                # No second name for the matrix: Taichi would copy it onto the stack for every lane, which is
-                # slow.
+                # A variable for the selected matrix would be slow: Taichi would copy it for every lane.
                 force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
-                # Not `+=`, which Taichi makes atomic: one thread owns the body.
+                # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
 
 
 @ti.func
 def store_block_forces(state: ti.template(), model: ti.template(), number):
-    """Store a block's corner forces for particles to gather."""
+    """Store the corner forces of a block's tetrahedra, which the particles gather later."""
     block = number & BLOCK_BITS
     g0 = ti.Matrix.zero(state.real, LANES, 4)
     g1 = ti.Matrix.zero(state.real, LANES, 4)
@@ -183,7 +182,7 @@ def store_block_forces(state: ti.template(), model: ti.template(), number):
 
 @ti.func
 def store_lane_forces(state: ti.template(), model: ti.template(), block, lane):
-    """`store_block_forces` for one lane: for processors that run one tetrahedron per thread."""
+    """Store the corner forces of one tetrahedron, for processors that run one tetrahedron per thread."""
     forces = lane_forces(state, model, block, lane)
     for corner in ti.static(range(4)):
         state.corner_force[(block * 4 + corner) * LANES + lane] = widened(forces[corner])

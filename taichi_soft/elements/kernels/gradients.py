@@ -1,4 +1,4 @@
-"""Stiffness of a body at its present positions, by element or as the blocks for conjugate gradients."""
+"""Stiffness of a body at its present positions, for each element, or as blocks for conjugate gradients."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
@@ -15,7 +15,7 @@ from taichi_soft.elements.kernels.linear_system import (
 
 @ti.kernel
 def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.types.ndarray(ndim=3)):
-    """- d f_i / d x_j of every tetrahedron of the first body, exact, (m, 12, 12) [N/m]."""
+    """Write the exact - d f_i / d x_j of every tetrahedron of the first body, (m, 12, 12) [N/m]."""
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = t // LANES, t % LANES
@@ -30,7 +30,7 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
 
 @ti.kernel
 def compute_bond_stiffness(state: ti.template(), law: ti.template(), out: ti.types.ndarray(ndim=3)):
-    """- d f_p / d p of every edge of the first body with fixed normals, exact, (k, 3, 3) [N/m]."""
+    """Write - d f_p / d p of every edge of the first body, exact for fixed normals, (k, 3, 3) [N/m]."""
     ti.loop_config(serialize=True)
     for e in range(out.shape[0]):
         columns = bond_stiffness(state, law, e, False)
@@ -42,7 +42,7 @@ def compute_bond_stiffness(state: ti.template(), law: ti.template(), out: ti.typ
 def compute_volume_pull(
     state: ti.template(), gradients: ti.types.ndarray(ndim=3), pulls: ti.types.ndarray(ndim=3)
 ):
-    """`volume_pull` of every tetrahedron of the first body, (m, 4, 3) each."""
+    """Write the results of `volume_pull` for every tetrahedron of the first body, (m, 4, 3) each."""
     ti.loop_config(serialize=True)
     for t in range(gradients.shape[0]):
         g, w = volume_pull(state, t)
@@ -53,7 +53,7 @@ def compute_volume_pull(
 
 @ti.kernel
 def compute_system_stiffness(state: ti.template(), program: ti.template()):
-    """Fill the blocks of the first body with only its projected stiffness."""
+    """Fill the blocks of the first body with its projected stiffness, without masses and damping."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         clear_system(state, 0)

@@ -1,4 +1,4 @@
-"""All internal forces of one body, in one thread."""
+"""Accumulate all internal forces of one body, in one thread."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel
@@ -22,7 +22,7 @@ def accumulate_forces(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def clear_forces(state: ti.template(), body):
-    """Zero the forces on all particles of one body."""
+    """Set the forces on all particles of one body to zero."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         state.particle_force[p] = ti.Vector.zero(state.real, 4)

@@ -1,10 +1,10 @@
-"""The system of implicit Euler in 3x3 blocks per particle and per edge: M + h D + h^2 K (eq. 3.26).
+"""System matrix of implicit Euler, M + h D + h^2 K (eq. 3.26), in 3x3 blocks for each particle and edge.
 
 K = - df/dx and D = - df/dv, both projected to be positive semi-definite. Only particles that share an edge
 interact, so every law fills the same blocks, and a product with the matrix is one pass over the edges. The
-rows of K and D sum to zero, so a product needs only `particle_inertia` and the differences of velocity along
-edges. A sum of stiff blocks times a velocity that all particles share would leave only rounding errors. The
-diagonal blocks are for the preconditioner.
+rows of K and D sum to zero, so a product needs only `particle_inertia` and the velocity differences along
+edges. Summing stiff blocks times a velocity common to all particles would leave only rounding errors. Only
+the preconditioner uses the diagonal blocks.
 """
 
 from taichi_soft.core.constants import LANES
@@ -33,12 +33,12 @@ from taichi_soft.elements.laws.springs import along, spring_tension
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
 EDGES = ((0, 0, 1), (1, 0, 2), (2, 0, 3), (3, 1, 2), (4, 1, 3), (5, 2, 3))
-"""The six edges of a tetrahedron as `state.tet_edges` lists them, each with its two corners."""
+"""For each of the six edges of a tetrahedron: its index in `state.tet_edges`, and its two corners."""
 
 
 @ti.func
 def clear_system(state: ti.template(), body):
-    """Zero all blocks of one body."""
+    """Set all blocks of one body to zero."""
     particles, edges = state.body_particles[body], state.body_edges[body]
     for p in range(particles[0], particles[1]):
         state.particle_block[p] = ti.Matrix.zero(state.real, 3, 3)
@@ -49,7 +49,7 @@ def clear_system(state: ti.template(), body):
 
 @ti.func
 def _add_pair(state: ti.template(), e, columns):
-    """Add a matrix that pulls both ends of an edge together."""
+    """Add the stiffness or damping between the ends of an edge to their blocks, given as columns."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
     state.particle_block[p] = state.particle_block[p] + block
@@ -59,7 +59,7 @@ def _add_pair(state: ti.template(), e, columns):
 
 @ti.func
 def _add_corner_pair(state: ti.template(), e, first, columns):
-    """Add a block of a tetrahedron whose row belongs to particle `first`."""
+    """Add a block of a tetrahedron to an edge; the row of the block belongs to particle `first`."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     if state.edge_vertices[e][0] != first:
         block = block.transpose()
@@ -68,10 +68,10 @@ def _add_corner_pair(state: ti.template(), e, first, columns):
 
 @ti.func
 def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, projected: ti.template()):
-    """Arguments of `corner_stiffness` for one tetrahedron now: rows for its corners, and the rest.
+    """Compute the arguments of `corner_stiffness` for one tetrahedron: rows of its corners, and `element`.
 
     Args:
-        projected: True makes it symmetric and positive semi-definite.
+        projected: True makes the stiffness symmetric and positive semi-definite.
     """
     v = particles_of(state, block, lane)
     x = [state.particle_position[v[i]] for i in ti.static(range(4))]
@@ -95,7 +95,7 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
 
 @ti.func
 def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.template()):
-    """- d f_i / d x_j of two corners [N/m], as columns, from their rows and the rest of `tet_stiffness`."""
+    """- d f_i / d x_j of two corners [N/m], as columns, from the results of `tet_stiffness`."""
     if ti.static(model.is_anisotropic and not model.has_energy and not projected):
         return rotating_pair_stiffness(model, element[0], gi, gj, element[2])
     elif ti.static(model.is_anisotropic):
@@ -106,7 +106,7 @@ def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.templa
 
 @ti.func
 def row_of(rows, i):
-    """Row i of a matrix (4, 3) as a vec3, for an i known only at run time."""
+    """Row i of a matrix (4, 3) as a vec3. The index i need not be known at compile time."""
     return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
 
 
@@ -116,7 +116,7 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         g, element = tet_stiffness(state, model, block, lane, True)
-        # Pairs of corners in a loop: ten copies of a block would dominate the compile time.
+        # A run-time loop over pairs of corners: ten unrolled copies would dominate the compile time.
         rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
         for i in range(4):
             p = state.tet_vertices[(block * 4 + i) * LANES + lane]
@@ -125,14 +125,14 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
                 if i == j:
                     state.particle_block[p] = state.particle_block[p] + ti.Matrix.cols([c0, c1, c2]) * scale
                 else:
-                    k = i * (5 - i) // 2 + j - 1  # of the edge in `EDGES`
+                    k = i * (5 - i) // 2 + j - 1  # index of the edge in `EDGES`
                     e = state.tet_edges[(block * 6 + k) * LANES + lane]
                     _add_corner_pair(state, e, p, (c0 * scale, c1 * scale, c2 * scale))
 
 
 @ti.func
 def volume_pull(state: ti.template(), t):
-    """Gradients g of V / V0 at the four corners of a tetrahedron, and the pull w on each per V / V0.
+    """Gradients g of V / V0 at the four corners of a tetrahedron, and the pull w on each corner per dV / V0.
 
     The force on the corners is -w dV / V0, so the stiffness is the outer product of w and g.
     """
@@ -148,9 +148,10 @@ def volume_pull(state: ti.template(), t):
 
 @ti.func
 def _add_volume_stiffness(state: ti.template(), body, scale):
-    """Add the stiffness of tetrahedra that pull their edges together: the positive part of w g^T.
+    """Add the stiffness of tetrahedra that pull their edges together, as the positive part of w g^T.
 
-    Its symmetric part has the eigenvalues (w.g +- |w||g|) / 2, the positive one along w/|w| + g/|g|.
+    The symmetric part of w g^T has the eigenvalues (w.g +- |w||g|) / 2. The positive one belongs to the
+    direction w/|w| + g/|g|.
     """
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
@@ -159,7 +160,7 @@ def _add_volume_stiffness(state: ti.template(), body, scale):
         g, w = volume_pull(state, t)
         ww = w[0].dot(w[0]) + w[1].dot(w[1]) + w[2].dot(w[2]) + w[3].dot(w[3])
         gg = g[0].dot(g[0]) + g[1].dot(g[1]) + g[2].dot(g[2]) + g[3].dot(g[3])
-        # |w/|w| + g/|g||^2 = 2 + 2 w.g / (|w||g|): the positive part is this number times its outer square.
+        # |w/|w| + g/|g||^2 = 2 + 2 w.g / (|w||g|): the positive part is `strength` times its outer square.
         strength = 0.25 * scale * ti.sqrt(ww * gg)
         if strength > 0.0:
             a, b = 1.0 / ti.sqrt(ww), 1.0 / ti.sqrt(gg)
@@ -185,7 +186,7 @@ def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.te
             tension += ring_tension(state, e)
         return spring_stiffness(r, tension, constants, projected)
     else:
-        # Laws that compare directions have their constants per length 1.
+        # The constants of laws that compare directions are for an edge of length 1.
         per_length = constants.x * 0.0 + 1.0
         if ti.static(law.ring in (Ring.SUBFACES, Ring.PLANE, Ring.HALVES)):
             per_length = 1.0 / ti.max(ti.sqrt(r.dot(r)), 1e-15)
@@ -238,7 +239,7 @@ def _add_edge_damping(state: ti.template(), body, scale):
 
 @ti.func
 def _add_tet_damping(state: ti.template(), body, scale):
-    """d (I - 1/4) between the corners of each tetrahedron."""
+    """Add `scale` times the damping d (I - 1/4) between the corners of each tetrahedron."""
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
@@ -268,7 +269,7 @@ def add_damping(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def add_inertia(state: ti.template(), p, inertia):
-    """Add to the inertia of a particle, which resists any change of its velocity [kg]."""
+    """Add `inertia` [kg] to a particle: it resists any change of the particle's velocity."""
     state.particle_inertia[p] = state.particle_inertia[p] + inertia
     for i in ti.static(range(3)):
         state.particle_block[p][i, i] = state.particle_block[p][i, i] + inertia
@@ -276,7 +277,7 @@ def add_inertia(state: ti.template(), p, inertia):
 
 @ti.func
 def add_masses(state: ti.template(), body):
-    """Add the masses of one body to its diagonal; pinned particles are not solved for."""
+    """Add the masses of one body to its diagonal blocks, except for pinned particles."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
@@ -286,7 +287,7 @@ def add_masses(state: ti.template(), body):
 
 @ti.func
 def add_edge_products(state: ti.template(), body, source: ti.template(), target: ti.template()):
-    """Add K and D times `source` to `target`, for the particles of one body."""
+    """Add the edge blocks (K and D) times `source` to `target`, for the particles of one body."""
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]

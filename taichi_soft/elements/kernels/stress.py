@@ -1,4 +1,4 @@
-"""Stress of tetrahedra at their present positions, for checks in every step."""
+"""Stress of tetrahedra: at their present positions, for checks in every step, or for given deformations."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen
@@ -9,12 +9,12 @@ from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, part
 from taichi_soft.elements.laws.force_model import cauchy_stress
 
 NO_LIMIT = 1e30
-"""[Pa]; not infinity, because fast-math compilers can assume that there is none."""
+"""Stress that means no limit [Pa]; not infinity, which fast-math compilers assume not to occur."""
 
 
 @ti.func
 def deformation_of(state: ti.template(), block, lane):
-    """F of a tetrahedron, as columns."""
+    """Deformation gradient F of a tetrahedron, as columns."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     x0 = state.particle_position[p0]
     a, b, c = state.particle_position[p1], state.particle_position[p2], state.particle_position[p3]
@@ -30,10 +30,10 @@ def stress_of(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def _largest_principal(mean, squares, determinant):
-    """Largest eigenvalue of mean I + D, by the angle of the cubic's roots, to 1e-4 of the norm of D.
+    """Largest eigenvalue of mean I + D, from the angle of the cubic's roots; error 1e-4 of the norm of D.
 
     Args:
-        squares, determinant: D : D, and det D, of the traceless D.
+        squares, determinant: D : D and det D of the traceless matrix D.
     """
     radius = ti.sqrt(squares / 6.0)
     cosine = 0.5 * determinant / ti.max(radius * radius * radius, 1e-30)
@@ -46,7 +46,7 @@ def _read_block(state: ti.template(), model: ti.template(), block, limit, first,
     """Write the rows of `read_stress` for a block's tetrahedra, from row `first` on."""
     means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     determinants = ti.Vector.zero(state.real, LANES)
-    for lane in range(LANES):  # vector registers take all of them at once, see `elements.kernels.elastic`
+    for lane in range(LANES):  # vectorised over the lanes, see `elements.kernels.elastic`
         stress = stress_of(state, model, block, lane)
         means[lane] = trace(stress) / 3.0
         deviator = scaled_plus_identity(stress, 1.0, -means[lane])
@@ -72,13 +72,13 @@ def read_stress(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     out: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Von Mises stress of the tetrahedra in `blocks`, and their largest principal stress with its direction.
+    """Write the von Mises stress of the tetrahedra in `blocks`, and their largest principal stress.
 
     Args:
-        limits: for each block, principal stress above which the direction is written [Pa]; `NO_LIMIT` skips
-            the principal stress.
-        out: (blocks times `LANES`, 5): von Mises and largest principal stress [Pa]; above the limit, its
-            direction in world axes, of length 1.
+        limits: for each block, principal stress above which its direction is also written [Pa]; `NO_LIMIT`
+            skips the principal stress.
+        out: (blocks times `LANES`, 5): von Mises stress and largest principal stress [Pa]; above the limit,
+            unit vector of its direction in world axes.
     """
     for i in range(blocks.shape[0]):
         block = blocks[i] & BLOCK_BITS
@@ -90,7 +90,7 @@ def read_stress(
 
 @ti.func
 def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.template()):
-    """The 3x3 part of a matrix from a row and a column on, as columns."""
+    """The 3x3 part of matrix `t` that begins at a row and a column, as columns."""
     a = ti.Vector([matrices[t, row + i, column] for i in ti.static(range(3))])
     b = ti.Vector([matrices[t, row + i, column + 1] for i in ti.static(range(3))])
     c = ti.Vector([matrices[t, row + i, column + 2] for i in ti.static(range(3))])
@@ -99,7 +99,7 @@ def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.templ
 
 @ti.func
 def _elasticity_from(model: ti.template(), stiffness: ti.template(), t):
-    """`elasticity_of` for a matrix (6, 6)."""
+    """Elasticity in the form of `elasticity_of`, from a stiffness matrix (6, 6)."""
     if ti.static(model.is_anisotropic):
         normal, mixed = _columns_of(stiffness, t, 0, 0), _columns_of(stiffness, t, 0, 3)
         return normal, mixed, _columns_of(stiffness, t, 3, 3)
@@ -114,7 +114,7 @@ def compute_stress(
     stiffness: ti.types.ndarray(dtype=ti.f64, ndim=3),
     out: ti.types.ndarray(dtype=ti.f64, ndim=3),
 ):
-    """`cauchy_stress` of many deformations F, (m, 3, 3) [Pa], in float64.
+    """Write the `cauchy_stress` of m deformation gradients F, (m, 3, 3) [Pa], in float64.
 
     Args:
         stiffness: (m, 6, 6) [Pa], as `Stiffness.matrix`.

@@ -1,4 +1,4 @@
-"""Force laws by name. A new law is one file, one entry here and its name in `core.types`."""
+"""Force laws by name. A new law needs a file, an entry here, and its name in `core.types`."""
 
 from dataclasses import replace
 from functools import partial
@@ -145,7 +145,7 @@ def element_model(
     flips: FlipsName | None = None,
     damping_model: DampingModelName = DampingModel.EDGE,
 ) -> ElementModel:
-    """Return the model with the given choices.
+    """Return the force model with the given choices.
 
     Args:
         law: a key of `LAWS`, such as "neo_hookean".
@@ -169,11 +169,11 @@ def element_model(
 
 
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
-    """Name of the law of a body for which none is given.
+    """Return the name of the default law for a material and options.
 
-    Neo-Hookean, because no body froze with it and every inverted body recovered (`python -m lab drop-test
-    --sweep`). "virial" for options that only the thesis's laws have and for an `AnisotropicMaterial`;
-    "springs" for a `SpringMaterial`.
+    "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial` and for options that only the
+    thesis's laws have; else "neo_hookean", because with it no body froze and every inverted body recovered
+    (`python -m lab drop-test --sweep`).
     """
     if isinstance(material, SpringMaterial):
         return "springs"
@@ -183,7 +183,7 @@ def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsNa
 
 
 def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
-    """Return the model that this mesh and this material need.
+    """Return `model` adapted to a mesh and a material.
 
     Raises: MeshError or MaterialError if the law does not support them.
     """

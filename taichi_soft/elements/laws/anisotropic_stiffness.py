@@ -1,14 +1,14 @@
 """Derivatives of an anisotropic tetrahedron's forces by its vertices, for implicit integration.
 
-The law of St. Venant-Kirchhoff involves no rotation. Those of thesis chapter 6 do: with F = R U and
-S = C : eps(U), the forces are -V P g with P = R Q and Q = S cof(U). A change of F rotates R as well: with
-U = A diag(s) A^T and G = A^T R^T dF A it is
+The law of St. Venant-Kirchhoff involves no rotation. The laws of thesis chapter 6 do: with F = R U and
+S = C : eps(U), the forces are -V P g with P = R Q and Q = S cof(U). A change dF changes both U and R. With
+U = A diag(s) A^T and G = A^T R^T dF A,
 
     dU = A [(s_a G_ab + s_b G_ba) / (s_a + s_b)] A^T,    R^T dR = A [(G_ab - G_ba) / (s_a + s_b)] A^T.
 
-These forces have no energy, so their derivative is not symmetric. Conjugate gradients get a matrix that is
-positive semi-definite by construction: the stiffness C, rotated by R and weighted by the deformed areas (R
-fixed: Mueller and Gross 2004, Interactive virtual materials), plus the contribution of tension.
+These forces have no energy, so their derivative is not symmetric. Conjugate gradients therefore use another
+matrix, which is positive semi-definite by construction: the stiffness C, rotated by a fixed R and weighted by
+the deformed areas (Mueller and Gross 2004, Interactive virtual materials), plus the contribution of tension.
 """
 
 from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
@@ -30,7 +30,7 @@ from taichi_soft.elements.laws.anisotropy import anisotropic_stress, between, gr
 from taichi_soft.elements.laws.force_gradients import element_stiffness, positive_part, stiffness_block
 
 MIN_VOLUME = 0.05
-"""Lower limit of the volume relative to rest by which tension is divided."""
+"""Lower limit of the relative volume V / V0 by which tension is divided."""
 
 
 @ti.func
@@ -44,9 +44,9 @@ def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
 
 @ti.func
 def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
-    """Arguments of `pair_stiffness` in place of F and S for a law of chapter 6: positive semi-definite.
+    """Arguments that replace F and S of `pair_stiffness` for a law of chapter 6: positive semi-definite.
 
-    For an inverted tetrahedron that recovers, only the modulus of its `recovering_piola`.
+    For an inverted tetrahedron with `flips="recover"`, they contain only the modulus of `recovering_piola`.
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -69,7 +69,7 @@ def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
 
 @ti.func
 def rotating_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
-    """- d f_i / d x_j of two vertices [N/m], as columns, for a law of chapter 6: exact.
+    """Exact - d f_i / d x_j of two vertices [N/m], as columns, for a law of chapter 6.
 
     Args:
         gi, gj: as for `pair_stiffness`.
@@ -84,7 +84,7 @@ def rotating_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
     if ti.static(model.flips == Flips.OFF):
         side = ti.select(determinant(F) < 0.0, -1.0, 1.0)
     block = ti.Matrix.zero(ti.f64, 3, 3)
-    for k in range(3):  # a loop, because three copies take minutes to compile
+    for k in range(3):  # a run-time loop, because three unrolled copies take minutes to compile
         along = ti.Vector([int(k == 0), int(k == 1), int(k == 2)]) + F[0] * 0.0
         G = product(product(transposed(RA), outer(along, gj)), A)
         in_axes, turn_in_axes = _parts(G, s)
@@ -116,7 +116,7 @@ def _strain_change(model: ti.template(), U, dU):
 
 @ti.func
 def _parts(G, s):
-    """Change of U, and R^T dR, in the axes of U, as columns; for G see above."""
+    """dU and R^T dR in the axes of U, as columns; for G see the top of this file."""
     least = 1e-9
     xy, xz, yz = ti.max(s.x + s.y, least), ti.max(s.x + s.z, least), ti.max(s.y + s.z, least)
     u_xy = (s.x * G[1].x + s.y * G[0].y) / xy
@@ -143,14 +143,14 @@ def _mixed_cofactor(M, N):
 def pair_stiffness(F, gi, gj, stress, stiffness):
     """- d f_i / d x_j of two vertices [N/m], as columns, for forces -V F S g_i with S = `green_stress`.
 
-    F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of the vertex to strain.
+    The matrix is F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of vertex i to strain.
     Args:
         gi, gj: rows of A^-1 of the vertices, times the root of the rest volume.
-        stress: S as columns, or the part of it that is used.
+        stress: S, or the part of S to include, as columns.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     Ti, Tj = _shear_of(gi), _shear_of(gj)
-    # C B_j: normal and shear stress from a displacement of the second vertex.
+    # C B_j: normal and shear stress per displacement of the second vertex.
     a = _scaled_columns(normal, gj), product(mixed, Tj)
     b = _scaled_columns(transposed(mixed), gj), product(shear, Tj)
     N = (
@@ -163,7 +163,7 @@ def pair_stiffness(F, gi, gj, stress, stiffness):
 
 @ti.func
 def _shear_of(g):
-    """Engineering shear yz, xz, xy from a displacement, as columns."""
+    """Matrix from a displacement to engineering shear yz, xz, xy, as columns, for a vertex with row `g`."""
     zero = g.x * 0.0
     return ti.Vector([zero, g.z, g.y]), ti.Vector([g.z, zero, g.x]), ti.Vector([g.y, g.x, zero])
 

@@ -1,7 +1,7 @@
 """Hooke's law for anisotropic materials (thesis eq. 2.25, chapter 7).
 
-Their stiffness is given in the axes of the rest shape, so the strain is needed in these axes too. That takes
-the rotation R of F = U R besides the stretch U; isotropic laws do not need R.
+The stiffness is given in the axes of the rest shape, so the law needs the strain in these axes too, and thus
+the rotation R of F = U R as well as the stretch U. Isotropic laws do not need R.
 """
 
 from taichi_soft.core.math.polar import orthogonal_factor
@@ -19,12 +19,12 @@ from taichi_soft.core.types import Strain
 
 @ti.func
 def anisotropic_stress(strain, stiffness):
-    """sigma = C : eps [Pa], as columns.
+    """Stress sigma = C : eps [Pa], as columns.
 
     Args:
         strain: symmetric, as columns.
-        stiffness: C in Voigt's order and with engineering shear, as three matrices in columns: normal
-            stress by normal strain, normal stress by shear strain, shear stress by shear strain.
+        stiffness: C in Voigt's order with engineering shear, as three matrices of columns: normal stress
+            from normal strain, normal stress from shear strain, shear stress from shear strain.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     e = ti.Vector([strain[0].x, strain[1].y, strain[2].z])
@@ -36,7 +36,7 @@ def anisotropic_stress(strain, stiffness):
 
 @ti.func
 def green_stress(F, stiffness):
-    """C : 1/2 (F^T F - I) [Pa], as columns, in the axes of the rest shape."""
+    """Stress C : 1/2 (F^T F - I) in the axes of the rest shape [Pa], as columns."""
     return anisotropic_stress(scaled_plus_identity(inner_square(F), 0.5, -0.5), stiffness)
 
 
@@ -44,7 +44,7 @@ def green_stress(F, stiffness):
 def turned_stress(model: ti.template(), F, stiffness):
     """Stress R (C : R^T eps R) R^T of the model's strain [Pa], as columns.
 
-    In a mirrored tetrahedron R mirrors too, so the stress is that of the mirror image.
+    In a mirrored tetrahedron, R includes the reflection, so the stress equals the stress of the mirror image.
     """
     R = orthogonal_factor(F)
     if ti.static(model.strain == Strain.EXACT):
@@ -56,7 +56,7 @@ def turned_stress(model: ti.template(), F, stiffness):
 
 @ti.func
 def between(M, columns):
-    """M N M^T."""
+    """M N M^T as columns, for N given as `columns`."""
     return product(product(M, columns), transposed(M))
 
 

@@ -1,9 +1,10 @@
 """CMPM with the plane that best fits the particles around an edge (thesis section 4.4.2).
 
-The fit is by least squares for more than three particles; the same formula gives the cross product for three.
-If there are two, the centre of the edge is the third. Such planes are rarely perpendicular to their edge. As
-in CMPM2, their normal is therefore compared with its rest direction as carried by the tetrahedra. Implicit
-Euler keeps the normal fixed, and compares it with the edge itself (`bond_stiffness`).
+For more than three particles, the plane is a least-squares fit; for three, the same formula gives the plane
+through them. If there are two, the centre of the edge is the third point. Such planes are rarely
+perpendicular to their edge. As in CMPM2, the normal is therefore compared with its rest direction as carried
+by the tetrahedra. Implicit Euler keeps the normal fixed and compares it with the edge itself
+(`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 
 @ti.func
 def plane_normal(count, total, squares, r):
-    """Unit normal of the plane that best fits points, on the side of `r`.
+    """Unit normal of the plane that best fits a set of points, pointing to the side of `r`.
 
     Args:
         count: number of points.
-        total: their sum, vec3 [m].
-        squares: sum of their outer squares, as columns [m^2].
+        total: sum of the points, vec3 [m].
+        squares: sum of the outer squares of the points, as columns [m^2].
         r: second end of the edge minus the first [m].
     """
     mean = total / count
@@ -40,13 +41,13 @@ def plane_normal(count, total, squares, r):
 
 
 def plane_normals(rings: EdgeRings) -> Floats:
-    """`plane_normal` of every edge at rest, in NumPy, (k, 3)."""
+    """Unit normal of the best-fitting plane of every edge at rest, (k, 3), in NumPy."""
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges]
     offset = mesh.vertices[vertex] - ends[edge].mean(axis=1)
     start = np.searchsorted(edge, np.arange(len(mesh.edges)))
-    count = np.maximum(np.bincount(edge), 3)[:, None]  # with two, the centre of the edge is the third
+    count = np.maximum(np.bincount(edge), 3)[:, None]  # counts the centre of the edge if there are two
     total = np.add.reduceat(offset, start, axis=0)
     squares = np.add.reduceat(offset[:, :, None] * offset[:, None, :], start, axis=0)
     _, axes = np.linalg.eigh(squares - total[:, :, None] * (total / count)[:, None, :])
@@ -57,8 +58,8 @@ def plane_normals(rings: EdgeRings) -> Floats:
 def carried_by_ring(rings: EdgeRings, normals: Floats) -> tuple[Floats, Floats]:
     """Weights (s,) of each particle around an edge, and (s,) of the edge's far end, in the carried direction.
 
-    Summed over the rows of `rings.neighbours` of an edge, they give the direction that `normals` had at rest,
-    as carried by the tetrahedra (`carried_direction`).
+    Each row belongs to a row of `rings.neighbours`. The weighted sum over the rows of an edge is the rest
+    direction in `normals` as carried by the tetrahedra (`carried_direction`).
     """
     far, one, other = carried_direction(rings, normals).T
     edge, vertex = rings.neighbours
@@ -72,7 +73,7 @@ def carried_by_ring(rings: EdgeRings, normals: Floats) -> tuple[Floats, Floats]:
 
 
 def best_fitting_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Ring rows: a particle; its weight, and part of the far end's weight, in the carried direction."""
+    """Return the bonds of a mesh. A ring row has a particle, and the weights of `carried_by_ring`."""
     rings = require_tets(mesh, material, "best_fitting_plane")
     normals = plane_normals(rings)
     weight, far_weight = carried_by_ring(rings, normals)

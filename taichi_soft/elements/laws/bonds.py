@@ -1,4 +1,4 @@
-"""Constants of every edge of a body at rest for a pairwise law, made once in NumPy by the law's own file."""
+"""Constants of every edge of a body at rest for a pairwise law, computed in NumPy by the law's file."""
 
 from __future__ import annotations
 
@@ -15,32 +15,31 @@ Ints = NDArray[np.int64]
 
 
 class Ring(Enum):
-    """Rows of an edge's ring, and how they are used while the body deforms."""
+    """Contents of the rows of an edge's ring, and their use while the body deforms."""
 
-    NONE = "none"  # a spring depends only on its two ends
+    NONE = "none"  # no rows: a spring depends only on its two ends
     EXPANSION = "expansion"  # tetrahedra, whose change of volume pulls or pushes along the edge
     VORONOI = "voronoi"  # corners of the Voronoi face, each in barycentric coordinates of four particles
     SUBFACES = "subfaces"  # the two particles that span a barycentric subface
-    PLANE = "plane"  # particles to fit a plane to
+    PLANE = "plane"  # particles, to which a plane is fitted
     HALVES = "halves"  # particles, whose ring is split into halves twice
-    TILT = "tilt"  # particles whose rise tilts a plane
+    TILT = "tilt"  # particles, whose rise tilts a plane
 
 
 @dataclass(frozen=True, eq=False)
 class Bonds:
-    """Rows for every edge of a mesh, in the order and direction of `mesh.edges`.
+    """Constants and ring of every edge of a mesh, in the order and direction of `mesh.edges`.
 
     Attributes:
-        constants: (k, 4): length at rest [m], stiffness along and across it [N/m], damping across it
-            [N s/m]. Zero if an edge is not a bond. Laws that compare directions use length 1 and [N]; those
-            with expansion have the area of the edge [m^2] in the third column.
+        constants: (k, 4): length at rest [m], stiffness along and across the edge [N/m], damping across it
+            [N s/m]. Zero if an edge is not a bond. In laws that compare directions, the length is 1 and the
+            stiffness in [N]. In laws with expansion, the third column is the area of the edge [m^2].
         ring_edge: (r,) edge of each row of the rings, ascending.
-        ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 in columns that a law does not
-            use.
-        ring_weights: (r, 4), see the law.
+        ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 in unused columns.
+        ring_weights: (r, 4), with a meaning that depends on the law.
         normals: (k, 3) unit normal at rest of the plane that separates tension from shear; NaN without one.
-        masses: (n,) [kg], if the law distributes mass differently.
-        expansion_modulus: (m,) [Pa], pressure of a tetrahedron on its edges per dV / V0, if a law has it.
+        masses: (n,) [kg], if the law distributes mass differently from the mesh; else None.
+        expansion_modulus: (m,) [Pa], pressure of each tetrahedron on its edges per dV / V0, or None.
     """
 
     constants: Floats
@@ -61,7 +60,7 @@ class Bonds:
 
 
 def columns(*values: Floats | float, count: int) -> Floats:
-    """The given columns side by side, padded with zeros on the right, (count, 4)."""
+    """Stack the given columns, padded with zeros on the right, (count, 4)."""
     rows = np.zeros((count, 4))
     for i, value in enumerate(values):
         rows[:, i] = value
@@ -69,7 +68,7 @@ def columns(*values: Floats | float, count: int) -> Floats:
 
 
 def member_columns(*values: Ints, count: int) -> Ints:
-    """The given columns side by side, padded with -1 on the right, (count, 4)."""
+    """Stack the given columns, padded with -1 on the right, (count, 4)."""
     rows = np.full((count, 4), -1, dtype=np.int64)
     for i, value in enumerate(values):
         rows[:, i] = value

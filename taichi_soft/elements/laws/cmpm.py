@@ -1,8 +1,8 @@
 """Continuum mechanics particle model: a spring along and one across each edge (thesis chapter 4).
 
-Between two particles lies a face of the Voronoi graph. Its corners move with the tetrahedra that contain
-them. The normal of the deformed face separates the edge into tension and shear. Implicit Euler keeps that
-normal fixed (`bond_stiffness`), as in thesis 4.2.
+A face of the Voronoi graph separates two particles. Its corners move with the tetrahedra that contain them.
+The normal of the deformed face splits the deformation of the edge into tension and shear. Implicit Euler
+keeps the normal fixed (`bond_stiffness`), as in thesis 4.2.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from taichi_soft.meshing.voronoi import voronoi_graph
 
 @ti.func
 def direction_of(v):
-    """Unit vector along `v`, or zero if it has no length."""
+    """Unit vector along `v`, or zero if `v` is zero."""
     return v / ti.max(ti.sqrt(v.dot(v)), 1e-30)
 
 
 @ti.func
 def bond_force(r, n, constants):
-    """Force on the first end of a bond [N], eq. 4.1 to 4.4: f_p = a/l (E (n.r - l) n + G m), f_q = -f_p.
+    """Force f_p = a/l (E (n.r - l) n + G m) on the first end of a bond [N], eq. 4.1 to 4.4; f_q = -f_p.
 
-    m = r - (n.r) n is the part of r across n. It is not normalised, which avoids a division by zero at rest.
+    m = r - (n.r) n is the component of r across n, not normalised: at rest its length is zero.
     Args:
         r: second end minus first [m].
-        n: unit normal of the face between them, towards the second end; zero gives no force.
-        constants: l [m], a E / l and a G / l [N/m].
+        n: unit normal of the face between the ends, towards the second end; zero gives no force.
+        constants: l [m], a E / l and a G / l [N/m] in x, y and z.
     """
     stretch = n.dot(r)
     return n * (constants.y * (stretch - constants.x)) + (r - n * stretch) * constants.z
@@ -38,11 +38,11 @@ def bond_force(r, n, constants):
 
 @ti.func
 def bond_damping(r, n, relative_velocity, tensile, shear):
-    """Damping force on the first end of a bond [N], eq. 4.5, along n, and along m if there is shear.
+    """Damping force on the first end of a bond [N], eq. 4.5, along n, and along m if the bond is sheared.
 
-    Along m it also damps the rotation of sheared bodies.
+    The force along m also damps the rotation of sheared bodies.
     Args:
-        r, n: as for `bond_force`; or the direction that is compared with n.
+        r, n: as for `bond_force`; r can also be the direction that the law compares with n.
         relative_velocity: velocity of the second end relative to the first [m/s].
         tensile, shear: b_n and b_m [N s/m].
     """
@@ -52,7 +52,7 @@ def bond_damping(r, n, relative_velocity, tensile, shear):
 
 @ti.func
 def shear_direction(r, n):
-    """Unit vector along the part of r across n; zero if that is within a millionth of r, and so rounding."""
+    """Unit vector along the component of r across n; zero if that is round-off, below 1e-6 of r."""
     m = r - n * n.dot(r)
     return ti.select(m.dot(m) > 1e-12 * r.dot(r), direction_of(m), m * 0.0)
 
@@ -72,9 +72,10 @@ def moduli(rings: EdgeRings, material: Material) -> tuple[Floats, Floats, Floats
 
 
 def cmpm_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Bonds across the clipped Voronoi faces; ring rows: a corner in barycentric coordinates.
+    """Return the bonds of a mesh, across the clipped faces of its Voronoi graph.
 
-    The first corner of a face is repeated at the end. Masses are those of the Voronoi cells (section 4.1).
+    A ring row is a corner of a face in barycentric coordinates; the first corner is repeated at the end. A
+    particle has the mass of its Voronoi cell (section 4.1).
     Raises: MeshError if the mesh is not Delaunay.
     """
     graph = voronoi_graph(mesh)

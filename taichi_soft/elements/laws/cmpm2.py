@@ -1,10 +1,9 @@
 """CMPM2: barycentric subfaces instead of the Voronoi graph (thesis section 4.4.1).
 
-The normal n of an edge's subfaces is compared with r, the direction that it had at rest as carried along by
-the
-tetrahedra: eq. 4.9 (with r - n^, of unit length) and 4.10. On an edge that several tetrahedra share, r is
-their mean, weighted by the areas of their subfaces. Implicit Euler keeps n fixed, and uses the edge itself
-for r (`bond_stiffness`).
+The normal n of an edge's subfaces is compared with r, the rest direction of n as carried by the tetrahedra:
+eq. 4.9 (with r - n^, of unit length) and 4.10. If several tetrahedra share an edge, r is the mean of their
+directions, weighted by the areas of their subfaces. Implicit Euler keeps n fixed, and uses the edge itself as
+r (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -31,10 +30,11 @@ def subface(center, a, b):
 
 
 def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
-    """Weights (r, 3) of an edge's far end and of the two sides in its carried direction.
+    """Weights (r, 3) of an edge's far end and of the two sides of a subface in the carried direction.
 
-    A direction d at rest becomes F d = sum (A^-1 d)_i (x_i - x_0) in each tetrahedron (eq. 6.3), here with
-    the edge's first end as x_0; summed over the rows of an edge, these give the means of the law.
+    In each tetrahedron, a direction d at rest becomes F d = sum (A^-1 d)_i (x_i - x_0) (eq. 6.3), here with
+    the edge's first end as x_0. Summed over the rows of an edge, the weights give the weighted
+    mean over its tetrahedra.
     """
     mesh = rings.mesh
     x = mesh.vertices
@@ -45,14 +45,14 @@ def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
 
 
 def require_tets(mesh: TetMesh, material: Material, law: str) -> EdgeRings:
-    """Return the rings of a tetrahedral mesh. Raises: MeshError for another mesh or material."""
+    """Return the edge rings of a mesh. Raises: MeshError if it is not a TetMesh with a Material."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError(f"law {law!r} needs tetrahedra and a Material")
     return EdgeRings.of(mesh)
 
 
 def cmpm2_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Ring rows: the two sides of a subface; the weights of both and of the far end in the direction r."""
+    """Return the bonds of a mesh. A ring row has the sides of a subface and `carried_direction` weights."""
     rings = require_tets(mesh, material, "cmpm2")
     normals = rings.sum(rings.area_vectors)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

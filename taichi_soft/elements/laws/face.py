@@ -1,7 +1,7 @@
 """Vertex forces from stress by the faces of a tetrahedron (thesis section 6.2).
 
-Each face passes the force sigma n a of eq. 6.8 in equal thirds to its three vertices; the material
-responds with the opposite.
+The force sigma n a of eq. 6.8 on each face is divided equally among its three vertices. The material responds
+with the opposite force.
 """
 
 from taichi_soft.core.math.tensors import times

@@ -1,11 +1,11 @@
 """Derivatives of a tetrahedron's forces by its vertices, for implicit integration.
 
 The derivative of an isotropic law decouples in the axes of the singular value decomposition F = U diag(s)
-V^T: a 3x3 block for the stretches, and for each pair of axes one number for their shear, (p_a - p_b)/(s_a -
-s_b), and one for their rotation, (p_a + p_b)/(s_a + s_b). Smith, de Goes and Kim 2019, Analytic eigensystems
-for isotropic distortion energies, show this for energies; it also holds without one, but then the block is
-not symmetric. When projected, the block is symmetrised and nothing is negative: the system is then positive
-definite for every pose, which conjugate gradients need.
+V^T: it has a 3x3 block for the stretches, and for each pair of axes a number for their shear, (p_a -
+p_b)/(s_a - s_b), and a number for their rotation, (p_a + p_b)/(s_a + s_b). Smith, de Goes and Kim 2019,
+Analytic eigensystems for isotropic distortion energies, show this for laws with an energy. It also holds for
+other laws, but their block is not symmetric. Projection makes the block symmetric and removes all negative
+values: the system is then positive definite for every pose, which conjugate gradients need.
 """
 
 from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
@@ -15,12 +15,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.laws.principal import hooke_principal
 
 MIN_GAP = 2.0e-3
-"""Relative gap of two stretches below which their limit is used, to avoid division by rounding errors."""
+"""Relative gap of two stretches below which they count as equal, to avoid a quotient of round-off."""
 
 
 @ti.func
 def principal(model: ti.template(), s, lame_lambda, lame_mu):
-    """p(s) and dp/ds of the model's law."""
+    """Principal stress p(s) [Pa] and its derivatives dp/ds, as columns, by the model's law."""
     if ti.static(model.has_energy):
         return model.law.principal(s, lame_lambda, lame_mu)
     else:
@@ -29,7 +29,7 @@ def principal(model: ti.template(), s, lame_lambda, lame_mu):
 
 @ti.func
 def positive_part(columns):
-    """Nearest positive semi-definite matrix to the symmetric part, as columns."""
+    """Positive semi-definite matrix nearest to the symmetric part of a matrix, as columns."""
     values, axes = symmetric_eigen(symmetric_part(columns))
     return from_axes(ti.max(values, 0.0), axes)
 
@@ -40,9 +40,9 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
     Args:
         sa, sb: stretches, sa >= |sb| as `signed_svd` orders them.
-        pa, pb: stress along them [Pa].
-        along: limit of the shear stiffness for equal stretches.
-        largest: bound of the rotation stiffness, which near sa = -sb is a quotient of rounding errors.
+        pa, pb: principal stress along them [Pa].
+        along: limit of the shear stiffness for equal stretches [Pa].
+        largest: upper limit of the rotation stiffness [Pa], which near sa = -sb is a quotient of round-off.
     """
     gap, total = sa - sb, sa + sb
     shear = along
@@ -57,9 +57,9 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
 @ti.func
 def weighted_rows(rest_inverse):
-    """Rows of A^-1 that map a vertex displacement to F (four vec3), times the root of the rest volume.
+    """Row of A^-1 of each vertex (four vec3), times the root of the rest volume.
 
-    They are zero for padding lanes, whose rows are zero.
+    The rows map vertex displacements to F. They are zero for padding lanes.
     """
     root = 1.0 / ti.sqrt(6.0 * ti.max(determinant(rest_inverse), 1e-37))
     rows = transposed(rest_inverse)
@@ -69,10 +69,10 @@ def weighted_rows(rest_inverse):
 
 @ti.func
 def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.template()):
-    """Arguments of `stiffness_block`: the `weighted_rows` in the axes of V; and U, dp/ds, alpha and beta.
+    """Compute the arguments of `stiffness_block`: `weighted_rows` in the axes of V; and U, M, alpha and beta.
 
     Args:
-        projected: True makes it symmetric and positive semi-definite.
+        projected: True makes the stiffness symmetric and positive semi-definite.
     """
     lame_lambda, lame_mu = elasticity[0], elasticity[1]
     U, s, V = signed_svd(F)
@@ -101,13 +101,13 @@ def stiffness_block(U, gi, gj, M, alpha, beta):
     """- d f_i / d x_j of two vertices of a tetrahedron [N/m], as columns.
 
     Args:
-        gi, gj: their rows from `element_stiffness`.
+        gi, gj: rows of the two vertices from `element_stiffness`.
     """
     both = gi * gj
     shear = alpha.x * ti.Vector([0.0, both.z, both.y])
     shear += alpha.y * ti.Vector([both.z, 0.0, both.x])
     shear += alpha.z * ti.Vector([both.y, both.x, 0.0])
-    # In the axes of U: rows by the first vertex, columns by the second.
+    # Block in the axes of U: rows for the first vertex, columns for the second.
     b00, b11, b22 = (
         M[0].x * both.x + shear.x,
         M[1].y * both.y + shear.y,
@@ -119,7 +119,7 @@ def stiffness_block(U, gi, gj, M, alpha, beta):
     b02 = M[2].x * gi.x * gj.z + beta.y * gi.z * gj.x
     b21 = M[1].z * gi.z * gj.y + beta.x * gi.y * gj.z
     b12 = M[2].y * gi.y * gj.z + beta.x * gi.z * gj.y
-    # U B U^T, column by column of U B first.
+    # U B U^T; c0, c1, c2 are the columns of U B.
     c0 = U[0] * b00 + U[1] * b10 + U[2] * b20
     c1 = U[0] * b01 + U[1] * b11 + U[2] * b21
     c2 = U[0] * b02 + U[1] * b12 + U[2] * b22

@@ -1,6 +1,6 @@
 """Force model of one tetrahedron: law, strain, treatment of flips, and damping.
 
-A model holds choices, never numbers, so that one compiled kernel serves every material.
+A model contains choices but no numbers, so one compiled kernel works for every material.
 """
 
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law
 from taichi_soft.elements.laws.recovery import recovering_piola
 
 MIN_VOLUME = 1 / 1024
-"""Lower limit of the volume relative to rest in the division of force by area."""
+"""Lower limit of the relative volume V / V0 by which force is divided to get the stress."""
 
 
 @dataclass(frozen=True)
 class ElementModel:
-    """Choices that shape the force kernel of one body."""
+    """Choices that determine the compiled force kernel of one body."""
 
     law: Law
-    strain: Strain | None  # None if the law has no choice of strain
-    flips: Flips | None  # None if the law does not act on tetrahedra
+    strain: Strain | None  # None if the law supports only one strain
+    flips: Flips | None  # None for laws along edges
     damping_model: DampingModel
-    is_anisotropic: bool = False  # its material has 21 constants instead of 2
+    is_anisotropic: bool = False  # True if the material has 21 constants instead of 2
 
     @property
     def has_energy(self) -> bool:
@@ -38,12 +38,12 @@ class ElementModel:
 
     @property
     def has_bonds(self) -> bool:
-        """True if forces act between the ends of edges, False if on the corners of tetrahedra."""
+        """True if elastic forces act along edges, False if they act on the corners of tetrahedra."""
         return isinstance(self.law, BondLaw)
 
     @property
     def reads_expansion(self) -> bool:
-        """True if edges read the expansion of their tetrahedra."""
+        """True if the force of an edge depends on the expansion of its tetrahedra."""
         return isinstance(self.law, BondLaw) and self.law.ring is Ring.EXPANSION
 
     @property
@@ -53,7 +53,7 @@ class ElementModel:
 
     @property
     def repairs_flips(self) -> bool:
-        """True if a flipped tetrahedron takes another branch than an upright one."""
+        """True if a flipped tetrahedron needs `flipped_forces`."""
         return self.flips is Flips.RECOVER and not self.has_energy
 
     @property
@@ -64,14 +64,14 @@ class ElementModel:
 
 @ti.func
 def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
-    """Hooke's stress of the model's strain, linear strain by default [Pa], as columns."""
+    """Hooke's stress of the model's strain, or of linear strain if the model has none [Pa], as columns."""
     strain = strains.exact_strain(F) if ti.static(model.strain == Strain.EXACT) else strains.linear_strain(F)
     return hooke_stress(strain, lame_lambda, lame_mu)
 
 
 @ti.func
 def piola_of(model: ti.template(), F, elasticity):
-    """Derivative of the energy of the model's law with respect to F [Pa], as columns."""
+    """Derivative of the energy density by F [Pa], as columns, for a model with an energy."""
     if ti.static(model.is_anisotropic):
         return product(F, green_stress(F, elasticity))
     else:
@@ -82,9 +82,9 @@ def piola_of(model: ti.template(), F, elasticity):
 def cauchy_stress(model: ti.template(), F, elasticity):
     """Cauchy stress of a deformation by the model's law, force per deformed area [Pa], as columns.
 
-    It is in world axes. Laws along edges have no stress; they use Hooke's for linear strain. An inverted
-    tetrahedron has the stress of its mirror image. If an energy restores it, the stress is that of the
-    negative volume, because compression would otherwise count as tension.
+    The stress is in world axes. For laws along edges, which have no stress, it is Hooke's stress of linear
+    strain. An inverted tetrahedron has the stress of its mirror image. But if an energy restores it, the
+    forces are divided by its negative volume, because compression would otherwise count as tension.
     Args:
         elasticity: as for `elastic_forces`.
     """
@@ -103,7 +103,7 @@ def cauchy_stress(model: ti.template(), F, elasticity):
 
 @ti.func
 def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
-    """Forces on four vertices [N] by the model's law.
+    """Elastic forces on the four vertices of a tetrahedron [N] by the model's law.
 
     Args:
         elasticity: lambda and mu [Pa], or a stiffness as for `anisotropic_stress`.
@@ -120,7 +120,7 @@ def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
 def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticity):
     """Elastic forces on four vertices [N], and six times the signed volume [m^3].
 
-    Valid for every pose unless `model.repairs_flips`: then only if the volume is not negative.
+    If `model.repairs_flips`, the forces are valid only if the volume is not negative.
     Args:
         x0, x1, x2, x3: deformed vertices, vec3 [m].
         rest_inverse: A^-1 of thesis eq. 6.1, as columns [1/m].
@@ -131,7 +131,7 @@ def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticit
     f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, elasticity)
     volume6 = determinant(B)
     if ti.static(model.mirrors_forces):
-        # The mirrored shape is at rest too: use the area vectors of a right-handed tetrahedron.
+        # For the mirrored shape to be at rest too, use the area vectors of a right-handed tetrahedron.
         mirror = ti.select(volume6 < 0.0, -1.0, 1.0)
         f0, f1, f2, f3 = f0 * mirror, f1 * mirror, f2 * mirror, f3 * mirror
     return f0, f1, f2, f3, volume6

@@ -6,5 +6,5 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def hooke_stress(strain, lame_lambda, lame_mu):
-    """sigma = lambda tr(eps) I + 2 mu eps [Pa], as columns."""
+    """Stress sigma = lambda tr(eps) I + 2 mu eps [Pa], as columns."""
     return scaled_plus_identity(strain, 2.0 * lame_mu, lame_lambda * trace(strain))

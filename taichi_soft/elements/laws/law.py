@@ -21,14 +21,14 @@ class StressLaw:
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
     strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # supported, the default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
-    parameters: tuple[str, ...] = SOLID  # of its material
+    parameters: tuple[str, ...] = SOLID  # constants of the material that it uses
     keeps_energy: bool = False
     takes_anisotropy: bool = True  # True if it also supports the parameters `ANISOTROPIC`
 
 
 @dataclass(frozen=True)
 class EnergyLaw:
-    """An elastic energy and its derivative: elastic deformation conserves energy."""
+    """An elastic energy and its derivative, so that elastic deformation conserves energy."""
 
     name: LawName
     source: str
@@ -37,7 +37,7 @@ class EnergyLaw:
     principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in principal axes, and derivatives
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
-    flips: tuple[Flips, ...]  # one, which follows from the energy
+    flips: tuple[Flips, ...]  # exactly one, which follows from the energy
     parameters: tuple[str, ...] = SOLID
     keeps_energy: bool = True
     takes_anisotropy: bool = False
@@ -50,7 +50,7 @@ class BondLaw:
     name: LawName
     source: str
     summary: str
-    ring: Ring  # what the law reads besides the two ends
+    ring: Ring  # data that the law reads in addition to the two ends
     bonds: Callable[..., Bonds]  # numpy: (mesh, material) -> constants of every edge
     parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
     keeps_energy: bool = False

@@ -1,9 +1,9 @@
 """Stable neo-Hookean material, after Smith, de Goes and Kim, Stable Neo-Hookean Flesh Simulation (2018).
 
-psi = m/2 (I - 3) + l/2 (J - a)^2 - m/2 log(I + 1), with I = F : F and J = det F: finite and smooth for every
-pose. Flat and flipped tetrahedra are driven back; one shrunk to a point is in equilibrium until something
-disturbs it. m = 4/3 mu, l = lambda + 5/6 mu and a = 1 + mu/l make it Hooke's law for small strain (their
-section 3.4).
+The energy psi = m/2 (I - 3) + l/2 (J - a)^2 - m/2 log(I + 1), with I = F : F and J = det F, is finite and
+smooth for every pose. It restores flat and flipped tetrahedra; a tetrahedron shrunk to a point is in unstable
+equilibrium. With m = 4/3 mu, l = lambda + 5/6 mu and a = 1 + mu/l, the law is Hooke's for small strain
+(section 3.4 of the paper).
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from taichi_soft.elements.laws.principal import axis_of, cofactors
 def neo_hookean_piola(F, lame_lambda, lame_mu):
     """P = m (1 - 1/(I + 1)) F + l (J - a) cof F [Pa], as columns."""
     square = F[0].dot(F[0]) + F[1].dot(F[1]) + F[2].dot(F[2])
-    # Factors that are exact in float32: Taichi rounds 4 / 3 to float32 even if everything else is float64.
+    # No factor 4 / 3, which Taichi would round to float32 even in float64 code; 4 and 3 are exact.
     along = lame_mu * 4.0 / 3.0 * (1.0 - 1.0 / (square + 1.0))
     pressure = (lame_lambda + lame_mu * 5.0 / 6.0) * (determinant(F) - 1.0) - lame_mu
     return plus(F, along, cofactor(F), pressure)
@@ -25,7 +25,7 @@ def neo_hookean_piola(F, lame_lambda, lame_mu):
 
 @ti.func
 def neo_hookean_principal(s, lame_lambda, lame_mu):
-    """The same in principal stretches: p [Pa], and dp/ds as columns."""
+    """Principal stress p [Pa] of the stretches s, and dp/ds as columns."""
     soft = lame_mu * 4.0 / 3.0
     bulk = lame_lambda + lame_mu * 5.0 / 6.0
     square = s.dot(s) + 1.0

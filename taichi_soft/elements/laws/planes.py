@@ -1,4 +1,4 @@
-"""Deviation of the planes of CMPM and its variants from perpendicular to their edges (thesis fig. 4.7)."""
+"""Angles between edges and the normals of their planes in CMPM and its variants (thesis fig. 4.7)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def plane_angles(mesh: TetMesh, law: str) -> NDArray[np.float64]:
 
     It is NaN for edges without a bond.
 
-    This normal separates the strain of an edge into tension and shear: the larger the angle, the more of a
-    tension counts as shear. Faces of the Voronoi graph and tilted planes are perpendicular by construction.
+    The normal splits the strain of an edge into tension and shear: the larger the angle, the larger the part
+    of a tension that counts as shear. Voronoi faces and tilted planes are perpendicular by construction.
     Args:
         mesh: rest shape.
-        law: one of chapter 4, such as "cmpm2" or "best_fitting_plane".
+        law: name of a law of chapter 4, such as "cmpm2" or "best_fitting_plane".
     Raises: OptionError for another law; MeshError if `mesh` is not a TetMesh, or not Delaunay for "cmpm".
     """
     if not isinstance(mesh, TetMesh):

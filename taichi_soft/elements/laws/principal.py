@@ -1,8 +1,8 @@
-"""Stress of isotropic laws in principal axes, and its derivatives: everything that a gradient needs.
+"""Stress of isotropic laws in principal axes, and its derivatives, for the derivatives of forces.
 
-With F = U diag(s) V^T every isotropic law has P = U diag(p(s)) V^T (Stomakhin et al. 2012, Energetically
-consistent invertible elasticity). The laws of thesis chapter 6 have p_a = sigma_a times the product of the
-other two stretches, since forces are stress times deformed area.
+With F = U diag(s) V^T, every isotropic law has P = U diag(p(s)) V^T (Stomakhin et al. 2012, Energetically
+consistent invertible elasticity). In the laws of thesis chapter 6, p_a is sigma_a times the product of the
+other two stretches, because forces are stress times deformed area.
 """
 
 from taichi_soft.core.runtime import ti
@@ -12,7 +12,7 @@ from taichi_soft.elements.laws.recovery import recovering_principal
 
 @ti.func
 def cofactors(s):
-    """Products of the other two stretches, and their derivatives by each stretch, as columns."""
+    """Product of the other two stretches for each axis, and its derivatives by each stretch, as columns."""
     others = ti.Vector([s.y * s.z, s.x * s.z, s.x * s.y])
     zero = s.x * 0.0
     return others, (ti.Vector([zero, s.z, s.y]), ti.Vector([s.z, zero, s.x]), ti.Vector([s.y, s.x, zero]))
@@ -28,7 +28,7 @@ def axis_of(s, c: ti.template()):
 
 @ti.func
 def hooke_principal(model: ti.template(), s, lame_lambda, lame_mu):
-    """p(s) [Pa] and dp/ds, as columns, for the laws of chapter 6 with the model's strain and flips."""
+    """Principal stress p(s) [Pa], and dp/ds as columns, for laws of chapter 6 with the model's options."""
     t = s
     mirror = s.x * 0.0 + 1.0
     if ti.static(model.flips == Flips.TOLERANT):

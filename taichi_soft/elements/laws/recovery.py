@@ -1,19 +1,19 @@
 """Recovery of flipped tetrahedra.
 
-Hooke's laws can hardly restore a tetrahedron that is pressed flat: their forces are stress times deformed
-area, and only the area across the thinnest axis is left there. Beyond flat they would have no restoring
-force. A flipped tetrahedron therefore follows a separate energy in the principal stretches s0 >= s1 >= -s2 >
-0 of F,
+Laws with Hooke's stress can hardly restore a tetrahedron that is pressed flat: their forces are stress times
+deformed area, and only the area across the thinnest axis remains. They have no restoring force for a flipped
+tetrahedron. It therefore gets a separate energy in the principal stretches s0 >= s1 >= -s2 > 0 of F,
 
-    psi = M/2 ((s0 - 1)^2 + (s1 - 1)^2) + phi(s2),   phi' = M (s2 - 1), but from 0 at flat in a steep ramp,
+    psi = M/2 ((s0 - 1)^2 + (s1 - 1)^2) + phi(s2),   phi' = M (s2 - 1) after a steep ramp from 0 at s2 = 0,
 
-with M the modulus of pressure waves, lambda + 2 mu. Without the ramp it is M/2 |F - R|^2 with R the nearest
-rotation: corotated elasticity without lateral contraction, which would invert a tetrahedron stretched along
-one axis further along another. A force with an energy cannot drive a cycle.
+where M = lambda + 2 mu is the modulus of pressure waves. Without the ramp, psi is M/2 |F - R|^2 with the
+nearest rotation R: corotated elasticity without lateral contraction. Lateral contraction would invert a
+tetrahedron further along one axis if it is stretched along another. Because the force has an energy, it adds
+no energy in a cycle.
 
-The ramp is there because an upright tetrahedron that is stretched enough becomes flat by its own lateral
-contraction. A restoring force with a sudden onset would throw it back and forth through flat, and add the
-work of that force in the rest of a substep each time.
+The ramp is necessary because an upright tetrahedron that is stretched enough becomes flat by its own lateral
+contraction. A force with a sudden onset would throw it back and forth through the flat shape, and each time
+add the work of that force during the rest of a substep.
 """
 
 from taichi_soft.core.math.svd import signed_svd
@@ -21,12 +21,12 @@ from taichi_soft.core.math.tensors import product, transposed
 from taichi_soft.core.runtime import ti
 
 RAMP = 1 / 16
-"""Inverted stretch at which the ramp ends. A wider ramp leaves more tetrahedra slightly inverted at rest."""
+"""Value of -s2 at which the ramp ends. A wider ramp leaves more tetrahedra slightly inverted at rest."""
 
 
 @ti.func
 def recovering_principal(s, modulus):
-    """p(s) = d psi / d s [Pa], and dp/ds of each axis, for negative s2."""
+    """Principal stress p(s) = d psi / d s [Pa] for negative s2, and dp_a/ds_a of each axis."""
     steep = (1.0 + RAMP) / RAMP
     p, rate = s - 1.0, s * 0.0 + 1.0
     if s.z > -RAMP:
@@ -36,7 +36,7 @@ def recovering_principal(s, modulus):
 
 @ti.func
 def recovering_piola(F, modulus):
-    """P [Pa], as columns, for F with a negative determinant."""
+    """First Piola-Kirchhoff stress P [Pa], as columns, for F with a negative determinant."""
     U, s, V = signed_svd(F)
     p, _ = recovering_principal(s, modulus)
     return product((U[0] * p.x, U[1] * p.y, U[2] * p.z), transposed(V))

@@ -1,12 +1,14 @@
 """CMPM with a normal from two splits of the ring of particles around an edge (thesis section 4.4.2).
 
 The thesis considers this normal because it needs no eigenvectors. The ring is split into two halves, and
-again a quarter of a turn further. Each split gives the vector between the mean positions of its halves. The
-normal is the cross product of the two vectors. Two particles get the centre of the edge as the third one.
+again at positions a quarter of a turn further. Each split gives the vector between the mean positions of its
+halves. The normal is the cross product of the two vectors. If the ring has only two particles, the centre of
+the edge is the third point.
 
-The normal is compared with its rest direction as carried by the tetrahedra, as in CMPM2 and in the best
-fitting plane. The order of the particles orients it, so that it stays continuous where an edge is turned
-inside out. Implicit Euler keeps the normal fixed, and compares it with the edge itself (`bond_stiffness`).
+The normal is compared with its rest direction as carried by the tetrahedra, as in CMPM2 and with the best
+fitting plane. The order of the particles determines its sign, so that it stays continuous if an edge is
+turned inside out. Implicit Euler keeps the normal fixed and compares it with the edge itself
+(`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -22,15 +24,15 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 FLAT = 1e-6
-"""Sine of the angle between the two vectors below which round-off would decide the normal."""
+"""Sine of the angle between the two vectors below which the normal would be round-off."""
 
 
 def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """Weights (s,) of the rows of `rings.neighbours` in the two vectors between the means of halves."""
+    """Weights of each row of `rings.neighbours` in the vectors of the two splits, (s,) each."""
     edge, _ = rings.neighbours
     start = np.searchsorted(edge, np.arange(len(rings.mesh.edges)))
     index = np.arange(len(edge)) - start[edge]
-    count = np.maximum(np.bincount(edge), 3)[edge]  # with two, the centre of the edge is the third
+    count = np.maximum(np.bincount(edge), 3)[edge]  # counts the edge's centre if there are two
     half = count // 2
     quarter = np.maximum(1, np.rint(count / 4).astype(np.int64))
 
@@ -41,7 +43,7 @@ def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:
 
 
 def split_ring_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Ring rows: a particle; weights in the carried direction as `carried_by_ring`, and in both splits.
+    """Return the bonds of a mesh. A ring row has a particle, `carried_by_ring` weights and `split_weights`.
 
     Raises: MeshError if the two vectors of an edge are parallel, so that they span no plane.
     """
@@ -62,7 +64,7 @@ def split_ring_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
             "its ring lie in one line. Use law='best_fitting_plane'."
         )
     normals /= length[:, None]
-    # The order of a wide ring can turn against the edge: the sign at rest is part of one split's weights.
+    # A wide ring can be ordered against the edge: one split's weights include the sign at rest.
     sign = np.where(np.einsum("ka,ka->k", normals, ends[:, 1] - ends[:, 0]) < 0, -1.0, 1.0)
     normals *= sign[:, None]
     weight, far_weight = carried_by_ring(rings, normals)

@@ -9,7 +9,7 @@ from taichi_soft.elements.materials import Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
 
 TINY = 1e-30
-"""[m^2], far below any squared length; added, because a maximum takes three times as many instructions."""
+"""Offset of squared lengths [m^2], far below any squared length: faster than a maximum."""
 
 
 @ti.func
@@ -25,25 +25,25 @@ def spring_tension(r, constants):
 
 @ti.func
 def along(r, tension):
-    """Force on the first end of an edge that is pulled together with `tension` [N].
+    """Force on the first end of an edge [N] whose ends pull at each other with `tension` [N].
 
-    It is zero if both ends coincide, because there is no direction.
+    It is zero if both ends coincide, because the edge then has no direction.
     """
     return r * (tension / ti.max(ti.sqrt(r.dot(r)), 1e-15))
 
 
 @ti.func
 def damped_pull(r, relative_velocity, tension, damping):
-    """`along` and `edge_damping_force` combined, with one division that does not wait for the root."""
+    """Sum of `along` and `edge_damping_force` [N], with a single division that is independent of the root."""
     square = r.dot(r) + TINY
     inverse = 1.0 / square
     return r * (inverse * (tension * ti.sqrt(square) + damping * r.dot(relative_velocity)))
 
 
 def spring_bonds(mesh: BodyMesh, material: Material | SpringMaterial) -> Bonds:
-    """Springs between given particles, or on the edges of a solid with k = E a / l (eq. 5.1).
+    """Return springs between given particles, or on the edges of a solid with k = E a / l (eq. 5.1).
 
-    The area a is that of the barycentric subfaces (4.4.1), and E is their mean.
+    In a solid, a is the area of an edge's barycentric subfaces (4.4.1), and E their mean modulus.
     """
     count = len(mesh.edges)
     if isinstance(material, SpringMaterial):

@@ -1,9 +1,10 @@
-"""St. Venant-Kirchhoff: Hooke's law in the axes of the rest shape, the derivative of an energy.
+"""Law of St. Venant-Kirchhoff: Hooke's law in the axes of the rest shape, with an energy.
 
-psi = lambda/2 (tr E)^2 + mu E : E with Green's strain E = 1/2 (F^T F - I). The principal strains are those
-of thesis eq. 6.7, but the thesis's stress acts in the deformed directions and per deformed area, and so
-has no energy: section 6.4 observes that it drifts. F^T F is the same for a mirror image, so a mirrored
-tetrahedron is at rest. Under strong compression (to a third of one length) the law collapses.
+The energy is psi = lambda/2 (tr E)^2 + mu E : E with Green's strain E = 1/2 (F^T F - I). The principal
+strains are the same as in thesis eq. 6.7. But the thesis's stress acts in the deformed directions and per
+deformed area, and therefore has no energy: section 6.4 observes that it drifts. F^T F is the same for a
+mirror image, so a mirrored tetrahedron is at rest. Under strong compression (to a third of one length) the
+law collapses.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ def st_venant_kirchhoff_piola(F, lame_lambda, lame_mu):
 
 @ti.func
 def st_venant_kirchhoff_principal(s, lame_lambda, lame_mu):
-    """p_a = s_a (lambda tr E + 2 mu E_a) [Pa] of the stretches, and dp/ds as columns."""
+    """Principal stress p_a = s_a (lambda tr E + 2 mu E_a) [Pa] of the stretches s, and dp/ds as columns."""
     green = 0.5 * (s * s - 1.0)
     stress = 2.0 * lame_mu * green + lame_lambda * green.sum()
     c0 = lame_lambda * s.x * s + axis_of(s, 0) * (stress.x + 2.0 * lame_mu * s.x * s.x)
@@ -33,7 +34,7 @@ def st_venant_kirchhoff_principal(s, lame_lambda, lame_mu):
 
 
 def st_venant_kirchhoff_energy(F, lame_lambda, lame_mu):
-    """psi [J/m^3] of deformations (m, 3, 3), in numpy."""
+    """psi [J/m^3] of deformations (m, 3, 3), in NumPy."""
     green = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
     trace = np.einsum("maa->m", green)
     return 0.5 * lame_lambda * trace**2 + lame_mu * np.einsum("mab,mab->m", green, green)

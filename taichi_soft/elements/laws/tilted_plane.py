@@ -1,10 +1,10 @@
 """CMPM with a plane tilted by the particles around an edge (thesis section 4.4.3, not implemented there).
 
-The plane is perpendicular to its edge at rest. A particle around the edge that rises by an angle tilts the
+At rest, the plane is perpendicular to its edge. A particle around the edge that rises by an angle tilts the
 plane by c times that angle, about the axis through the edge that is perpendicular to the particle's arm. Eq.
-4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt it by only an eighth of a uniform shear; c =
-beta / pi tilts it by all of the shear if the particles are evenly spaced. beta is the angle that a particle
-represents. Implicit Euler keeps the plane's normal fixed (`bond_stiffness`).
+4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt the plane by only an eighth of a uniform
+shear. With c = beta / pi and evenly spaced particles, the tilt equals the shear. beta is the angle that a
+particle represents. Implicit Euler keeps the plane's normal fixed (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 PRINTED = 1 / 8
-"""Factor by which eq. 4.12 as printed differs from c = beta / pi: it is (1/4) beta / (2 pi)."""
+"""Ratio of c in eq. 4.12 as printed, (1/4) beta / (2 pi), to beta / pi."""
 
 
 @ti.func
@@ -37,21 +37,21 @@ def tilt(axis, arm, height, rest_angle, weight):
     rise = axis.dot(arm)
     across = arm - axis * rise
     distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
-    # As a variable: inside a vector's expression, Taichi would evaluate the real function once per component.
+    # A variable, because inside a vector expression Taichi would call atan2 once for each component.
     angle = atan2(rise - height, distance)
     return across * (weight * (angle - rest_angle) / distance)
 
 
 @ti.func
 def tilted_normal(axis, rotation):
-    """Rotate the unit vector `axis` away from `rotation` by an angle of its length."""
+    """Return the unit vector `axis`, rotated away from the vector `rotation` by an angle of its length."""
     angle = ti.sqrt(rotation.dot(rotation))
     cosine, sine = cos_sin(angle)
     return axis * cosine - rotation * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
 
 
 def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """For each of `rings.neighbours`: beta / pi, and the angle above the plane at rest, (s,)."""
+    """beta / pi and the angle above the plane at rest, for each row of `rings.neighbours`, (s,) each."""
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges[edge]]
@@ -77,7 +77,7 @@ def _angle_about(axis: Floats, one: Floats, other: Floats) -> Floats:
 
 
 def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -> Bonds:
-    """Ring rows: a particle; its c (times `factor`) and its angle above the plane at rest."""
+    """Return the bonds of a mesh. A ring row has a particle, its c times `factor`, and its angle at rest."""
     rings = require_tets(mesh, material, "tilted_plane")
     edge, vertex = rings.neighbours
     fraction, rest_angle = tilt_rows(rings)

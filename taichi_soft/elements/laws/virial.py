@@ -1,9 +1,9 @@
 """Vertex forces from stress by the virial theorem (thesis section 6.3).
 
-sigma = 1/V sum x f^T (eq. 6.16 without its factor 2, which cancels against the kinetic energy) is
-solved for the forces that cause the deformation: [f1 f2 f3] = V sigma B^-T. V B^-T is the cofactor matrix of
-B over 6, so there is no division and a flat tetrahedron is not a special case. The material responds with -f.
-With the printed factor 2, forces are twice as large: a `Material` with twice Young's modulus has them.
+The equation sigma = 1/V sum x f^T (eq. 6.16 without its factor 2, which cancels against the kinetic energy)
+is solved for the forces that cause the deformation: [f1 f2 f3] = V sigma B^-T. V B^-T is the cofactor matrix
+of B divided by 6, so the law needs no division and a flat tetrahedron is no special case. The material
+responds with -f. With the printed factor 2, forces are twice as large: double Young's modulus to get these.
 """
 
 from taichi_soft.core.math.tensors import cofactor, times

@@ -1,9 +1,9 @@
-"""Springs that keep the volume of their tetrahedra (thesis chapter 5).
+"""Springs with additional forces that preserve the volume of tetrahedra (thesis chapter 5).
 
-Besides the springs, each tetrahedron that has expanded by dV pulls the ends of its six edges together with
-the pressure E nu dV / V0 times the total area a of the edge (eq. 5.5 with its sign reversed: as printed, an
-expanded tetrahedron pushes them apart, and its volume diverges). A `Material` with Poisson's ratio -nu has
-the printed forces, because the springs have no ratio.
+In addition to the springs, a tetrahedron that has expanded by dV pulls the ends of each of its six edges
+together, with the pressure E nu dV / V0 times the total area a of the edge. This is eq. 5.5 with its sign
+reversed: as printed, an expanded tetrahedron pushes the ends apart, and its volume diverges. For the printed
+forces, use Poisson's ratio -nu, which does not affect the springs.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 def expansion(x0, x1, x2, x3, inverse_volume6):
     """Expansion dV / V0 of a tetrahedron (eq. 5.4).
 
-    An inverted tetrahedron has a volume too, and is at rest as its mirror image. With the signed volume it
-    would push its edges apart, lose more of it, and diverge.
+    V is the absolute volume, so a tetrahedron is also at rest as its mirror image. With the signed volume, an
+    inverted tetrahedron would push the ends of its edges apart, invert further, and diverge.
     Args:
         inverse_volume6: 1 / (6 V0) [1/m^3].
     """
@@ -41,7 +41,7 @@ def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
 
 
 def volume_spring_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Springs of eq. 5.2, with the area a of the edge; each ring row is a tetrahedron."""
+    """Return the springs of eq. 5.2, with the area a of each edge. A ring row is a tetrahedron."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError("law 'volume_springs' needs tetrahedra and a Material")
     rings = EdgeRings.of(mesh)

@@ -1,4 +1,4 @@
-"""Materials of bodies: numbers only, no Taichi."""
+"""Materials of bodies: constants only, independent of Taichi."""
 
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
@@ -7,7 +7,7 @@ from taichi_soft.elements.materials.spring_constants import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
 AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
-"""Any material of a body."""
+"""Material of any kind."""
 
 __all__ = [
     "CONSTANTS",

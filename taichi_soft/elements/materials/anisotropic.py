@@ -31,15 +31,15 @@ from taichi_soft.elements.materials.stiffness import Stiffness, rotate_stiffness
 @serialised("stiffness", "density", "damping", "frame", "damping_ratio")
 @dataclass(frozen=True, eq=False)
 class AnisotropicMaterial:
-    """A linearly elastic, damped material whose stiffness depends on the direction.
+    """A linearly elastic, damped material whose stiffness depends on direction.
 
     Args:
-        stiffness: stiffness in the material's axes: a `Stiffness`, or a sequence of one per tetrahedron.
+        stiffness: stiffness in the material's axes: a `Stiffness`, or a sequence with one per tetrahedron.
         density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
         damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
         frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
-            (x, y, z, w) for the body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
-            `frames_along` returns. None: the axes of the mesh.
+            (x, y, z, w) for the body, or one per tetrahedron, (m, 3, 3) or (m, 4), for example from
+            `frames_along`. None: the axes of the mesh.
         damping_ratio: as for `Material`.
     Raises: MaterialError or OptionError with the first value out of range.
     """
@@ -73,17 +73,17 @@ class AnisotropicMaterial:
         require_one_length(given, "tetrahedron")
 
     def per_tet(self, name: str, tet_count: int) -> Array:
-        """`density` or `damping` of each of `tet_count` tetrahedra.
+        """Return `density` or `damping` of each of `tet_count` tetrahedra, (tet_count,).
 
         Args:
             name: "density" or "damping".
             tet_count: number of tetrahedra.
-        Raises: MaterialError if it is an array of another length.
+        Raises: MaterialError if the constant is an array of another length.
         """
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def require_count(self, tet_count: int) -> None:
-        """Check that constants and frame have values for a number of tetrahedra.
+        """Check that the constants and the frame fit a number of tetrahedra.
 
         Args:
             tet_count: number of tetrahedra.
@@ -105,7 +105,7 @@ class AnisotropicMaterial:
         """Return the material of a subset of the tetrahedra.
 
         Args:
-            rows: numbers of the tetrahedra, (k,).
+            rows: indices of the tetrahedra, (k,).
         """
         lists = {"density": 1, "damping": 1, "frame": 3}
         given = {
@@ -117,7 +117,7 @@ class AnisotropicMaterial:
         return replace(self, **lists_of_rows)
 
     def stiffness_matrices(self, tet_count: int) -> Array:
-        """Stiffness of each tetrahedron in the axes of the mesh, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+        """Return the stiffness of each tetrahedron in the mesh's axes, (m, 6, 6) [Pa], as `Stiffness.matrix`.
 
         Args:
             tet_count: number of tetrahedra m.
@@ -131,11 +131,12 @@ class AnisotropicMaterial:
 
 
 def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
-    """Return frames whose first axis points along each direction: for fibres, with `Stiffness.one_axis`.
+    """Return a frame for each direction whose first axis points along it, for fibres.
 
     Args:
-        directions: (m, 3), of any length but zero.
-    Returns: rotation matrices, (m, 3, 3). Their other two axes are as close to those of the mesh as possible.
+        directions: directions of the fibres, (m, 3), of any length except zero.
+    Returns: rotation matrices, (m, 3, 3), with the smallest possible angles. Use them for the `frame` of an
+        `AnisotropicMaterial` with `Stiffness.one_axis`.
     Raises: MaterialError for a direction that is zero.
     """
     rows = as_array(directions, "directions", (None, 3))
@@ -144,7 +145,7 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
         where = f" {int(lengths.argmin())} is zero" if len(rows) else " are missing"
         raise MaterialError(f"directions{where}: pass the fibre's direction in every tetrahedron")
     along = rows / lengths[:, None]
-    # The shortest rotation that maps x there; for the opposite direction half a turn about z.
+    # The smallest rotation that maps x to the direction; half a turn about z maps it to -x.
     frames = np.empty((len(rows), 3, 3))
     cosine = along[:, 0]
     axis = np.cross([1.0, 0.0, 0.0], along)
@@ -169,7 +170,7 @@ def _one_per_tet(values: Any) -> tuple[Stiffness, ...]:
 
 
 def _frame(value: Any) -> Array:
-    """One rotation (3, 3), or one per tetrahedron (m, 3, 3), read-only."""
+    """Check a frame. Return one rotation (3, 3), or one per tetrahedron (m, 3, 3), read-only."""
     if value is None or to_array(value, "frame").shape in ((4,), (3, 3)):
         frame: Array = as_rotation(value).copy()
     else:

@@ -1,4 +1,4 @@
-"""Constants with one number for a body or one per element."""
+"""Constants of materials: one number for a body, or one per element."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from taichi_soft.core.errors import MaterialError
 Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 1e-9, 1e20
-"""Range of constants: beyond it, forces or accelerations overflow float32."""
+"""Range of valid constants: outside it, forces or accelerations overflow float32."""
 
 MAX_DAMPING_RATIO = 1000.0
-"""Far above the damping that a substep can apply: larger ratios have no further effect."""
+"""Largest damping ratio, far above the damping that a substep can apply: more has no further effect."""
 
 POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
 
 
 def is_positive(x: Array) -> NDArray[np.bool_]:
-    """True for values above 0 and in the range of constants."""
+    """True for values that are positive and in the range of valid constants."""
     return np.asarray((x >= SMALLEST) & (x < LARGEST))
 
 
 def is_damping(x: Array) -> NDArray[np.bool_]:
-    """True for values of 0 or more and in the range of constants."""
+    """True for values from 0 to the largest valid constant."""
     return np.asarray((x >= 0) & (x < LARGEST))
 
 
 def as_ratio(given: Any) -> float:
-    """Check a damping ratio. Raises: MaterialError."""
+    """Check a damping ratio and return it as a float. Raises: MaterialError."""
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, float, np.integer, np.floating)):
         raise MaterialError(f"damping_ratio must be one number for the body, got {given!r}")
     if not 0.0 <= given <= MAX_DAMPING_RATIO:
@@ -46,7 +46,10 @@ def as_ratio(given: Any) -> float:
 def as_constant(
     given: Any, name: str, element: str, is_valid: Callable[[Array], Any], range_text: str
 ) -> float | Array:
-    """Return a number, or a read-only array of one per `element`. Raises: MaterialError with a bad one."""
+    """Check a constant and return it as a float, or as a read-only array with a number per `element`.
+
+    Raises: MaterialError with the first invalid value.
+    """
     try:
         if np.asarray(given).dtype.kind not in "iuf":
             raise TypeError
@@ -75,7 +78,7 @@ def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
 
 
 def described(material: Any) -> str:
-    """`repr` of a material: numbers as they are, arrays by their length and range."""
+    """Return the `repr` of a material, with the length and range of arrays."""
     given = {each.name: getattr(material, each.name) for each in fields(material)}
     texts = [f"{name}={_text(value)}" for name, value in given.items() if value is not None]
     return f"{type(material).__name__}({', '.join(texts)})"
@@ -92,7 +95,7 @@ def _text(value: Any) -> str:
 
 
 def require_one_length(given: dict[str, Any], element: str) -> None:
-    """Check that constants have values for the same number of elements. Raises: MaterialError."""
+    """Check that all arrays among the constants have the same length. Raises: MaterialError."""
     lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
     if len(set(lengths.values())) > 1:
         raise MaterialError(f"arrays of different lengths {lengths}: pass one value per {element} in each")

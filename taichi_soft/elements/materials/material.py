@@ -25,13 +25,13 @@ from taichi_soft.elements.materials.element_values import (
 )
 
 DAMPING_RATIO = 0.05
-"""Default damping ratio of a body's first mode: a tenth of the amplitude is left after seven oscillations."""
+"""Default damping ratio of a body's first mode: a tenth of the amplitude remains after seven oscillations."""
 
 CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping")
 
 
 def isotropic_stiffness(lame_lambda: Array, lame_mu: Array) -> Array:
-    """Stiffness from Lame's constants (m,) [Pa], (m, 6, 6) [Pa], as `Stiffness.matrix`."""
+    """Return stiffness matrices, (m, 6, 6) [Pa], as `Stiffness.matrix`, from Lame's constants, (m,) [Pa]."""
     matrices = np.zeros((len(lame_mu), 6, 6))
     matrices[:, :3, :3] = lame_lambda[:, None, None]
     matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
@@ -48,14 +48,16 @@ class Material:
         young: Young's modulus E [Pa], above 0.
         poisson: Poisson's ratio nu, above -1 and below 0.5.
         density: mass per volume [kg/m^3], above 0.
-        damping: b of thesis eq. 3.9 [N s/m], for each edge, 0 or more. An array is averaged over the
-            tetrahedra that share an edge.
-        shear_modulus: G [Pa] for the laws of chapter 4, where it is independent; None: E / (2 (1 + nu)).
+        damping: damping constant b of each edge, thesis eq. 3.9 [N s/m], 0 or more. An edge has the mean of
+            the values of its tetrahedra.
+        shear_modulus: shear modulus G [Pa] for the laws of chapter 4, which allow any value; None:
+            E / (2 (1 + nu)).
         damping_ratio: damping ratio of the slowest vibration of a free body: 0 is undamped, 0.05 leaves a
             tenth of the amplitude after seven oscillations, 1 returns without oscillating. All vibrations
-            decay at the same rate, and rigid motion does not. It never needs more substeps. `damping` is
-            added to it.
-        shear_damping: b_m of eq. 4.5 [N s/m] for the same laws, across the edges; None: `damping`.
+            decay at the same rate; rigid motion is not damped. It never needs more substeps. `damping` acts
+            in addition.
+        shear_damping: damping b_m across the edges, eq. 4.5 [N s/m], for the laws of chapter 4; None:
+            `damping`.
     Raises: MaterialError with the first value out of range.
     Example:
         rubber = Material(young=1e6, poisson=0.45, density=1100, damping_ratio=0.1)
@@ -118,13 +120,13 @@ class Material:
         """Return the material of a subset of the tetrahedra.
 
         Args:
-            rows: numbers of the tetrahedra, (k,).
+            rows: indices of the tetrahedra, (k,).
         """
         given = {name: getattr(self, name) for name in CONSTANTS}
         return replace(self, **{name: value[rows] for name, value in given.items() if np.ndim(value) == 1})
 
     def stiffness_matrices(self, tet_count: int) -> Array:
-        """Stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+        """Return the stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`.
 
         Args:
             tet_count: number of tetrahedra m.

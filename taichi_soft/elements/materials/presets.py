@@ -1,9 +1,9 @@
-"""Named materials with rounded textbook values: a start, not a measurement.
+"""Named materials with rounded textbook values, as a starting point.
 
-Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
-gelatine from the stiff end of its usual range of 1 to 100 kPa (with the thesis's law and tolerant flips, a
-fall from several metres dents it permanently); damping ratios are half of usual loss factors at a few hertz,
-rounded; `thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
+Moduli and densities are from M. F. Ashby, Materials Selection in Mechanical Design (property tables). The
+modulus of gelatine is at the stiff end of the usual range of 1 to 100 kPa; with the thesis's law and tolerant
+flips, a fall from several metres still dents it permanently. Damping ratios are half the usual loss factors
+at a few hertz, rounded. `thesis_sphere` is from thesis section 6.6 and has only its damping of edges.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def preset(name: PresetName) -> Material:
 
     Args:
         name: one of `PRESETS`, such as "gelatine".
-    Raises: OptionError with the available names.
+    Raises: OptionError, with the available names, for an unknown name.
     """
     if not isinstance(name, str) or name not in PRESETS:
         raise OptionError(f"unknown material {name!r}: {choose_one_of(PRESETS, name)}")

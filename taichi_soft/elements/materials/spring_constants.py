@@ -24,20 +24,20 @@ from taichi_soft.elements.materials.element_values import (
 
 
 def _is_stiffness(x: Array) -> NDArray[np.bool_]:
-    """True for 0, and for values in the range of constants."""
+    """True for 0, and for positive values in the range of valid constants."""
     return np.asarray((x == 0) | is_positive(x))
 
 
 @serialised("stiffness", "damping", "rest_length")
 @dataclass(frozen=True, eq=False)
 class SpringMaterial:
-    """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per row of `mesh.edges`.
+    """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per edge of the mesh.
 
     Args:
-        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge with 0 has
-            only its damping.
-        damping: b of eq. 3.9 [N s/m], 0 or more.
-        rest_length: l of eq. 3.8 [m], above 0; None: the lengths in the mesh.
+        stiffness: stiffness k, thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. With 0, an
+            edge has only damping.
+        damping: damping constant b, eq. 3.9 [N s/m], 0 or more.
+        rest_length: length at rest l, eq. 3.8 [m], above 0; None: the lengths in the mesh.
     Raises: MaterialError with the first value out of range, or if no edge has any stiffness.
     """
 
@@ -65,11 +65,11 @@ class SpringMaterial:
     def from_young(
         cls, young: float, area: ArrayLike, lengths: ArrayLike, damping: float | Array = 0.0
     ) -> SpringMaterial:
-        """Make springs as stiff as bars: k = E a / l (eq. 5.1).
+        """Return springs with the stiffness of bars: k = E a / l (eq. 5.1).
 
         Args:
             young: Young's modulus E [Pa].
-            area: cross-section a of each bar, or of all [m^2].
+            area: cross-section a [m^2]: one number, or one per bar.
             lengths: lengths at rest [m], such as `mesh.edge_lengths`.
             damping: b [N s/m].
         Raises: MaterialError for a number that is not positive or for arrays of different lengths.
@@ -90,13 +90,13 @@ class SpringMaterial:
         return cls(stiffness if stiffness.ndim else float(stiffness), damping, l if l.ndim else float(l))
 
     def per_edge(self, name: str, edge_count: int, default: Array | None = None) -> Array:
-        """Return one value of a constant for each of `edge_count` edges; `default` if it is None.
+        """Return one value of a constant for each of `edge_count` edges; `default` if the constant is None.
 
         Args:
             name: "stiffness", "damping" or "rest_length".
             edge_count: number of edges.
             default: value of each edge, (edge_count,), for a constant that is None.
-        Raises: MaterialError if it is an array of another length.
+        Raises: MaterialError if the constant is an array of another length.
         """
         given = getattr(self, name)
         return spread(default if given is None else given, name, "edges", edge_count)  # type: ignore[arg-type]

@@ -1,8 +1,8 @@
 """Stiffness of a linear material, which can be anisotropic (thesis 2.3 and 2.4, eq. 2.25).
 
-A 6x6 matrix maps strain to stress in Voigt's order xx, yy, zz, yz, xz, xy, with engineering shear
-gamma_xy = 2 eps_xy: it is then symmetric, and so are its inverses and sums. The thesis's order is xx, yy,
-zz, xy, xz, yz with tensor shear; `Stiffness.from_thesis` converts it.
+A 6x6 matrix maps strain to stress in Voigt's order xx, yy, zz, yz, xz, xy. With engineering shear,
+gamma_xy = 2 eps_xy, the matrix is symmetric. The thesis uses the order xx, yy, zz, xy, xz, yz and tensor
+shear; `Stiffness.from_thesis` converts from it.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 """Axes of each of Voigt's six components."""
 
 ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
-"""Entries that one plane of symmetry leaves: yz and xz, which it mirrors, couple only with each other."""
+"""Entries that can be non-zero with one plane of symmetry, xy: yz and xz couple only with each other."""
 
 THESIS_ORDER = (0, 1, 2, 5, 4, 3)
-"""Positions of Voigt's components in the thesis: its fourth is xy, its sixth yz."""
+"""Position of each of Voigt's components in the thesis's order, whose fourth is xy and sixth yz."""
 
 
 def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
-    """Check Poisson's ratio, strictly between -1 and `high`. Raises: OptionError."""
+    """Check that a Poisson's ratio is strictly between -1 and `high`, and return it. Raises: OptionError."""
     return as_number(value, name, np.nextafter(-1, 0), np.nextafter(high, 0), f"above -1 and below {high:g}")
 
 
 def rotate_stiffness(matrix: Floats, rotations: Floats) -> Floats:
-    """Rotate a stiffness (6, 6) by `rotations` (m, 3, 3) of the material, (m, 6, 6).
+    """Return the stiffness (6, 6) of a material after each of `rotations` (m, 3, 3), (m, 6, 6).
 
-    With the matrix K that rotates stress in Voigt's order, it is K C K^T (Bond 1943).
+    The result is K C K^T with the matrix K that rotates stress in Voigt's order (Bond 1943).
     """
     first, second = np.array(PAIRS).T
     R = rotations
-    # Stress rotates as R s R^T, and components off the diagonal occur twice in it.
+    # Stress rotates as R s R^T, in which components off the diagonal occur twice.
     K = R[:, first[:, None], first] * R[:, second[:, None], second]
     K[:, :, 3:] += (R[:, first[:, None], second] * R[:, second[:, None], first])[:, :, 3:]
     return np.asarray(K @ matrix @ np.swapaxes(K, 1, 2))
 
 
 def voigt_stress(matrices: Floats, strain: Floats) -> Floats:
-    """Stress (m, 3, 3) [Pa] of strain (m, 3, 3) by stiffness (m, 6, 6) in Voigt's order."""
+    """Return the stress (m, 3, 3) [Pa] for strain (m, 3, 3) and stiffness (m, 6, 6) [Pa] in Voigt's order."""
     first, second = np.array(PAIRS).T
     rows = strain[:, first, second] * np.array([1, 1, 1, 2, 2, 2])
     stress = np.empty_like(strain)
@@ -63,9 +63,9 @@ class Stiffness:
     """A symmetric, positive definite stiffness in the axes of its material.
 
     Args:
-        matrix: (6, 6) [Pa], Voigt's order, engineering shear.
-    Raises: MaterialError if it is not symmetric to 1e-6 of its largest entry, or not positive definite (with
-        the smallest eigenvalue).
+        matrix: (6, 6) [Pa], in Voigt's order with engineering shear.
+    Raises: MaterialError if the matrix is not symmetric to 1e-6 of its largest entry, or not positive
+        definite.
     """
 
     matrix: Floats
@@ -99,7 +99,7 @@ class Stiffness:
 
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
-        """Make an isotropic stiffness: 2 constants (thesis eq. 2.35).
+        """Return an isotropic stiffness: 2 constants (thesis eq. 2.35).
 
         Args:
             young: Young's modulus [Pa], above 0.
@@ -118,13 +118,14 @@ class Stiffness:
         poisson_across: float,
         shear_along: float,
     ) -> Stiffness:
-        """Make a stiffness with rotational symmetry about x, such as wood's: 5 constants (thesis 2.4.2).
+        """Return a stiffness with rotational symmetry about x, such as wood's: 5 constants (thesis 2.4.2).
 
         Args:
-            young_along, young_across: Young's moduli along x, and across it [Pa].
-            poisson_along: contraction across x under tension along x.
-            poisson_across: contraction across x under tension across x, at right angles to it.
-            shear_along: shear modulus of planes through x [Pa]. The other is E / (2 (1 + nu)) across x.
+            young_along, young_across: Young's moduli along and across x [Pa].
+            poisson_along: Poisson's ratio for tension along x and contraction across x.
+            poisson_across: Poisson's ratio for tension and contraction both across x.
+            shear_along: shear modulus of planes through x [Pa]. The shear modulus of the plane across x is
+                E / (2 (1 + nu)) with the constants across x.
         """
         shear_across = as_positive(young_across, "young_across", "Pa") / (
             2 * (1 + _as_ratio(poisson_across, "poisson_across", 1.0))
@@ -139,11 +140,11 @@ class Stiffness:
     def orthotropic(
         cls, young: Sequence[float], poisson: Sequence[float], shear: Sequence[float]
     ) -> Stiffness:
-        """Make a stiffness with three planes of symmetry at right angles: 9 constants (thesis 2.4.1).
+        """Return a stiffness with three orthogonal planes of symmetry: 9 constants (thesis 2.4.1).
 
         Args:
             young: Young's moduli along x, y, z [Pa].
-            poisson: nu_yz, nu_xz, nu_xy: contraction along the second axis under tension along the first.
+            poisson: nu_yz, nu_xz, nu_xy: tension along the first axis, contraction along the second.
             shear: shear moduli G_yz, G_xz, G_xy [Pa].
         """
         moduli = as_array(young, "young", (3,), "Pa")
@@ -162,11 +163,11 @@ class Stiffness:
 
     @classmethod
     def one_plane(cls, constants: Sequence[float]) -> Stiffness:
-        """Make a stiffness with one plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
+        """Return a stiffness with one plane of symmetry, the xy plane: 13 constants (thesis 2.4.1).
 
         Args:
-            constants: [Pa], the independent entries of the matrix, row by row from the diagonal: c11, c12,
-                c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
+            constants: independent entries of the matrix [Pa], row by row from the diagonal: c11, c12, c13,
+                c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
         """
         values = as_array(constants, "constants", (13,), "Pa")
         matrix = np.zeros((6, 6))
@@ -176,7 +177,7 @@ class Stiffness:
 
     @classmethod
     def from_thesis(cls, matrix: ArrayLike) -> Stiffness:
-        """Convert eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
+        """Convert the matrix of thesis eq. 2.25: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
 
         Args:
             matrix: (6, 6) [Pa].
@@ -186,14 +187,14 @@ class Stiffness:
         return cls(rows)
 
     def to_thesis(self) -> Floats:
-        """Matrix of thesis eq. 2.25, (6, 6) [Pa]: for tensor shear, so in general not symmetric."""
+        """Return the matrix of thesis eq. 2.25, (6, 6) [Pa]: for tensor shear, so in general asymmetric."""
         rows = self.matrix.copy()
         rows[:, 3:] *= 2
         return np.asarray(rows[np.ix_(THESIS_ORDER, THESIS_ORDER)])
 
     @property
     def tensor(self) -> Floats:
-        """c_ijkl of stress_ij = c_ijkl strain_kl, (3, 3, 3, 3) [Pa]."""
+        """Stiffness tensor c_ijkl, with stress_ij = c_ijkl strain_kl, (3, 3, 3, 3) [Pa]."""
         index = np.zeros((3, 3), dtype=int)
         for number, (a, b) in enumerate(PAIRS):
             index[a, b] = index[b, a] = number
@@ -201,9 +202,10 @@ class Stiffness:
 
     @property
     def compliance(self) -> Floats:
-        """Compliance, from stress to strain (thesis eq. 2.23): the inverse of `matrix`, (6, 6) [1/Pa].
+        """Compliance, the inverse of `matrix` (thesis eq. 2.23), (6, 6) [1/Pa].
 
-        It has the same order and engineering shear: its diagonal has 1 / E and 1 / G.
+        It maps stress to strain, in Voigt's order with engineering shear. In an orthotropic material its
+        diagonal contains 1 / E and 1 / G.
         """
         return np.asarray(np.linalg.inv(self.matrix))
 
@@ -216,10 +218,10 @@ class Stiffness:
         return Stiffness(rotate_stiffness(self.matrix, as_rotation(rotation)[None])[0])
 
     def young_along(self, direction: ArrayLike) -> float:
-        """Young's modulus of a bar cut along `direction` [Pa].
+        """Return the Young's modulus of a bar that is cut along `direction` [Pa].
 
         Args:
-            direction: axis of the bar, (3,), of any length but zero.
+            direction: axis of the bar, (3,), of any length except zero.
         """
         n = as_array(direction, "direction", (3,))
         length = float(np.linalg.norm(n))
@@ -227,14 +229,14 @@ class Stiffness:
             raise MaterialError("direction is zero: pass the axis of the bar")
         n = n / length
         pull = np.array([n[a] * n[b] for a, b in PAIRS])
-        strain = np.linalg.solve(self.matrix, pull)  # engineering shear counts both halves of each product
+        strain = np.linalg.solve(self.matrix, pull)  # engineering shear is twice the tensor shear
         return float(1 / (pull @ strain))
 
     def symmetry(self, tolerance: float = 1e-6) -> str:
-        """Narrowest symmetry in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
+        """Return the symmetry in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
 
         Args:
-            tolerance: limit of what counts as zero or equal, relative to the largest entry.
+            tolerance: largest difference that counts as zero, relative to the largest entry.
         """
         c = self.matrix
         small = tolerance * np.abs(c).max()

@@ -1,1 +1,1 @@
-"""Kernels of a world file that replace Python code."""
+"""Kernels that a world file needs in place of Python code."""

@@ -1,1 +1,1 @@
-"""Kernels that pack and hash the state that passes from one step to the next."""
+"""Kernels that pack and hash the state of a world between two steps."""

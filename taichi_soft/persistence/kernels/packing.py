@@ -1,4 +1,4 @@
-"""Pack the state that passes from one step to the next into one array, and unpack it, bit by bit."""
+"""Pack the state of a world between two steps into one array, and unpack it, without loss."""
 
 from collections.abc import Mapping
 
@@ -12,13 +12,15 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
 LONG_GROUP = 256
-"""Rows from which copying a group takes a relevant part of the time of a snapshot."""
+"""Number of rows from which copying a group takes a significant part of a snapshot's time."""
 
 
 def row_table(state: State, counts: Mapping[str, int]) -> NDArray[np.int32]:
-    """Row count, width and start of each group, (groups + 1, 3). The last row marks the end.
+    """Return row count, width and first word of each group, (groups + 1, 3). The last row marks the end.
 
-    Args: counts: number of rows by group.
+    Args:
+        state: fields of the world.
+        counts: number of rows by name of the group.
     """
     rows, at = [], 0
     for name, group in state.kept.items():
@@ -106,7 +108,7 @@ def _mix_two(code, x, y):
 
 @ti.kernel
 def hash_bodies(state: ti.template(), body_count: ti.i32) -> ti.i64:
-    """Hash of the state: status of all slots; positions, velocities and pins of the bodies in them."""
+    """Return a hash of the status of all slots, and of positions, velocities and pins of their bodies."""
     code = ti.u64(1469598103934665603)
     ti.loop_config(serialize=True)
     for body in range(body_count):
