@@ -32,7 +32,7 @@ def say(line: str) -> None:
 
 
 def progress_bar() -> Progress:
-    """Make a progress bar that only a terminal shows."""
+    """Make a progress bar that is visible only on a terminal."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     return Progress(*columns, console=errors, disable=not errors.is_terminal)
 
@@ -59,7 +59,7 @@ def device_facts(device: Device) -> dict[str, Any]:
 
 
 def version_of(name: str) -> str:
-    """Version of an installed package."""
+    """Return the version of an installed package."""
     try:
         return version(name)
     except PackageNotFoundError:
