@@ -6,7 +6,10 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def box_distance(parameters, x):
-    """Signed distance [m] and normal; inside, those of the nearest face. Parameters: half edges (3) [m]."""
+    """Return signed distance [m] and normal; inside the box, the normal of the nearest face.
+
+    Parameters: half of each edge (3) [m].
+    """
     side = ti.Vector([0.0, 0.0, 0.0])
     for i in ti.static(range(3)):
         side[i] = ti.select(x[i] < 0.0, -1.0, 1.0)

@@ -8,9 +8,10 @@ RESTITUTION_SPEED = 0.5
 
 @ti.func
 def resolve_floor(x, v, h, floor):
-    """Position and velocity after contact of a particle that this substep moved to x with velocity v.
+    """Return position and velocity of a particle after contact. In this substep it moved to x with velocity
+    v.
 
-    The impulse acts before the drift, so it shortens the path as well. Otherwise a particle held by friction
+    The impulse acts before the drift, so it also shortens the path. Otherwise a particle held by friction
     would creep.
     Args:
         x: new position [m].

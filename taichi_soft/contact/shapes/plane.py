@@ -41,11 +41,11 @@ class PlaneShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Infinite in all directions, (2, 3)."""
+        """Bounds that are infinite in all directions, (2, 3)."""
         return about_origin((np.inf, np.inf, np.inf))
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, (n,) [m], negative outside.
+        """Return the depth of points below the plane, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].
@@ -54,7 +54,7 @@ class PlaneShape(Shape):
         return depths
 
     def surface(self, size: float = 20.0) -> Triangles:
-        """Return a square about the origin.
+        """Return a square around the origin.
 
         Args:
             size: edge of the square [m]; 20 m by default.

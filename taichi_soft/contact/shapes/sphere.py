@@ -15,10 +15,10 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius")
 @dataclass(frozen=True, eq=False)
 class SphereShape(Shape):
-    """A sphere about the origin.
+    """A sphere centred on the origin.
 
     Args:
-        radius: [m], above 0.
+        radius: radius of the sphere [m], above 0.
     Raises: OptionError for a radius out of range.
     """
 
@@ -33,11 +33,11 @@ class SphereShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]."""
         return about_origin([self.radius] * 3)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, (n,) [m], negative outside.
+        """Return the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
             points: in the frame of the shape, (n, 3) [m].

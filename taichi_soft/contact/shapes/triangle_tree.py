@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from taichi_soft.meshing import spatial_order
 
 FAR_AWAY = 1e15
-"""Coordinate [m] of empty leaves, far from everything; its square fits float32."""
+"""Coordinate [m] of empty leaves, far from everything. Its square fits float32."""
 
 
 def triangle_tree(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
