@@ -120,7 +120,7 @@ class Budget:
             del self._decided[old]
 
     def revert(self) -> None:
-        """Undo the changes of the last `prepare`, because the step after it failed."""
+        """Undo the changes of the last `prepare`, because the step after them was refused."""
         if self._before is not None:
             undo(self._world, self._before)
         step = self._world.step_count

@@ -1,8 +1,8 @@
-"""Errors and warnings. Every message has the value received and what to do."""
+"""Errors and warnings. Every message contains the value received and what to do."""
 
 
 class TaichiSoftError(Exception):
-    """Base of all errors of this package. Its text is always one line."""
+    """Base class of all errors of this package. The text is always one line."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
@@ -45,11 +45,11 @@ class BakeError(TaichiSoftError, OSError):
 
 
 class SlowStepWarning(UserWarning):
-    """A step takes more than 500 substeps. The text names the body, the cause and what to do."""
+    """A step takes more than 500 substeps. The text contains the body, the cause and what to do."""
 
 
 class TooSoftWarning(UserWarning):
-    """A body's pressure on its base exceeds a fifth of its Young's modulus: it collapses."""
+    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that it collapses."""
 
 
 class UnstableStepWarning(UserWarning):
@@ -69,4 +69,4 @@ class SolverWarning(UserWarning):
 
 
 class SkippedCellsWarning(UserWarning):
-    """A mesh file has cells that are not tetrahedra, which the body leaves out."""
+    """A mesh file has cells that are not tetrahedra. The body does not contain them."""
