@@ -118,7 +118,7 @@ class EngineAdapter:
 
     @one_thread
     def step(self) -> None:
-        """Make exactly one fixed step without the accumulator, for replays, tests and servers.
+        """Make exactly one fixed step, independent of frame times, for replays, tests and servers.
 
         Raises: errors of `before_step` and `World.step`. After an error in the step, only the changes of
             `before_step` remain.
@@ -180,7 +180,8 @@ class EngineAdapter:
 
     @property
     def budget_status(self) -> BudgetStatus:
-        """Which bodies have reduced detail or skip steps, and whether the steps fit the budget.
+        """Status of the budget: bodies with reduced detail or skipped steps, and whether steps fit the
+        budget.
 
         Raises: StateError without `budget_ms`.
         """
@@ -200,7 +201,7 @@ class EngineAdapter:
 
     @one_thread
     def rewind(self, steps: int) -> None:
-        """Restore the state from before a step, `steps` steps ago, and before its inputs.
+        """Go back `steps` steps, to the state before the inputs of the first of them.
 
         `alpha` does not change: repeat the steps with `step` and the corrected inputs, and drawing continues
         at the same time.
@@ -244,7 +245,8 @@ class EngineAdapter:
         return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Positions of a body, interpolated between the previous step and the last one, float32 (n, 3) [m].
+        """Read the positions of a body, interpolated between the previous step and the last one, float32
+        (n, 3) [m].
 
         Args:
             body: body of this adapter's world.
@@ -260,8 +262,8 @@ class EngineAdapter:
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Positions [m] and normals, interpolated between the previous and the last step, float32 (k, 3)
-        each.
+        """Read positions [m] and normals of a render mesh, interpolated between the previous step and the
+        last one, float32 (k, 3) each.
 
         Args:
             mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; or a body, for the

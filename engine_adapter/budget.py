@@ -1,4 +1,4 @@
-"""Keep a time budget for the steps of a world with levels of detail and skipped steps."""
+"""Keep a time budget for the steps of a world, by levels of detail and skipped steps."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
-"""Fractions of the budget, for the expected time of a long step: above TIGHT detail is reduced, until it is
-below FULL; detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
+"""Fractions of the budget for the expected time of a long step. Above TIGHT, detail is reduced until the time
+is below FULL. Detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
 
 REMEMBERED = 8
 """Number of recent steps whose median gives the cost of a tetrahedron. The median ignores interrupted
@@ -156,15 +156,15 @@ class Budget:
         self._load = self._tets() - sum(len(body.tets) for body in skipping)
 
     def _tets(self) -> int:
-        """Number of tetrahedra of all bodies."""
+        """Return the number of tetrahedra of all bodies."""
         return sum(len(body.tets) for body in self._world.bodies)
 
     def _expected(self, load: float) -> float:
-        """Expected time of a step with `load` tetrahedra [s]."""
+        """Return the expected time of a step with `load` tetrahedra [s]."""
         return load * median(self._costs) if self._costs else 0.0
 
     def _long(self, load: float) -> float:
-        """Expected time of a long step with `load` tetrahedra [s]."""
+        """Return the expected time of a long step with `load` tetrahedra [s]."""
         longer = LEAST_LONG
         if len(self._spread) >= PATIENCE:
             longer = sorted(self._spread)[int(LONG * len(self._spread))]
@@ -188,7 +188,7 @@ class Budget:
     def _lowered(self, load: float, start: float) -> list[tuple[Body, int]]:
         """Lower the farthest bodies first, by one level each, until a step is expected to fit the budget.
 
-        Sleeping bodies are skipped, because they cost nothing.
+        Sleeping bodies are not lowered, because they take no time.
         """
         if self._waits:
             self._waits -= 1
@@ -227,7 +227,7 @@ class Budget:
         return [body for body in self._world.bodies if 0 <= body.level + change < len(body.asset.levels)]
 
     def _from_near(self, bodies: list[Body]) -> list[Body]:
-        """Sort bodies from the nearest to the farthest, or by slot without a viewer."""
+        """Return bodies sorted from the nearest to the farthest; without a viewer, sorted by slot."""
         if self._viewer is None:
             return sorted(bodies, key=lambda body: body.index)
         apart = [float(np.linalg.norm(body.center_of_mass() - self._viewer)) for body in bodies]

@@ -1,4 +1,4 @@
-"""Convert frames of any length to fixed steps."""
+"""Convert frame times of any length to fixed steps."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Accumulator:
 
     @property
     def alpha(self) -> float:
-        """`remainder` over dt, at least 0 and below 1."""
+        """Return `remainder` over dt, at least 0 and below 1."""
         return max(self.remainder / self._dt, 0.0)
 
     def put(self, frame_dt: float) -> tuple[int, float]:

@@ -152,12 +152,12 @@ class RollbackSession:
 
     @property
     def rollbacks(self) -> int:
-        """Number of rewinds so far."""
+        """Number of rewinds that this session has made."""
         return self._rollbacks
 
     @property
     def longest_rewind(self) -> int:
-        """Largest number of ticks that one rewind went back."""
+        """Largest number of ticks of a single rewind."""
         return self._longest_rewind
 
     def advance(self, own_input: bytes) -> bool:
@@ -252,7 +252,7 @@ class RollbackSession:
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 
     def _read(self, data: bytes) -> _Message:
-        """Parse and check a message. Raises: SessionError."""
+        """Parse a message and check it. Raises: SessionError for an invalid message."""
         body = HEAD.size + 4 * self._players
         if not isinstance(data, (bytes, bytearray)) or len(data) < body or data[:4] != MARK:
             raise SessionError("these bytes are not a message of a session of this version")
@@ -286,7 +286,7 @@ class RollbackSession:
         return message
 
     def _require_order(self, message: _Message) -> None:
-        """Check that a message agrees with earlier ones. Raises: SessionError."""
+        """Check that a message agrees with earlier messages. Raises: SessionError if it does not."""
         who, known = f"player {message.player}", self._inputs[message.player]
         due = self._heard[message.player]
         if message.first > due:
@@ -311,7 +311,9 @@ class RollbackSession:
         self._heard[player] += 1
 
     def _make_tick(self) -> None:
-        """Save the state, apply known or predicted inputs, and make a step. An error changes nothing."""
+        """Save the state, apply known or predicted inputs, and make a step. After an error, nothing is
+        changed.
+        """
         tick = self._world.step_count
         self._rollback.save()
         if tick % self._hash_every == 0:

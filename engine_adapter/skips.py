@@ -18,7 +18,7 @@ LOOK_AGAIN = 8
 
 @dataclass(frozen=True)
 class _Island:
-    """Connected bodies, which skip a step together."""
+    """A group of connected bodies, which always skip a step together."""
 
     bodies: tuple[Body, ...]
     tets: int
@@ -31,7 +31,10 @@ class Skips:
     """
 
     def __init__(self, world: World, from_near: Callable[[list[Body]], list[Body]]) -> None:
-        """Args: from_near: sorts bodies by distance, nearest first."""
+        """Start without skipping.
+
+        Args: from_near: function that sorts bodies by distance, nearest first.
+        """
         self.slow: tuple[Body, ...] = ()  # bodies that currently skip steps, the farthest first
         self._world, self._from_near = world, from_near
         self._islands: list[_Island] = []  # islands that can skip, the farthest first

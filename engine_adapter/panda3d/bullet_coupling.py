@@ -36,7 +36,7 @@ class _Rigid:
         return bool(node.get_mass() > 0.0 and not node.is_kinematic())
 
     def push(self) -> None:
-        """Apply the impulses that its colliders received in the last step to Bullet's body."""
+        """Apply to Bullet's body the impulses that its colliders received in the last step."""
         now = self._impulses()
         if self.is_pushed:
             # Bullet receives impulses one step late. Adding half of the impulse now, and subtracting it in

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from panda3d import core
 
 _UNSET = np.full(3, 102 / 255)
-"""The grey that trimesh assigns to a material without a colour."""
+"""Grey that trimesh assigns to a material without a colour."""
 
 _textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material, for all bodies of an asset
 

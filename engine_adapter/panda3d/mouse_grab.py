@@ -57,7 +57,7 @@ class MouseGrab:
 
     @property
     def grab(self) -> Grab | None:
-        """Current grab; None if there is none or the body was removed."""
+        """Current grab; None without a grab, or after its body was removed."""
         if self._grab is not None and not self._grab.is_held:
             self._grab = None
         return self._grab

@@ -60,7 +60,7 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
         return self._meshes
 
     def draw(self) -> None:
-        """Update the buffers with positions interpolated by `EngineAdapter.alpha`.
+        """Fill the buffers with positions interpolated by `EngineAdapter.alpha`.
 
         Raises: as `EngineAdapter.render_mesh`.
         """
@@ -78,7 +78,7 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
             geom.set_bounds(_box_round(positions))
 
     def _make(self) -> None:
-        """Make buffers for the body's current meshes."""
+        """Make buffers for the current meshes of the body."""
         skins: tuple[RenderMesh, ...] = self._body.render_meshes
         self._meshes = skins or (self._body.render_mesh(crease=self._crease),)
         self.node().remove_all_geoms()
