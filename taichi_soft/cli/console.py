@@ -1,4 +1,4 @@
-"""Terminal output, options and device information that all commands share."""
+"""Functions of all commands for terminal output, options and device information."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def progress_bar() -> Progress:
 def filming(name: str) -> Iterator[Callable[[int, int], None]]:
     """Show the progress of a film and of compilation: a bar on a terminal, one line elsewhere.
 
-    Yields a function of (frames made, total frames).
+    Yields: a function to call with (frames made, total frames).
     """
     if not errors.is_terminal:
         say(f"filming {escape(name)}")

@@ -36,7 +36,7 @@ SECONDS = 5.0
 """Default length of a film whose scene is not a Stage [s]."""
 
 DROP = 0.5
-"""Drop height [height of the mesh]."""
+"""Drop height, over the height of the mesh."""
 
 
 def film(

@@ -26,7 +26,7 @@ def info(
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print device, versions, laws and materials."""
+    """Print the device, versions, laws and materials."""
     from taichi_soft.elements.laws import LAWS
     from taichi_soft.elements.materials import PRESETS
     from taichi_soft.profiling.baseline import find_compiler

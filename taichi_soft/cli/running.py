@@ -32,7 +32,7 @@ def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
 
 
 def run_app(app: typer.Typer, *arguments: str) -> None:
-    """Run a command. A TaichiSoftError prints one line and exits with 1, a wrong option with 2.
+    """Run a command. A TaichiSoftError is printed as one line, with exit code 1; a wrong option exits with 2.
 
     Args:
         app: result of `make_app`.
