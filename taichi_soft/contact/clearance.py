@@ -24,7 +24,7 @@ neighbours."""
 def require_clear(
     colliders: Sequence[Collider], asset: SoftBodyAsset, points: NDArray[np.float64], name: str
 ) -> None:
-    """Check that a body starts outside of all colliders that it touches, or only slightly inside.
+    """Check that a body starts outside of all colliders that it can touch, or only slightly inside.
 
     Args:
         points: vertices of the body that are not pinned, (n, 3) [m].

@@ -43,7 +43,7 @@ class ColliderRow:
 
     @property
     def skin(self) -> float:
-        """Distance outside the shape at which bodies touch it [m]."""
+        """Distance outside the shape at which contact begins, with the additional skin of the shape [m]."""
         return self.thickness + self.shape.seam
 
     @property

@@ -89,7 +89,7 @@ def _depth(body: Placed, other: Placed) -> float:
 
 
 def _is_inside(points: Floats, corners: Floats) -> NDArray[np.bool_]:
-    """True for points from which a ray leaves a closed surface more often than it enters it."""
+    """Return True for each point from which a ray leaves a closed surface more often than it enters it."""
     seen = corners @ RAY.T - (points @ RAY.T)[:, None, None]
     x, y, z = np.moveaxis(seen, -1, 0)
     areas = np.roll(x, -1, axis=-1) * np.roll(y, -2, axis=-1) - np.roll(x, -2, axis=-1) * np.roll(

@@ -1,4 +1,4 @@
-"""A box about the origin, with edges along the axes."""
+"""A box centred on the origin, with edges along the axes."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti

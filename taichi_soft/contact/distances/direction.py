@@ -1,4 +1,4 @@
-"""Unit vectors with a fallback for zero length."""
+"""Direction and length of a vector, with a fallback direction for zero length."""
 
 from taichi_soft.core.runtime import ti
 

@@ -3,7 +3,7 @@
 from taichi_soft.core.runtime import ti
 
 RESTITUTION_SPEED = 0.5
-"""Impact speed [m/s] below which nothing bounces, so that resting bodies come to rest."""
+"""Impact speed [m/s] below which bodies do not bounce, so that they come to rest."""
 
 
 @ti.func

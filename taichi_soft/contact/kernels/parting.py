@@ -278,7 +278,7 @@ def _part_pair(soft: ti.template(), a, b, gravity, dt):
 def _shift_beside_colliders(
     state: ti.template(), body: ti.i32, shift: ti.math.vec3, dt: ti.f32
 ) -> ti.math.vec3:
-    """Reduce a displacement [m] so that it moves no particle of a body deeper into a collider."""
+    """Reduce the displacement of a body [m] so that none of its particles moves deeper into a collider."""
     s = shift
     for c in range(state.colliders.count[None]):
         mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]

@@ -33,7 +33,7 @@ def begin_rebounds(state: ti.template(), body):
 
 @ti.func
 def restore_rebounds(state: ti.template(), body):
-    """Restore the rebound speeds before a step is retried."""
+    """Restore the rebound speeds of a body before its step is retried."""
     row = body * state.colliders.capacity.colliders
     while row < (body + 1) * state.colliders.capacity.colliders:
         state.colliders.rebound[row] = state.colliders.prev_rebound[row]

@@ -1,4 +1,6 @@
-"""Velocity of a particle after contact: inelastic or with restitution, and with Coulomb friction."""
+"""Compute the velocity of a particle after contact, inelastic or with restitution, and with Coulomb
+friction.
+"""
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.core.runtime import ti

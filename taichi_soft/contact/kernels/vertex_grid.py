@@ -1,4 +1,4 @@
-"""A grid of the vertices of one body that can be near another.
+"""Sort the vertices of one body that can be near another body into a grid.
 
 Groups of fields: reads hull; writes soft.
 """

@@ -1,4 +1,4 @@
-"""A box."""
+"""The shape of a box."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class BoxShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return two triangles per face."""
+        """Return the triangles of the box, two per face."""
         import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.box(np.asarray(self.size)))

@@ -1,4 +1,4 @@
-"""A capsule: a cylinder with round caps."""
+"""The shape of a capsule: a cylinder with round caps."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class CapsuleShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return triangles whose vertices lie on the capsule."""
+        """Return triangles that approximate the capsule. Their vertices lie on it."""
         import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.capsule(self.length, self.radius, count=(32, 32)))

@@ -20,7 +20,7 @@ FLATTEST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ClosedMesh:
-    """Triangles that separate inside from outside."""
+    """A closed surface of triangles, which separates inside from outside."""
 
     vertices: FloatArray  # (n, 3) [m], all different
     triangles: IntArray  # (f, 3), counterclockwise seen from outside

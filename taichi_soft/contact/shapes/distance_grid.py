@@ -1,4 +1,4 @@
-"""The signed distance of a closed mesh on a grid around it."""
+"""Compute the signed distance of a closed mesh on a grid around it."""
 
 from __future__ import annotations
 

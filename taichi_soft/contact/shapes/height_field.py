@@ -1,4 +1,4 @@
-"""Ground given by heights on a grid."""
+"""The shape of ground that is given by heights on a grid."""
 
 from __future__ import annotations
 

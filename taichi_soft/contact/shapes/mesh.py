@@ -1,4 +1,4 @@
-"""A solid inside a closed triangle mesh."""
+"""The shape of the solid inside a closed triangle mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An infinite plane."""
+"""The shape of an infinite plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base class of all shapes."""
+"""Base class of all shapes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ shape than rounding errors, and cannot slip into the joint."""
 
 
 class Shape(ABC):
-    """An immutable solid in its own frame. Abstract: use `SphereShape` and the other shapes."""
+    """An immutable solid in its own frame. This class is abstract: use `SphereShape` or another shape."""
 
     kind: ClassVar[ShapeKind]
     seam: ClassVar[float] = 0.0

@@ -15,7 +15,7 @@ def triangle_tree(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], ND
     """Return the triangles (f, 3, 3) in the order of the leaves, and the boxes.
 
     Boxes are lower and upper corners, (2 n, 6), with n a power of two. Box 1 is the root, the children of i
-    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 hold one triangle each or none.
+    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 contain one triangle or none.
     """
     ordered = corners[spatial_order(corners.mean(axis=1))]
     count = 1 << (len(ordered) - 1).bit_length()
