@@ -1,4 +1,4 @@
-"""Checks of arguments of the public interface, made before anything is changed."""
+"""Check arguments of the public interface before anything is changed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def as_number(value: Any, name: str, low: float, high: float, text: str = "") ->
 
 
 def as_positive(value: Any, name: str, unit: str) -> float:
-    """Convert `value` to a float above 0. Raises: OptionError."""
+    """Convert `value` to a float above 0. Raises: OptionError for other values."""
     number = as_number(value, name, 0.0, np.inf, f"a number above 0 {unit}")
     if number == 0.0:
         raise OptionError(f"{name} must be a number above 0 {unit}, got 0")

@@ -1,4 +1,4 @@
-"""CPU cores, and binding threads to them on Linux."""
+"""List CPU cores, and bind threads to them on Linux."""
 
 from __future__ import annotations
 

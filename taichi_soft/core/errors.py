@@ -53,7 +53,7 @@ class TooSoftWarning(UserWarning):
 
 
 class UnstableStepWarning(UserWarning):
-    """The substep is longer than the estimated stable step."""
+    """The substep is longer than the estimated largest stable substep."""
 
 
 class FrozenBodyWarning(UserWarning):
@@ -61,7 +61,7 @@ class FrozenBodyWarning(UserWarning):
 
 
 class DroppedEventsWarning(UserWarning):
-    """Events were dropped, because too many waited for `drain_events`."""
+    """Events were dropped, because too many were waiting for `drain_events`."""
 
 
 class SolverWarning(UserWarning):

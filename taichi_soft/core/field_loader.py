@@ -38,7 +38,7 @@ class Loader:
         self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
 
     def write(self) -> None:
-        """Write all filled fields."""
+        """Write all fields that `fill` and `fill_all` have set."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
         pieces, sizes = [], [1, 1]
         for field, rows in self._waiting:

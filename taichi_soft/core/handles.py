@@ -34,11 +34,11 @@ class Handle:
     _serial: int
 
     def _keep(self) -> bytes | None:
-        """Implement `keep`, for worlds only."""
+        """Return a snapshot as `keep` does. Only worlds implement this."""
         raise NotImplementedError
 
     def _undo(self, data: bytes) -> None:
-        """Implement `undo`, for worlds only."""
+        """Restore a snapshot as `undo` does. Only worlds implement this."""
         raise NotImplementedError
 
     def __init_subclass__(cls) -> None:
@@ -52,7 +52,7 @@ class Handles:
     """Numbers the handles of a world, and finds those that still exist."""
 
     def __init__(self) -> None:
-        """Start without handles; 0 is the world itself."""
+        """Start without handles. Number 0 is the world itself."""
         self.count = 1
         self.turn = Turn()
         self.recorder: Recorder | None = None

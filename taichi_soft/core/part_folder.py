@@ -35,7 +35,7 @@ class PartFolder:
             (self.path / "new").rename(self.path / LOCK)
 
     def remove(self) -> None:
-        """Remove the folder and its contents. Further calls do nothing."""
+        """Remove the folder and its contents. Later calls do nothing."""
         self._lock.close()
         self._remove()
 

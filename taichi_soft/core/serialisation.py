@@ -100,7 +100,9 @@ def to_json(data: Any) -> bytes:
 
 
 def from_json(content: bytes | memoryview) -> Any:
-    """Decode JSON. Raises: SnapshotError, also for non-finite numbers, which `to_json` never writes."""
+    """Decode JSON. Raises: SnapshotError for invalid JSON and for non-finite numbers, which `to_json` never
+    writes.
+    """
     try:
         return json.loads(bytes(content), parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:

@@ -20,7 +20,7 @@ _QUICK: Any = import_module("_signal")
 """C module behind `signal`. It has no enumerations, which would be slow in every step of a world."""
 
 INTERRUPTED, TERMINATED = 130, 143
-"""Exit codes: 128 plus the signal's number, as in shells."""
+"""Exit codes for signals: 128 plus the number of the signal, as in shells."""
 
 
 def watch_imports() -> None:

@@ -29,7 +29,7 @@ class Turn:
     __slots__ = ("holder", "lock")
 
     def __init__(self) -> None:
-        """Start without a holder. Raises: StateError as `require_here`."""
+        """Start without a holder. Raises: StateError in a forked process, see `require_here`."""
         require_here()
         self.lock = threading.Lock()
         self.holder = 0  # id of the thread with access, 0 for none

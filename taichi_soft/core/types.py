@@ -40,7 +40,7 @@ class Strain(Choice):
 
 
 class Flips(Choice):
-    """Treatment of inverted tetrahedra."""
+    """Treatment of inverted tetrahedra by a law."""
 
     TOLERANT = "tolerant"  # the mirrored shape counts as a rest shape too (thesis)
     RECOVER = "recover"  # forces turn the tetrahedron back
@@ -55,7 +55,7 @@ class DampingModel(Choice):
 
 
 class Integrator(Choice):
-    """Time integrator (thesis section 3.5)."""
+    """Integrator of the equations of motion (thesis section 3.5)."""
 
     EXPLICIT_EULER = "explicit_euler"
     LEAPFROG = "leapfrog"

@@ -1,7 +1,7 @@
-"""Eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
+"""Compute eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
-Jacobi stays accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in float32
-(Golub and Van Loan, Matrix Computations, section 8.5).
+The Jacobi method is accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in
+float32 (Golub and Van Loan, Matrix Computations, section 8.5).
 """
 
 from taichi_soft.core.runtime import ti

@@ -1,4 +1,4 @@
-"""Elementary functions from arithmetic alone, bit-identical on every processor and system.
+"""Elementary functions that use only arithmetic, bit-identical on every processor and system.
 
 The functions of C libraries, such as `expf`, differ in their last bits between systems. Here arguments are
 reduced to a range near 0, where Taylor series are short. Results are within 4 ulps.
@@ -47,7 +47,7 @@ _DOUBLE = _Kind(
 )
 _LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
 _HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
-"""pi / 2 in two parts; the product of the first with any integer below 2^20 is exact in 64 bits."""
+"""pi / 2 in two parts. In 64 bits, the product of the first part with any integer below 2^20 is exact."""
 
 # Coefficients after the first terms. The first terms are 1 + x of exp, 2 s of log, 1 and x of cosine and
 # sine, x of arctangent.

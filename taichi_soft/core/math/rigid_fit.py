@@ -11,7 +11,7 @@ REGULARISATION = 1e-10
 """Weight of the smallest rotation. It affects only rotations that the vertices do not determine."""
 
 SWEEPS = 30
-"""Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
+"""Number of Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
 
 RESIDUE = 1e-12
 """Fraction of the largest number below which a number counts as rounding."""

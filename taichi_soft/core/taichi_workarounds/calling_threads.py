@@ -31,7 +31,7 @@ _home = 0  # identity of the dedicated thread
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
-    """Let only one thread at a time call kernels and access numbers of fields.
+    """Make threads wait, so that only one at a time calls kernels and accesses numbers of fields.
 
     Args:
         lay_out_now: calls Taichi's own function that lays out fields, with its argument.

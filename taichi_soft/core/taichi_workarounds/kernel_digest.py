@@ -74,7 +74,7 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
     if id(value) in seen:
         parts.append(f"again {seen[id(value)][0]}")
         return
-    seen[id(value)] = len(seen), value  # keeps it alive, so that no other object gets its identity
+    seen[id(value)] = len(seen), value  # keep the object alive, so that no other object gets its identity
     if hasattr(value, "snode") and hasattr(value, "vars"):
         parts.append(_field_text(value))
     elif hasattr(value, "field_dict"):  # a field of structs

@@ -126,7 +126,7 @@ class FirstLaunches:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:
-        """Replace the function with which Taichi creates a kernel."""
+        """Replace Taichi's function that creates a kernel."""
         plain = kernels.Kernel.materialize
 
         def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:

@@ -12,7 +12,7 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def keep_branches_in_real_functions() -> None:
-    """Add the statements of a `ti.func` to the kernel or real function that is being compiled."""
+    """Make Taichi add the statements of a `ti.func` to the kernel or real function that it is compiling."""
     ti.lang.kernel_impl.Kernel.ast_builder = lambda _: (
         ti.lang.impl.get_runtime().compiling_callable.ast_builder()
     )

@@ -98,7 +98,7 @@ def give_workers_usual_floats(count: int) -> None:
 
 
 def _calling(function: int) -> Callable[[Any], None]:
-    """Return a function for kernels that calls the C function at an address with one argument."""
+    """Return a function for kernels that calls the C function at address `function` with one argument."""
 
     def call(argument: Any) -> None:
         runtime = ti.lang.impl.get_runtime()
