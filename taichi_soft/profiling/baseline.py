@@ -60,7 +60,7 @@ def compile_baseline() -> ctypes.CDLL:
 
 
 class Baseline:
-    """One body in plain C++."""
+    """A body that the C++ reference steps."""
 
     def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
         """Copy the arrays of `body`, in the order of the kernels. The law is virial, springs or volume

@@ -46,7 +46,7 @@ class DeviceGain:
 
 
 class Frames:
-    """Times frames of several scenes in this process."""
+    """Times the frames of several scenes in this process."""
 
     def __init__(self) -> None:
         self._scene: tuple[int, int] | None = None

@@ -48,7 +48,7 @@ def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = 
 
 
 def measure_phases(count: int = 16, dt: float = 1 / 60, repeats: int = 121) -> Phases:
-    """Measure `count` spheres at a fixed step of `dt` [s]."""
+    """Measure a world of `count` spheres with a fixed step of `dt` [s]."""
     world = spheres(count)
     substeps = world.stable_substeps(dt)
     adapter = EngineAdapter(world, FixedStep(dt=dt, substeps=substeps))

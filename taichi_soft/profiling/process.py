@@ -38,7 +38,9 @@ class Process:
         self._process.communicate()
 
     def ask(self, line: str) -> float:
-        """Send a line and return the answer. Raises: DeviceError if the process has failed."""
+        """Send a line and return the time that the process answers [s]. Raises: DeviceError if the process
+        has failed.
+        """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
