@@ -1,4 +1,4 @@
-"""Find why a body became non-finite, by repeating its last step."""
+"""Find why a body became non-finite, by repeating the last step of the body."""
 
 from __future__ import annotations
 

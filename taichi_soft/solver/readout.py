@@ -24,7 +24,7 @@ Floats32 = NDArray[np.float32]
 
 
 class Readout:
-    """Positions, velocities, render meshes and rest shapes of the bodies of one world."""
+    """Reads positions, velocities, render meshes and rest shapes of the bodies of a world."""
 
     def __init__(
         self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints

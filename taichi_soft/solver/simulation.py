@@ -200,7 +200,7 @@ class Simulation:
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Return the islands of the last step, by slot. Bodies added since then are separate."""
+        """Return the islands of the last step, by slot. Bodies added since then form separate islands."""
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)
@@ -263,7 +263,7 @@ class Simulation:
         self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
-        """Move a body to other positions. Raises: OptionError for values out of range."""
+        """Set positions and velocities of a body. Raises: OptionError for values out of range."""
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
@@ -312,7 +312,7 @@ class Simulation:
         self.state.write_surroundings(settings)
 
     def on_placed(self, body: SoftBody) -> None:
-        """Make the next step check which bodies this body overlaps."""
+        """Make the next step check which other bodies `body` overlaps."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
 

@@ -30,7 +30,8 @@ compresses a pile of three blocks about three times as much, and with four times
 
 
 MANY_SUBSTEPS = 500
-"""Substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per step."""
+"""Number of substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per
+step."""
 
 FRAME = 1 / 60
 """Length of the step for which a world is checked when it is built [s]."""
@@ -61,7 +62,7 @@ class Substeps:
 
     @property
     def has_limit(self) -> bool:
-        """True if a step that needs too many substeps is refused."""
+        """True if the world refuses steps that need too many substeps."""
         return self._most is not None
 
     def stable_step(self, body: SoftBody) -> StableStep:
@@ -166,7 +167,7 @@ class Substeps:
         return seconds, count, h
 
     def forget(self) -> None:
-        """Discard the last choice."""
+        """Discard the last choice of substeps."""
         self._asked = ()
 
     def renew(self) -> None:

@@ -26,7 +26,7 @@ def hold(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def predict(state: ti.template(), program: ti.template(), body, job, felt):
-    """Solve for the new velocities."""
+    """Solve for the new velocities of a body."""
     speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
     return speed, beside, beside, 1
 

@@ -29,7 +29,7 @@ class IntegratorModel:
     """(state, program, body, job, felt): compute new velocities. Returns the highest speed [m/s]; the highest
     and the mean speed relative to the job's velocity; 1 if forces changed no velocity too much."""
     check: Any
-    """(state, body, h, is_last) -> 1 if a body kept its shape in a substep."""
+    """(state, body, h, is_last) -> 1 if the body kept its shape in a substep."""
     advance: Any = None
     """(x, v, a, h, kick) -> position and velocity of one particle, for the schedule `flat`; None if not
     supported."""
@@ -45,7 +45,7 @@ class IntegratorModel:
 
     @property
     def takes_solves(self) -> bool:
-        """True if new velocities come from linear solves, one per substep and body."""
+        """True if new velocities are solutions of linear systems, one per substep and body."""
         return self.advance is None
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""End of a step, body by body."""
+"""End a step, body by body."""
 
 from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body

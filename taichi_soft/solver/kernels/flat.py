@@ -369,7 +369,7 @@ def end_flat(
 
 @ti.kernel
 def finish_flat(state: ti.template(), body_count: ti.i32):
-    """End the step after the last attempt."""
+    """End the step of all bodies after the last attempt."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _end_step(state, body_count)

@@ -120,7 +120,7 @@ def _measure_errors(state: ti.template(), body):
 
 @ti.func
 def _update_constraints(state: ti.template(), body, releases):
-    """Update constraints and friction after a solve.
+    """Update the constraints and the friction of particles after a solve.
 
     Args:
         releases: 1 to release particles that are pulled.

@@ -27,7 +27,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import MOST_PARTS, Job
 
 OWNER = 0
-"""Number of the worker that owns an island; helpers have the numbers after it."""
+"""Worker number of the owner of an island. Helpers have larger numbers."""
 
 HELP = -1
 """Used instead of a phase: run the phase that the owner has started."""
@@ -37,7 +37,7 @@ HELP = -1
 def _now(counter: ti.template()):
     """Read a counter that other threads change.
 
-    A maximum with -1 does not change it, and cannot be optimised into a plain load.
+    A maximum with -1 does not change the counter, but the compiler cannot turn it into a plain load.
     """
     return ti.atomic_max(counter, -1)
 
@@ -50,7 +50,7 @@ def _size_of(state: ti.template(), island):
 
 @ti.func
 def is_shared_island(state: ti.template(), island):
-    """True if an island has several bodies, so that other threads can help."""
+    """True if an island has several bodies, so that helpers can take some."""
     return _size_of(state, island) > 1
 
 

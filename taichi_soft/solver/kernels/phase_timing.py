@@ -1,4 +1,4 @@
-"""Run one phase of the substep many times, for profiles."""
+"""Run one phase of a substep many times, to profile it."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces

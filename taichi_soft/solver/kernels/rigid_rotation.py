@@ -16,12 +16,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_edge_products
 
 THIN = 1e-6
-"""Moment of inertia added about every axis, over the trace of the tensor."""
+"""Small moment of inertia that is added about every axis, over the trace of the tensor."""
 
 
 @ti.func
 def _cross_matrix(d):
-    """Return the matrix whose product with an angular velocity is its cross product with `d`."""
+    """Return the matrix that multiplies an angular velocity to give its cross product with `d`."""
     zero = d.x * 0.0
     return ti.Matrix([[zero, d.z, -d.y], [-d.z, zero, d.x], [d.y, -d.x, zero]])
 

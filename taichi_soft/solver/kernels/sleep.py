@@ -58,14 +58,14 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 
 @ti.func
 def reset_rest_timer(state: ti.template(), body, speed):
-    """Reset the rest timer of a body if it is fast."""
+    """Restart the rest timer of a body if `speed` is too high for sleep."""
     if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
         state.body_calm_time[body] = 0.0
 
 
 @ti.func
 def reset_rest_timer_of_hull(state: ti.template(), body, dt):
-    """Reset the rest timer of a body with a hull if it has moved far in a step of `dt` [s].
+    """Restart the rest timer of a body with a hull if it has moved too far in a step of `dt` [s].
 
     Velocities are ignored, because carriers of points in contact oscillate from substep to substep without
     moving away.

@@ -40,7 +40,7 @@ FADING = 20.0
 slivers would excite each other, light ones for seconds."""
 
 STEP_MARGIN = 0.9
-"""Square of the substep chosen for a deformed body over its estimated stability limit."""
+"""Square of the substep for a deformed body, over its estimated stability limit."""
 
 MAX_REFINEMENT = 4.0
 """Largest number of substeps over the number at rest. If even shorter substeps are needed, the step is
@@ -199,7 +199,7 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _stiffens(state: ti.template(), program: ti.template(), body):
-    """1 if `_refinement_of` applies to the law of a body."""
+    """1 if a body with this law can need more substeps, see `_refinement_of`."""
     stiffens = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.has_energy and model.flips == Flips.RECOVER):
