@@ -31,7 +31,7 @@ Ints = NDArray[np.int64]
 
 
 class BodyControl(SoftBody):
-    """Methods of a body that change it."""
+    """Methods that change a body."""
 
     @recorded
     def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
@@ -129,7 +129,8 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Set the velocities of all particles that are not pinned to a rigid motion.
+        """Set the velocities of all free particles to those of a rigid motion. Pinned particles do not
+        change.
 
         Args:
             linear: velocity of the centre of mass, (3,) [m/s].

@@ -34,7 +34,7 @@ class BodyMeasures(SoftBody):
         return np.flatnonzero(self.volumes() < 0)
 
     def pose(self) -> Pose:
-        """Rigid motion of the rest shape that fits the body best, weighted by mass.
+        """Rigid motion that fits the rest shape to the body best, weighted by mass.
 
         `mesh.vertices @ pose.rotation.T + pose.position` is the best fit to the positions. The rotation never
         mirrors, even for a flat or inverted body. For a straight rope, the rotation about its axis is
@@ -80,7 +80,9 @@ class BodyMeasures(SoftBody):
         return measures.strains(self)
 
     def plastic_strains(self) -> Floats:
-        """Permanent equivalent (von Mises) logarithmic strain of each tetrahedron, (m,)."""
+        """Permanent (plastic) logarithmic strain of each tetrahedron, as equivalent von Mises strain,
+        (m,).
+        """
         return measures.plastic_strains(self)
 
     def stresses(self) -> Floats:

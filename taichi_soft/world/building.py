@@ -125,7 +125,7 @@ def _add_floor(context: WorldContext) -> None:
 
 
 def _schedule(context: WorldContext, device: Device) -> Schedule:
-    """Choose the schedule of a world. Raises: OptionError if the requested one lacks a feature."""
+    """Choose the schedule of a world. Raises: OptionError if the requested schedule lacks a feature."""
     settings, request = context.settings, context.contact_request
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]

@@ -28,13 +28,13 @@ MOST_VERTICES = 10_000_000
 
 
 def require_open(context: WorldContext) -> None:
-    """Raise a StateError after `World.build`."""
+    """Raise a StateError if the world is already built."""
     if context.fields is not None:
         raise StateError("the world is already built: add_body and reserve come first, then build() once")
 
 
 def require_own(context: WorldContext, body: Any) -> None:
-    """Raise an OptionError for a body of another world, and a StateError for a removed one."""
+    """Raise an OptionError for a body of another world, and a StateError for a removed body."""
     if not isinstance(body, Body) or not belongs_to(body, context):
         raise OptionError(f"body must be a body of this world, got {body!r}")
     require_alive(body)

@@ -39,7 +39,7 @@ from taichi_soft.world.world_queries import WorldQueries
 from taichi_soft.world.world_states import WorldStates
 
 MOST_RETRIES = 10
-"""Largest `retries`: 1,024 times the requested substeps."""
+"""Largest value of `retries`. It allows 1,024 times the requested substeps."""
 
 
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
@@ -189,7 +189,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Time that the world has simulated [s]."""
         return self._context.clock.time
 
     @property
@@ -270,7 +270,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             simulation.check_solves()
 
     def _push(self) -> None:
-        """Apply the force field to the next step, if there is one."""
+        """Apply the force field, if there is one, to the next step."""
         if self._force_field is not None:
             rows = apply_force_field(self._context, self._force_field)
             if self._recorder is not None:

@@ -36,7 +36,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldBodies(WorldParts):
-    """Methods of a world for its bodies."""
+    """Methods of a world that concern its bodies."""
 
     @property
     def bodies(self) -> Sequence[Body]:

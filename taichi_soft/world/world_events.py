@@ -12,7 +12,7 @@ Happened = TypeVar("Happened", bound=Event)
 
 
 class WorldEvents(WorldParts):
-    """Methods of a world for events."""
+    """Methods of a world that record and return events."""
 
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
         """Record only events of these kinds for `drain_events`, from the next step on.

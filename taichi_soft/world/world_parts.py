@@ -9,7 +9,7 @@ from taichi_soft.solver.simulation import Simulation
 
 
 class WorldParts(Handle):
-    """Base class of the mixins of `World`."""
+    """Base class of the classes from which `World` inherits."""
 
     _context: WorldContext
     _recorder: Recorder | None

@@ -23,7 +23,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldQueries(WorldParts):
-    """Methods of a world for queries."""
+    """Methods of a world that search its surfaces."""
 
     def raycast(
         self,

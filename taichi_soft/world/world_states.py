@@ -10,7 +10,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldStates(WorldParts):
-    """Methods of a world for its state."""
+    """Methods of a world that save, restore and compare states."""
 
     def snapshot(self) -> bytes:
         """Return the complete state between two steps, for `restore` in this world or an identical one.
