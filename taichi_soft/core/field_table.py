@@ -18,7 +18,7 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""Type of a field's numbers: float32, or float64 for fields of which forces are computed in double
+"""Type of a field's numbers: float32 in a world, float64 in fields made to evaluate forces in double
 precision."""
 
 LOADED = "loaded"

@@ -26,8 +26,8 @@ POSITION_CORRECTION = 0.2
 """Fraction of a penetration that is corrected in each substep."""
 
 CONTACT_SLOP = 0.25
-"""Fraction of the thickness by which a pair can be too close without a correction, so that contacts do not
-end. Correcting the whole penetration would act against the forces that press the pair together, and excite
+"""Fraction of the thickness by which a pair can be too close without a correction. Pairs at rest stay within
+it. Correcting the whole depth would act against the forces that press the pair together, and excite
 vibrations."""
 
 

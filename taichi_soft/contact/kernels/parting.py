@@ -132,7 +132,7 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
 
 @ti.func
 def _overlap(state: ti.template(), a, b):
-    """1 if two bodies overlap by more than `INSET`; while they are being moved apart, 1 for any overlap."""
+    """1 if two bodies overlap by more than `INSET`, or are moved apart and not yet clear by `OUTSET`."""
     depth = INSET * ti.min(state.body_surface[a].z, state.body_surface[b].z)
     if state.body_overlap[a] == OVERLAPPING or state.body_overlap[b] == OVERLAPPING:
         depth = -OUTSET * 0.5 * (state.body_surface[a].y + state.body_surface[b].y)

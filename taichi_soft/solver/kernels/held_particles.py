@@ -1,12 +1,13 @@
 """Constrain particles to the floor or colliders in the solve of implicit Euler, with Coulomb friction.
 
-Contact after the solve could remove only the momentum of the particles that touch. A resting body would
-collapse, and a conveyor belt would move only the lowest particles of a body. So the solve constrains each
-stopped particle: along the normal, it has the velocity of the surface. A sticking particle has the surface
-velocity in all directions; a sliding particle receives an impulse of friction. While impulses violate
-Coulomb's law, the system is solved again, starting from the last solution. Each time, particles that would be
-pulled are released, particles that stick beyond the friction limit begin to slide, and particles whose
-sliding friction would reverse stick.
+Contact after the solve could remove only the momentum of the particles that touch. A body would sink into
+itself until its solve moves these particles down fast enough, and would follow a conveyor belt only as fast
+as its lowest particles pull it. So the solve constrains each stopped particle: along the normal, it has the
+velocity of the surface. A sticking particle has the surface velocity in all directions; a sliding particle
+receives an impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting
+from the last solution. Each time, particles that would be pulled are released, particles that stick beyond
+the friction limit begin to slide, and particles stick if friction would
+reverse their sliding.
 
 Groups of fields: reads colliders.
 """
