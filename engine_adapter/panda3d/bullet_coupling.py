@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 class BulletState:
     """Poses and velocities of rigid bodies. Returned by `BulletCoupling.snapshot`."""
 
-    rows: tuple[tuple[Any, ...], ...]  # one per rigid body
+    rows: tuple[tuple[Any, ...], ...]  # state of each rigid body
 
 
 class _Rigid:

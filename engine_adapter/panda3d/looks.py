@@ -39,7 +39,7 @@ def render_state(visual: Any, is_textured: bool) -> Any:
     """Make a Panda3D RenderState with the texture and colour of a material; empty if the material has
     neither.
 
-    To override the colour, set one with a priority: `node.set_color(red, 1)`.
+    To override the colour, set another colour with a priority: `node.set_color(red, 1)`.
     """
     state = core.RenderState.make_empty()
     if getattr(visual, "kind", None) != "texture":

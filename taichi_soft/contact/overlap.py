@@ -22,8 +22,8 @@ INSET = 0.02
 """Depth, over the mean edge, above which bodies overlap. Contact itself moves shallower bodies apart."""
 
 RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
-"""Axes. The third is the direction of the ray that decides whether a point is inside. It meets no edge or
-vertex of usual meshes."""
+"""Axes as rows. The third is the direction of the ray that decides whether a point is inside. The ray meets
+no edge or vertex of usual meshes."""
 
 CHUNK = 1 << 19
 """Number of pairs of points and triangles that are compared at once."""

@@ -1,6 +1,6 @@
 """Enums of the public interface. Functions that accept a member also accept its string.
 
-The `...Name` types let editors complete the strings and mypy reject misspelt ones.
+With the `...Name` types, editors complete the strings, and mypy rejects misspelt ones.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ reuse its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
 SUBSTEP = 1.0e-5  # [s], far below every stable step: the bodies only fall
-PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
+PUSHED_APART = 0.02  # initial stretch of the body, so that elastic forces act
 
 
 NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")

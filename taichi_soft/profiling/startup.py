@@ -45,7 +45,8 @@ world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
 """,
 }
-"""Worlds by name: a body and a floor; soft contact, a pool and a collider; a body that can be cut."""
+"""Code of each world, by name: a body and a floor; soft contact, a pool and a collider; a body that can be
+cut."""
 
 
 @dataclass(frozen=True)

@@ -189,15 +189,16 @@ class WorldControl(WorldParts):
         is_fixed: bool = False,
         point: ArrayLike | None = None,
     ) -> Motor:
-        """Rotate a part of a body about an axis, or push it along one, towards a speed, until `Motor.remove`.
+        """Add a motor, which rotates a part of a body about an axis, or pushes it along the axis, up to a
+        target speed.
 
         The motor accelerates the particles as a rigid part; the rest of the body follows by its elasticity.
         The torque or force is external, as from a shaft in the level: no other body receives a reaction. The
         motor does not keep the body on the axis. With implicit Euler, elastic forces act after the motor, so
-        heavily loaded particles stay below the speed; more substeps help.
+        heavily loaded particles stay below the target speed; more substeps reduce the difference.
         Args:
             body: body of this world.
-            particles: vertices to drive; pinned ones stay fixed.
+            particles: vertices to drive. Pinned vertices stay fixed.
             axis: direction (3,), of any nonzero length, for the current pose of the body.
             speed: target speed, right-handed about the axis [rad/s] or along it [m/s]. 0 brakes the
                 particles.

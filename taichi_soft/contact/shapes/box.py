@@ -46,7 +46,7 @@ class BoxShape(Shape):
         """Return the depth of points below the nearest face, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = (np.asarray(self.size) / 2 - np.abs(points)).min(axis=1)
         return depths

@@ -44,7 +44,7 @@ class CapsuleShape(Shape):
         """Return the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         half = self.length / 2
         beside = points - np.clip(points, (0.0, 0.0, -half), (0.0, 0.0, half))

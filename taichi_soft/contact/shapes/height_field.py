@@ -85,7 +85,7 @@ class HeightFieldShape(Shape):
         """Return a lower bound of the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         heights = np.asarray(self.heights, dtype=np.float64)
         last = np.array(heights.shape) - 1

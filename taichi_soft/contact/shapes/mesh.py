@@ -93,7 +93,7 @@ class MeshShape(Shape):
         """Return the depth of points below the surface, from the grid, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         resolution = np.array(self.resolution)
         distances = self._samples.reshape(self.resolution)

@@ -48,7 +48,7 @@ class PlaneShape(Shape):
         """Return the depth of points below the plane, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = -points @ np.asarray(self.normal)
         return depths

@@ -68,7 +68,7 @@ class Shape(ABC):
         shapes.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
 
     @abstractmethod

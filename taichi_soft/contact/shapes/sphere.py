@@ -40,7 +40,7 @@ class SphereShape(Shape):
         """Return the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = self.radius - np.linalg.norm(points, axis=1)
         return depths

@@ -1,7 +1,7 @@
 """Best-fitting rigid motion between two sets of vertices, in 64-bit floats.
 
-For vertices on a line, rounding would decide the rotation about the line. A small weight makes it the
-smallest rotation.
+For vertices on a line, rounding would decide the rotation about the line. A small weight on the rotation
+avoids this.
 """
 
 from taichi_soft.core.math.rows import row_at
