@@ -84,7 +84,7 @@ class EngineAdapter:
 
     @property
     def world(self) -> World:
-        """World of the adapter."""
+        """World that the adapter steps."""
         return self._world
 
     @property
@@ -101,25 +101,26 @@ class EngineAdapter:
     def time(self) -> float:
         """Simulated time of the interpolated positions [s].
 
-        It is one step behind the sum of all frame times. Before the first step it is the world's time.
+        This time is one step behind the sum of all frame times. Before the first step it is the time of the
+        world.
         """
         return self._world.time - (1.0 - self.alpha) * self._world.last_dt
 
     @property
     def dropped_time(self) -> float:
-        """Time that the last `advance` dropped [s]; 0 if the machine keeps up."""
+        """Time that the last `advance` dropped [s]; 0 if the machine is fast enough."""
         return self._dropped_time
 
     @property
     def total_dropped_time(self) -> float:
-        """Time dropped so far [s]."""
+        """Time that all calls of `advance` have dropped [s]."""
         return self._total_dropped_time
 
     @one_thread
     def step(self) -> None:
-        """Make exactly one fixed step without the accumulator, for replays, tests and servers.
+        """Make exactly one fixed step, independent of frame times, for replays, tests and servers.
 
-        Raises: errors of `before_step` and `World.step`. If the step was not made, only the changes of
+        Raises: errors of `before_step` and `World.step`. After an error in the step, only the changes of
             `before_step` remain.
         """
         if self._before_step is not None:
@@ -132,7 +133,7 @@ class EngineAdapter:
             self._rollback.save()
 
     def _step_within(self, budget: Budget) -> None:
-        """Make a step with the levels and skipped bodies that a budget chooses."""
+        """Make a step with the levels and skipped bodies that `budget` chooses."""
         step = self._world.step_count
         try:
             budget.prepare(self._rewind_ticks)
@@ -150,8 +151,8 @@ class EngineAdapter:
 
         Args:
             frame_dt: time since the last frame [s], 0 or more.
-        Returns: number of steps made, at most `max_steps`. Time for further steps is dropped, including the
-            fraction of a step (see `dropped_time`).
+        Returns: number of steps made, at most `max_steps`. Time for further steps is dropped, with the
+            fraction of a step that is left (see `dropped_time`).
         Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; errors of
             `step`. The time of the steps that were not made then counts as dropped.
         """
@@ -163,13 +164,13 @@ class EngineAdapter:
             for _ in range(steps):
                 self.step()
         finally:
-            made = self._world.step_count - before  # counts a step whose warning was raised as an error
+            made = self._world.step_count - before  # includes a step whose warning was raised as an error
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
 
     def see_from(self, viewer: ArrayLike) -> None:
-        """Set the position of the camera, (3,) [m]: a budget reduces the farthest bodies first.
+        """Set the position of the camera. A budget reduces the detail of the farthest bodies first.
 
         Args:
             viewer: position of the camera, (3,) [m].
@@ -179,7 +180,8 @@ class EngineAdapter:
 
     @property
     def budget_status(self) -> BudgetStatus:
-        """Bodies with reduced detail, bodies that skip steps, and whether the budget is met.
+        """Status of the budget: bodies with reduced detail or skipped steps, and whether steps fit the
+        budget.
 
         Raises: StateError without `budget_ms`.
         """
@@ -199,7 +201,7 @@ class EngineAdapter:
 
     @one_thread
     def rewind(self, steps: int) -> None:
-        """Restore the state before the inputs of the step that is `steps` back.
+        """Go back `steps` steps, to the state before the inputs of the first of them.
 
         `alpha` does not change: repeat the steps with `step` and the corrected inputs, and drawing continues
         at the same time.
@@ -216,7 +218,7 @@ class EngineAdapter:
         self._rollback.rewind_to(self._world.step_count - back)
 
     def snapshot(self) -> bytes:
-        """See `World.snapshot`. The snapshot does not contain `alpha`."""
+        """Return a state as `World.snapshot` does. It does not contain `alpha`."""
         return self._world.snapshot()
 
     @one_thread
@@ -235,7 +237,7 @@ class EngineAdapter:
             self._rollback.save()
 
     def state_hash(self) -> str:
-        """See `World.state_hash`."""
+        """Return a hash of the state, see `World.state_hash`."""
         return self._world.state_hash()
 
     def drain_events(self) -> list[Event]:
@@ -243,11 +245,12 @@ class EngineAdapter:
         return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Positions of a body, interpolated between the previous step and the last one, float32 (n, 3) [m].
+        """Read the positions of a body, interpolated between the previous step and the last one, float32
+        (n, 3) [m].
 
         Args:
             body: body of this adapter's world.
-            out: C-contiguous float32 array to fill and return; None makes a new one.
+            out: C-contiguous float32 array to fill and return; None allocates a new one.
         Raises: OptionError if `out` does not fit or the body belongs to another world; StateError if it was
             removed.
         """
@@ -259,13 +262,13 @@ class EngineAdapter:
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Positions [m] and normals, interpolated between the previous and the last step, float32 (k, 3)
-        each.
+        """Read positions [m] and normals of a render mesh, interpolated between the previous step and the
+        last one, float32 (k, 3) each.
 
         Args:
-            mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; a body stands for the
+            mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; or a body, for the
                 first of its `render_meshes`.
-            positions, normals: C-contiguous float32 arrays to fill and return; None makes a new one.
+            positions, normals: C-contiguous float32 arrays to fill and return; None allocates new ones.
         Raises: as `World.read_render_mesh`.
         """
         return self._world.read_render_mesh(mesh, self._accumulator.alpha, positions, normals)

@@ -1,4 +1,4 @@
-"""Keep a time budget for the steps of a world with levels of detail and skipped steps."""
+"""Keep a time budget for the steps of a world, by levels of detail and skipped steps."""
 
 from __future__ import annotations
 
@@ -16,47 +16,51 @@ from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
-"""Fractions of the budget, for the expected time of a long step: above TIGHT detail is reduced, until it is
-below FULL; detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
+"""Fractions of the budget for the expected time of a long step. Above TIGHT, detail is reduced until the time
+is below FULL. Detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
 
 REMEMBERED = 8
-"""Number of recent steps for the median cost of a tetrahedron, which ignores interrupted steps."""
+"""Number of recent steps whose median gives the cost of a tetrahedron. The median ignores interrupted
+steps."""
 
 SPREAD, LONG, LEAST_LONG, MOST_LONG = 240, 0.97, 1.15, 1.5
-"""A long step is the quantile LONG of the last SPREAD steps, as a multiple of the median, clamped to
-[LEAST_LONG, MOST_LONG]. The upper limit bounds the reduction when other programs interrupt many steps."""
+"""The expected time of a long step is the quantile LONG of the last SPREAD steps, as a multiple of the
+median, clamped to [LEAST_LONG, MOST_LONG]. Without the upper limit, other programs that interrupt many steps
+would reduce detail too far."""
 
 PATIENCE = 30
-"""Steps without a reduction before levels are raised: 0.5 s of a game."""
+"""Number of steps without a reduction before levels are raised: 0.5 s of a game."""
 
 TRY_AGAIN = 8
-"""Steps between attempts to lower levels after an attempt found none, because the search takes time."""
+"""Number of steps to wait after a search found no level to lower, because the search itself takes time."""
 
 CHANGING = 0.25
-"""Largest fraction of the budget for changes of level before a step. At least one change is made."""
+"""Largest fraction of the budget that changes of level before a step can use. At least one change is made."""
 
 
 @dataclass(frozen=True)
 class BudgetStatus:
-    """Detail that a time budget has reduced."""
+    """Detail that a time budget has reduced. Returned by `EngineAdapter.budget_status`."""
 
-    levels: dict[Body, int]  # levels of bodies that are coarser than their finest level
-    skipping: tuple[Body, ...]  # bodies that skip steps, the farthest first: see `World.skip_step`
+    levels: dict[Body, int]  # levels of the bodies that are not at their finest level
+    skipping: tuple[Body, ...]  # bodies that skip steps, the farthest first, see `World.skip_step`
     step_ms: float  # expected time of a step, from recent steps [ms]
     is_met: bool  # False if steps exceed the budget although all detail is reduced
 
 
 @dataclass
 class _Decision:
-    """Changes for one step, by handle."""
+    """Levels to set and bodies that skip, for one step, by handle number."""
 
     levels: list[tuple[int, int]]
     skipping: list[int]
 
 
 class Budget:
-    """Lowers the levels of the farthest bodies if steps take too long, and lets the farthest bodies skip
-    steps if that is not enough or takes effect later. Both are reverted in reverse order."""
+    """Keeps steps within a time budget.
+
+    If steps take too long, the budget lowers the levels of the farthest bodies. If that is not enough or
+    takes effect too late, the farthest bodies skip steps. Both are reverted in reverse order."""
 
     def __init__(self, world: World, milliseconds: float) -> None:
         """Set the budget [ms]. Raises: OptionError for a number that is not above 0."""
@@ -64,14 +68,14 @@ class Budget:
         self._world = world
         self._viewer: NDArray[np.float64] | None = None
         self._costs: deque[float] = deque(maxlen=REMEMBERED)  # cost of a tetrahedron in recent steps [s]
-        self._spread: deque[float] = deque(maxlen=SPREAD)  # the same over the median before
+        self._spread: deque[float] = deque(maxlen=SPREAD)  # ratio of each cost to the median before it
         self._load = 0  # tetrahedra that move in the next step, or moved in the last one
-        self._calm = 0  # steps since a reduction, or since levels could not be raised
+        self._calm = 0  # steps since a reduction or an attempt to raise levels
         self._waits = 0  # steps until the next attempt to lower levels
         self._skips = Skips(world, self._from_near)
-        self._decided: dict[int, _Decision] = {}  # by step
-        self._newest = -1  # last decided step
-        self._before: bytes | None = None  # state before the current choice, to revert it
+        self._decided: dict[int, _Decision] = {}  # choices, by step count
+        self._newest = -1  # newest step with a choice
+        self._before: bytes | None = None  # state before the current choice, to revert to
 
     def see_from(self, viewer: ArrayLike) -> None:
         """Set the point from which distances are measured, (3,) [m]."""
@@ -79,7 +83,7 @@ class Budget:
 
     @property
     def status(self) -> BudgetStatus:
-        """Current status."""
+        """Return the current status."""
         levels = {body: body.level for body in self._world.bodies if body.level}
         skipping = tuple(body for body in self._skips.slow if body.is_alive)
         expected = self._expected(self._load if skipping else self._tets())
@@ -97,7 +101,8 @@ class Budget:
     def prepare(self, ticks: int) -> None:
         """Choose levels and skipped bodies for the next step, and store the choice for `ticks` steps.
 
-        A step that is repeated after `rewind` gets its earlier levels, so that the clock decides only once.
+        A step that is repeated after `rewind` gets the same choice again, so that the result does not depend
+        on the clock.
         """
         step, self._before = self._world.step_count, None
         if step <= self._newest:
@@ -115,7 +120,7 @@ class Budget:
             del self._decided[old]
 
     def revert(self) -> None:
-        """Undo the changes of the last `prepare`, because its step was refused."""
+        """Undo the changes of the last `prepare`, because the step after them was refused."""
         if self._before is not None:
             undo(self._world, self._before)
         step = self._world.step_count
@@ -124,7 +129,7 @@ class Budget:
             self._decided.pop(step, None)
 
     def _keep(self) -> None:
-        """Store the state before a change, because the next step may be refused."""
+        """Store the state before a change, so that `revert` can restore it."""
         if self._before is None:
             self._before = keep(self._world)
 
@@ -139,7 +144,7 @@ class Budget:
         skipping: list[Body] = []
         if decision is not None:
             for serial, level in decision.levels:
-                if serial in bodies:  # other inputs may have removed it
+                if serial in bodies:  # other inputs may have removed the body
                     self._has_changed(bodies[serial], level)
             skipping = [bodies[serial] for serial in decision.skipping if serial in bodies]
         self._let_skip(skipping)
@@ -151,22 +156,22 @@ class Budget:
         self._load = self._tets() - sum(len(body.tets) for body in skipping)
 
     def _tets(self) -> int:
-        """Number of tetrahedra of all bodies."""
+        """Return the number of tetrahedra of all bodies."""
         return sum(len(body.tets) for body in self._world.bodies)
 
     def _expected(self, load: float) -> float:
-        """Expected time of a step with `load` tetrahedra [s]."""
+        """Return the expected time of a step with `load` tetrahedra [s]."""
         return load * median(self._costs) if self._costs else 0.0
 
     def _long(self, load: float) -> float:
-        """Expected time of a long step with `load` tetrahedra [s]."""
+        """Return the expected time of a long step with `load` tetrahedra [s]."""
         longer = LEAST_LONG
         if len(self._spread) >= PATIENCE:
             longer = sorted(self._spread)[int(LONG * len(self._spread))]
         return self._expected(load) * min(max(longer, LEAST_LONG), MOST_LONG)
 
     def _skip(self, load: int, spent: float) -> list[Body]:
-        """Let bodies skip the next step. `spent` is the time of changes before it [s]."""
+        """Choose the bodies that skip the next step. `spent` is the time of the changes before it [s]."""
         left = self.seconds - min(spent, 2 * CHANGING * self.seconds)
         long = self._long(load)
         is_full = long > (FULL if self._skips.slow else TIGHT) * left
@@ -175,7 +180,7 @@ class Budget:
         return skipping
 
     def _changes(self, load: int, start: float) -> list[tuple[Body, int]]:
-        """Make the changes of level that are due."""
+        """Raise or lower levels if that is due, and return the changed bodies with their new levels."""
         if self._long(load) > (FULL if self._skips.slow else TIGHT) * self.seconds:
             return self._lowered(load, start)
         return self._raised(load, start) if self._calm >= PATIENCE else []
@@ -183,7 +188,7 @@ class Budget:
     def _lowered(self, load: float, start: float) -> list[tuple[Body, int]]:
         """Lower the farthest bodies first, by one level each, until a step is expected to fit the budget.
 
-        Sleeping bodies are skipped, because they cost nothing.
+        Sleeping bodies are not lowered, because they take no time.
         """
         if self._waits:
             self._waits -= 1
@@ -214,24 +219,24 @@ class Budget:
         return changes
 
     def _is_late(self, start: float) -> bool:
-        """True if the changes since `start` take too long for one frame."""
+        """True if the changes since `start` already take too long for one frame."""
         return perf_counter() - start > CHANGING * self.seconds
 
     def _with_levels(self, change: int) -> list[Body]:
-        """Bodies whose level can change by `change` (1 or -1), by slot."""
+        """Return the bodies whose level can change by `change` (1 or -1), by slot."""
         return [body for body in self._world.bodies if 0 <= body.level + change < len(body.asset.levels)]
 
     def _from_near(self, bodies: list[Body]) -> list[Body]:
-        """Sort bodies from the nearest to the farthest, or by slot without a viewer."""
+        """Return bodies sorted from the nearest to the farthest; without a viewer, sorted by slot."""
         if self._viewer is None:
             return sorted(bodies, key=lambda body: body.index)
         apart = [float(np.linalg.norm(body.center_of_mass() - self._viewer)) for body in bodies]
         return [bodies[i] for i in np.argsort(apart, kind="stable")]
 
     def _has_changed(self, body: Body, level: int) -> bool:
-        """Change the level of a body, and return False if that is refused, see `Body.set_level`.
+        """Change the level of a body. Return False if the change is refused, see `Body.set_level`.
 
-        Bodies that are held do not get coarser, because a player may be holding them.
+        Held bodies are not made coarser, because a player may be holding them.
         """
         if body.is_held and level > body.level:
             return False

@@ -1,4 +1,4 @@
-"""Convert frames of any length to fixed steps."""
+"""Convert frame times of any length to fixed steps."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from taichi_soft.core.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
-"""Tolerance for when a step is due [steps]. Sums of frame times are rounded: six frames of 1/60 s are not
-exactly 1/10 s. A billionth covers the rounding of years of frames and is invisible."""
+"""Tolerance for when a step is due [steps]. The sum of frame times is rounded: six frames of 1/60 s are not
+exactly 1/10 s. A billionth of a step covers the rounding of years of frames and is invisible."""
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Division of a game loop's time into steps.
+    """Length and number of the steps that a game loop makes.
 
     Args:
         dt: length of a step [s], see `World.step`.
@@ -43,11 +43,11 @@ class Accumulator:
     def __init__(self, fixed_step: FixedStep) -> None:
         self._dt = fixed_step.dt
         self._max_steps = fixed_step.max_steps
-        self.remainder = 0.0  # [s], from -ROUND_OFF to 1 - ROUND_OFF of dt
+        self.remainder = 0.0  # time not yet simulated [s], from -ROUND_OFF * dt to (1 - ROUND_OFF) * dt
 
     @property
     def alpha(self) -> float:
-        """`remainder` over dt, at least 0 and below 1."""
+        """Return `remainder` over dt, at least 0 and below 1."""
         return max(self.remainder / self._dt, 0.0)
 
     def put(self, frame_dt: float) -> tuple[int, float]:

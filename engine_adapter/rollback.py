@@ -1,4 +1,4 @@
-"""Go back a few steps, to repeat them with inputs that arrived late."""
+"""Go back a few steps and repeat them with inputs that arrived late."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Rollback:
 
     Args:
         world: a built world.
-        ticks: number of steps to store, 1 or more. Each takes the memory of a snapshot.
+        ticks: number of steps to store, 1 or more. Each step takes the memory of a snapshot.
     Raises: OptionError for wrong arguments; StateError if the world is not built.
     Example:
         rollback = Rollback(world, ticks=30)
@@ -31,32 +31,32 @@ class Rollback:
             raise StateError("the world is not built: call world.build() before Rollback(world, ticks)")
         self._world = world
         self._ticks = as_count(ticks, "ticks")
-        self._snapshots: dict[int, bytes] = {}  # by the world's step count, ascending
-        self._restore_count = world.restore_count  # the world's, while the snapshots are its past
+        self._snapshots: dict[int, bytes] = {}  # by step count, ascending
+        self._restore_count = world.restore_count  # the world's count when the snapshots were stored
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """Step counts that can be restored, ascending."""
+        """Step counts that `rewind_to` can restore, ascending."""
         return tuple(self._snapshots) if self._is_past else ()
 
     @property
     def _is_past(self) -> bool:
-        """True if the snapshots lead to the current state."""
+        """True if the snapshots are from the past of the current state."""
         return self._restore_count == self._world.restore_count
 
     def save(self) -> None:
-        """Store the current state. Call it between a step and the inputs of the next one."""
+        """Store the current state. Call this between a step and the inputs of the next one."""
         if not self._is_past:
             self._snapshots.clear()
             self._restore_count = self._world.restore_count
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks + 1:  # the current state is not a step back
+        while len(self._snapshots) > self._ticks + 1:  # the newest is the current state
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:
-        """Restore the state that `save` stored at a step count, and drop later ones.
+        """Restore the state that `save` stored at a step count, and drop later states.
 
         Args:
             step: one of `steps`.

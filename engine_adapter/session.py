@@ -1,4 +1,4 @@
-"""Rollback netcode: one machine's side of a game whose inputs arrive late over a network."""
+"""Rollback netcode: the session of one machine in a network game whose inputs arrive late."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from taichi_soft import OptionError, TaichiSoftError, World
 from taichi_soft.core.checks import as_count
 
 Inputs = tuple[bytes, ...]
-"""The inputs of all players in one tick, by player."""
+"""Inputs of all players in one tick, in the order of the players."""
 
 MARK, NO_TICK = b"TSR1", 0xFFFFFFFF
 HEAD = struct.Struct("<4sQBBHHHIIQIH")
@@ -20,11 +20,13 @@ LEAD_SMOOTHING = 0.1  # weight of the newest message in the estimate of how far 
 
 
 class SessionError(TaichiSoftError, ValueError):
-    """A message does not belong to this session, or a player has been silent for too long."""
+    """Raised for a message that does not belong to the session, and for a player who has been silent for too
+    long.
+    """
 
 
 class _Message(NamedTuple):
-    """The fields of `HEAD`, then the number of known ticks of each player, then inputs."""
+    """Contents of a message: the fields of `HEAD`, the number of known ticks of each player, and inputs."""
 
     mark: bytes
     start: int  # hash of the session's initial state
@@ -34,9 +36,9 @@ class _Message(NamedTuple):
     ticks: int
     hash_every: int
     tick: int  # next tick of the sender
-    hash_tick: int  # tick of the newest hash that no late input can change, or NO_TICK
+    hash_tick: int  # tick of the newest hash that late inputs cannot change, or NO_TICK
     hash: int
-    first: int  # tick of the first input
+    first: int  # tick of the first input in the message
     input_count: int
     heard: tuple[int, ...]
     inputs: list[bytes]
@@ -45,26 +47,27 @@ class _Message(NamedTuple):
 class RollbackSession:
     """Makes ticks with predicted inputs, and repeats them if a prediction was wrong.
 
-    Each machine runs the same world and has its own session. `advance` makes a tick with the input of the
-    own player. It predicts that the others repeat their last known inputs. `message` returns a datagram for
-    all other machines, and `receive` takes theirs: late, twice, in any order. A datagram may be lost, because
-    each one repeats all inputs that another machine has not acknowledged. Give all machines the same
-    arguments. Only `act`, `player`, `delay` and `patience` may differ.
+    Each machine runs the same world and has its own session. `advance` makes a tick with the input of the own
+    player, and predicts that the other players repeat their last known inputs. `message` returns a datagram
+    for all other machines, and `receive` reads theirs. Datagrams can arrive late, twice, in any order or not
+    at all, because each one repeats all inputs that another machine has not acknowledged. Give all machines
+    the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
         world: world built by the same script on all machines, at the same step.
-        act: function that applies the inputs of all players, by player, before each step. It must depend on
-            these and the world only, because a tick can be made several times.
+        act: function that applies the inputs of all players, by player, before each step. It must depend only
+            on the inputs and the world, because a tick can be made several times.
         player: number of the own player, from 0.
         players: number of players, 2 to 16.
-        input_size: size of an input [bytes], 1 to 64. Zeros stand for inputs before a player's first one.
+        input_size: size of an input [bytes], 1 to 64. Before a player's first input, its input is zeros.
         step: length and substeps of each tick.
-        ticks: largest number of ticks made on predictions, 1 to 1000. Each takes the memory of a snapshot.
+        ticks: largest number of ticks made on predictions, 1 to 1000. Each tick takes the memory of a
+            snapshot.
         delay: ticks until an own input takes effect, 0 to `ticks`. A larger delay shortens rewinds and
             increases input latency.
         hash_every: ticks between comparisons of hashes, 1 to 10000.
-        patience: largest number of consecutive `advance` calls that wait for another player; after it,
-            `advance` raises an error.
+        patience: largest number of consecutive `advance` calls that wait for another player. Then `advance`
+            raises an error.
     Raises: OptionError for an argument out of range; StateError if the world is not built.
     Example:
         session = RollbackSession(world, lambda inputs: None, player=0, input_size=1)
@@ -104,16 +107,16 @@ class RollbackSession:
         self._start = int(world.bodies_hash(), 16)
         self._tick = first = world.step_count
         blank = bytes(self._input_size)
-        self._inputs = [{first - 1: blank} for _ in range(self._players)]  # known ones, by player and tick
-        self._used: dict[int, Inputs] = {}  # by tick
-        self._heard = [first] * self._players  # by player: all inputs before this tick are known
-        self._acknowledged = [first] * self._players  # by player: tick up to which it knows our inputs
+        self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
+        self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
+        self._heard = [first] * self._players  # per player, the first tick without a known input
+        self._acknowledged = [first] * self._players  # per player, first tick of our inputs it lacks
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
-        self._hashes: dict[int, int] = {}  # own ones, by tick
-        self._their_hashes: dict[tuple[int, int], int] = {}  # not compared yet, by tick and player
-        self._newest = [first] * self._players  # tick of the newest message
+        self._hashes: dict[int, int] = {}  # own hashes, by tick
+        self._their_hashes: dict[tuple[int, int], int] = {}  # hashes still to compare, by tick and player
+        self._newest = [first] * self._players  # per player, tick of its newest message
         self._leads = [0.0] * self._players
         self._waits = 0
         self._rollbacks = self._longest_rewind = 0
@@ -121,35 +124,40 @@ class RollbackSession:
 
     @property
     def tick(self) -> int:
-        """Number of the tick that `advance` makes next: the step count of the world on the first machine."""
+        """Number of the tick that `advance` makes next. It equals the step count of the world on the first
+        machine.
+        """
         return self._tick
 
     @property
     def confirmed(self) -> int:
-        """Tick before which all inputs are known: no message can change what happened before it."""
+        """First tick with an unknown input. No message can change what happened before it."""
         return min(self._heard)
 
     @property
     def ahead(self) -> float:
-        """Ticks by which this machine is ahead of the slowest other one, estimated; negative if it is behind.
+        """Estimated number of ticks by which this machine is ahead of the slowest other one; negative if it
+        is behind.
 
-        A game that occasionally skips a tick while this is above 1 avoids long rewinds for all machines.
+        A game that occasionally skips a tick while this is above 1 avoids long rewinds on all machines.
         """
         return max(self._leads[each] for each in self._others)
 
     @property
     def desync(self) -> int | None:
-        """First compared tick whose initial state differs on another machine; None if all states agree."""
+        """First compared tick at whose start the state differs on another machine; None if all states
+        agree.
+        """
         return self._desync
 
     @property
     def rollbacks(self) -> int:
-        """Number of rewinds so far."""
+        """Number of rewinds that this session has made."""
         return self._rollbacks
 
     @property
     def longest_rewind(self) -> int:
-        """Largest number of ticks that one rewind went back."""
+        """Largest number of ticks of a single rewind."""
         return self._longest_rewind
 
     def advance(self, own_input: bytes) -> bool:
@@ -157,8 +165,8 @@ class RollbackSession:
 
         Args:
             own_input: input of the own player, `input_size` bytes. It takes effect `delay` ticks later.
-        Returns: False if no tick was made, because `ticks` ticks are already predicted. Call it again in the
-            next frame, and keep sending messages.
+        Returns: False if no tick was made, because `ticks` ticks are already predicted. Call `advance` again
+            in the next frame, and keep sending messages.
         Raises: OptionError for an input of another size; SessionError after `patience` consecutive calls
             without a tick; errors of `act` and `World.step`, which leave the tick unmade.
         """
@@ -208,7 +216,7 @@ class RollbackSession:
         returned False."""
         first, end = min(self._acknowledged[each] for each in self._others), self._heard[self._player]
         own = [self._inputs[self._player][tick] for tick in range(first, end)]
-        # Send no hash of a state that a rewind or a late input can still change.
+        # Leave out hashes of states that a rewind or a late input can still change.
         final = min(self.confirmed, self._tick if self._wrong is None else self._wrong)
         tick = max((each for each in self._hashes if each <= final), default=NO_TICK)
         settings = self._player, self._players, self._input_size, self._ticks, self._hash_every
@@ -216,9 +224,9 @@ class RollbackSession:
         return HEAD.pack(*head) + struct.pack(f"<{self._players}I", *self._heard) + b"".join(own)
 
     def receive(self, data: bytes) -> None:
-        """Read a message of another machine. It can be late, repeated or out of order.
+        """Read a message from another machine. It can be late, repeated or out of order.
 
-        The next call of `advance` or `settle` repeats the ticks that it corrects.
+        The next call of `advance` or `settle` repeats the ticks that the message corrects.
         Args:
             data: result of `message` on the other machine.
         Raises: SessionError for a message that is damaged, belongs to another session, world or version, or
@@ -238,13 +246,13 @@ class RollbackSession:
             self._their_hashes[message.hash_tick, other] = message.hash
         if message.tick > self._newest[other]:
             self._newest[other] = message.tick
-            # Each machine sees the other one late. If the latency is equal in both directions, half of the
-            # difference is this machine's lead.
+            # Each machine receives the other's tick late. If the latency is equal in both directions, half of
+            # the difference is this machine's lead.
             lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 
     def _read(self, data: bytes) -> _Message:
-        """Parse and check a message. Raises: SessionError."""
+        """Parse a message and check it. Raises: SessionError for an invalid message."""
         body = HEAD.size + 4 * self._players
         if not isinstance(data, (bytes, bytearray)) or len(data) < body or data[:4] != MARK:
             raise SessionError("these bytes are not a message of a session of this version")
@@ -278,14 +286,14 @@ class RollbackSession:
         return message
 
     def _require_order(self, message: _Message) -> None:
-        """Check that a message agrees with earlier ones. Raises: SessionError."""
+        """Check that a message agrees with earlier messages. Raises: SessionError if it does not."""
         who, known = f"player {message.player}", self._inputs[message.player]
         due = self._heard[message.player]
         if message.first > due:
             raise SessionError(
                 f"{who} sends no input before tick {message.first}, and that of {due} is missing"
             )
-        most = self._heard[self._player] + 2 * self._ticks  # a correct machine waits before it
+        most = self._heard[self._player] + 2 * self._ticks  # a correct machine never sends later ticks
         hash_tick = -1 if message.hash_tick == NO_TICK else message.hash_tick
         if max(message.first + message.input_count, message.tick, hash_tick) > most:
             raise SessionError(
@@ -303,7 +311,9 @@ class RollbackSession:
         self._heard[player] += 1
 
     def _make_tick(self) -> None:
-        """Save the state, apply known or predicted inputs, and make a step. An error changes nothing."""
+        """Save the state, apply known or predicted inputs, and make a step. After an error, nothing is
+        changed.
+        """
         tick = self._world.step_count
         self._rollback.save()
         if tick % self._hash_every == 0:
@@ -320,7 +330,7 @@ class RollbackSession:
         self._used[tick] = used
 
     def _wait(self) -> None:
-        """Count a call that made no tick. Raises: SessionError if there were too many."""
+        """Count a call of `advance` that made no tick. Raises: SessionError if there were too many."""
         self._waits += 1
         if self._waits >= self._patience:
             tick = self.confirmed
@@ -331,7 +341,7 @@ class RollbackSession:
             )
 
     def _compare(self) -> None:
-        """Compare the hashes of states that no late input can change."""
+        """Compare own and received hashes of states that late inputs cannot change."""
         for (tick, player), theirs in list(self._their_hashes.items()):
             if tick <= self.confirmed and tick in self._hashes:
                 del self._their_hashes[tick, player]
@@ -339,7 +349,7 @@ class RollbackSession:
                     self._desync = tick if self._desync is None else min(self._desync, tick)
 
     def _forget(self) -> None:
-        """Drop data that no rewind and no message needs."""
+        """Drop data that neither a rewind nor a message needs."""
         confirmed = self.confirmed
         for player, known in enumerate(self._inputs):
             needed = (
@@ -347,7 +357,7 @@ class RollbackSession:
                 if player == self._player
                 else confirmed
             )
-            _drop_before(known, min(needed, confirmed) - 1)  # the last known input is the prediction
+            _drop_before(known, min(needed, confirmed) - 1)  # keep the last known input, for predictions
         _drop_before(self._used, confirmed)
         oldest = self._tick - 4 * self._ticks - self._delay - self._hash_every
         _drop_before(self._hashes, oldest)
@@ -356,6 +366,6 @@ class RollbackSession:
 
 
 def _drop_before(rows: dict[int, bytes] | dict[int, Inputs] | dict[int, int], tick: int) -> None:
-    """Delete entries of earlier ticks."""
+    """Delete the entries of ticks before `tick`."""
     for each in [each for each in rows if each < tick]:
         del rows[each]

@@ -1,4 +1,4 @@
-"""Choose the bodies that skip a step when there is no time for all: the farthest ones, in turn."""
+"""Choose the bodies that skip a step if there is no time for all bodies. The farthest bodies skip in turn."""
 
 from __future__ import annotations
 
@@ -9,43 +9,45 @@ from taichi_soft import Body, World
 from taichi_soft.core.handles import serial_of
 
 LEAST = 0.25
-"""Smallest fraction of skipping tetrahedra that move in each step, so that no body skips more than three
+"""Smallest fraction of the slow tetrahedra that move in each step, so that no body skips more than three
 steps in a row."""
 
 LOOK_AGAIN = 8
-"""Steps between updates of islands and distances."""
+"""Number of steps between updates of islands and distances."""
 
 
 @dataclass(frozen=True)
 class _Island:
-    """Connected bodies, which skip a step together."""
+    """A group of connected bodies, which always skip a step together."""
 
     bodies: tuple[Body, ...]
     tets: int
 
 
 class Skips:
-    """Chooses islands that skip a step: the farthest skip half of their steps, and more if that is not
-    enough.
+    """Chooses islands that skip a step. The farthest skip half of their steps, or more if that is not enough.
 
     The nearest island and islands with a held body never skip, see `Body.is_held`.
     """
 
     def __init__(self, world: World, from_near: Callable[[list[Body]], list[Body]]) -> None:
-        """Args: from_near: sorts bodies by distance, nearest first."""
+        """Start without skipping.
+
+        Args: from_near: function that sorts bodies by distance, nearest first.
+        """
         self.slow: tuple[Body, ...] = ()  # bodies that currently skip steps, the farthest first
         self._world, self._from_near = world, from_near
         self._islands: list[_Island] = []  # islands that can skip, the farthest first
         self._looked = 0  # steps until the next update of islands
-        self._waited: dict[int, int] = {}  # consecutive skipped steps of a body, by handle
+        self._waited: dict[int, int] = {}  # steps skipped in a row, by handle number
 
     def restart(self) -> None:
-        """Let no body skip."""
+        """Stop all skipping."""
         self.slow, self._looked = (), 0
         self._waited.clear()
 
     def choose(self, load: int, limit: float) -> list[Body]:
-        """Choose bodies to skip the next step, so that about `limit` of `load` tetrahedra move."""
+        """Choose the bodies that skip the next step, so that about `limit` of `load` tetrahedra move."""
         if load <= limit:
             self.restart()
             return []
@@ -53,7 +55,7 @@ class Skips:
         slow = self._slowed(load, limit)
         total, moving = sum(each.tets for each in slow), 0
         skipping: list[Body] = []
-        # Islands that have waited longest move first; among equals the nearest.
+        # Islands that have waited longest move first; among equals, the nearest does.
         for island in sorted(reversed(slow), key=self._wait, reverse=True):
             if moving < LEAST * total or load - total + moving + island.tets <= limit:
                 moving += island.tets
@@ -65,7 +67,7 @@ class Skips:
         return skipping
 
     def _look(self) -> None:
-        """Update the islands and their order."""
+        """Update the list of islands and their order."""
         self._looked -= 1
         if self._looked >= 0 and all(body.is_alive for island in self._islands for body in island.bodies):
             return
@@ -79,7 +81,7 @@ class Skips:
         ]
 
     def _slowed(self, load: int, limit: float) -> list[_Island]:
-        """Farthest islands, as many as needed if each makes half of the steps."""
+        """Return the farthest islands whose skipping of every second step meets `limit`."""
         slow, mean = [], float(load)
         for island in self._islands:
             if mean <= limit:

@@ -1,8 +1,8 @@
 """Write the demo as a project for Godot 3 or 4: `python write_project.py 3 FOLDER`.
 
-`demo` has the nodes and the demo in the words of Godot 4. `demo3` and `demo4` have the files that only one of
-the two reads. For Godot 3 the tables below replace words. Where a line differs in another way, the lines
-after it that begin with `# Godot 3: ` replace it.
+The folder `demo` contains the nodes and the demo for Godot 4. `demo3` and `demo4` contain files for one
+version only. For Godot 3, the tables below replace expressions. Lines that differ in other respects are
+replaced by the lines after them that begin with `# Godot 3: `.
 """
 
 import re
@@ -15,7 +15,7 @@ Pairs = list[tuple[str, str | Callable[[re.Match[str]], str]]]
 HERE = Path(__file__).resolve().parent
 PICTURE = HERE.parents[1] / "assets" / "elephant.glb"
 KINDS = (".gd", ".tscn", ".godot", ".gdns", ".gdnlib", ".gdextension", ".py")
-"""Ends of the names of files that belong to a project; an editor adds others."""
+"""Suffixes of the files that belong to a project. An editor adds other files."""
 
 MARK = "# Godot 3: "
 
@@ -35,7 +35,7 @@ NAMES = {
     "process_physics_priority": "process_priority",
     "reverse": "invert",
 }
-"""Godot 3's names, by Godot 4's."""
+"""Names in Godot 3, by names in Godot 4."""
 
 WORDS: Pairs = [
     *((rf"\b{re.escape(of_4)}\b", of_3) for of_4, of_3 in NAMES.items()),
@@ -43,7 +43,7 @@ WORDS: Pairs = [
     (r"\bPacked(\w+Array)\b", r"Pool\1"),
     (r"(?<!_path)\.is_empty\(\)", ".empty()"),  # a NodePath has `is_empty` in both
 ]
-"""Pairs of an expression and what replaces it, in scripts and scenes."""
+"""Pairs of a regular expression and its replacement, for scripts and scenes."""
 
 GRAMMAR: Pairs = [
     (r"^## ", "# "),
@@ -60,12 +60,12 @@ GRAMMAR: Pairs = [
     (r"\b(\w+)\.emit\(\)", r'emit_signal("\1")'),
     (r"\b(\w+)\.emit\(", r'emit_signal("\1", '),
     (r"\.(\w+)\.connect\((\w+)\)", r'.connect("\1", self, "\2")'),
-    # Only a project that lists the classes of its scripts knows their names.
+    # Godot knows the class names of scripts only if the project file lists them.
     (r"(:|->) SoftWorld\b", r"\1 Node"),
     (r" as SoftWorld\b", ""),
     (r"\bSoftWorld\.(?=[A-Z])", "_world."),
 ]
-"""The same, in scripts."""
+"""Pairs of a regular expression and its replacement, for scripts."""
 
 SCENE: Pairs = [
     (r"format=3", "format=2"),
@@ -77,11 +77,11 @@ SCENE: Pairs = [
         lambda m: f"{m[1]}extents = Vector3( {', '.join(f'{float(x) / 2:g}' for x in m[2].split(','))} )",
     ),
 ]
-"""The same, in scenes."""
+"""Pairs of a regular expression and its replacement, for scenes."""
 
 
 def main() -> None:
-    """Write a project. Files of an earlier one are replaced."""
+    """Write a project, and replace the files of an earlier one."""
     if len(sys.argv) != 3 or sys.argv[1] not in ("3", "4"):
         sys.exit("usage: python write_project.py 3|4 FOLDER")
     folder = Path(sys.argv[2])
@@ -93,7 +93,7 @@ def main() -> None:
 
 
 def files_of(version: int) -> dict[str, str]:
-    """Texts of the project for a version of Godot, by their paths in it."""
+    """Return the text of each file of the project for a version of Godot, by path."""
     found = {}
     for source in (HERE / "demo", HERE / f"demo{version}"):
         for path in sorted(source.rglob("*")):
@@ -105,7 +105,7 @@ def files_of(version: int) -> dict[str, str]:
 
 
 def translated(text: str, version: int) -> str:
-    """A script or scene in the words of a version of Godot."""
+    """Translate a script or scene from Godot 4 to `version`."""
     rows: list[str] = []
     is_replaced = False
     for row in text.splitlines():

@@ -1,6 +1,7 @@
 """Write the C++ headers of the fields of a world: `python write_fields.py`.
 
-The headers contain names, sizes, and bounds for snapshots. All follow from the declarations in Python.
+The headers contain names, sizes, and the valid ranges of values in snapshots, generated from the declarations
+in Python.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ ENUMS = {
 }
 
 COUNTS = {WORLD: "1", BODY: "bodies", PARTICLE: "particles", COLLIDER: "collider_room"}
-"""C++ expression for the number of rows, by `rows` of a declaration."""
+"""C++ expressions for the number of rows of a field, by `rows` of its declaration."""
 
 CONDITIONS = {
     "": "",
@@ -80,14 +81,14 @@ CONDITIONS = {
     "has_soft_contact": "has_soft_contact",
     "implicit": "is_implicit",
 }
-"""Member of `Scene` that is true if it has a field, by `when` of its declaration. Every exported world has
-contact."""
+"""Members of `Scene` that are true if the scene has the field, by `when` of its declaration. Every exported
+world has contact."""
 
 THINGS = {"": "kNothing", PARTICLE: "kParticles", BODY: "kBodies", COLLIDER: "kColliders", FRAME: "kFrames"}
 
 
 def headers() -> dict[str, str]:
-    """Texts of the headers, by file name."""
+    """Return the text of each header, by file name."""
     return {"constants.hpp": _constants_header(), "fields.hpp": _fields_header()}
 
 
@@ -175,7 +176,7 @@ def _groups() -> Iterator[tuple[str, type[FieldGroup]]]:
 
 
 def _members() -> Iterator[str]:
-    """Lines that declare the fields: each group is a struct with the name of the group."""
+    """Yield the lines that declare the fields. Each group is a struct with the group's name."""
     for prefix, group in _groups():
         inner = "  " if prefix else ""
         lines = []
@@ -195,7 +196,7 @@ def _members() -> Iterator[str]:
 
 
 def _bindings() -> Iterator[str]:
-    """Lines that bind the fields to their places in memory."""
+    """Yield the lines that bind the fields to their addresses in memory."""
     for prefix, group in _groups():
         for name, each in group.declarations().items():
             if not each.native:

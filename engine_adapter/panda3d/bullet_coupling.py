@@ -20,15 +20,15 @@ Floats = NDArray[np.float64]
 class BulletState:
     """Poses and velocities of rigid bodies. Returned by `BulletCoupling.snapshot`."""
 
-    rows: tuple[tuple[Any, ...], ...]  # one per rigid body
+    rows: tuple[tuple[Any, ...], ...]  # state of each rigid body
 
 
 class _Rigid:
-    """A rigid body and the colliders of its shapes."""
+    """A rigid body, and the colliders of its shapes."""
 
     def __init__(self, path: Any, colliders: tuple[NodeCollider, ...]) -> None:
         self.path, self.colliders = path, colliders
-        self.last: Floats = np.zeros((2, 3))  # impulse [N s] and angular impulse [N m s] of the last step
+        self.last: Floats = np.zeros((2, 3))  # impulse [N s] and angular impulse [N m s] in the last step
 
     @property
     def is_pushed(self) -> bool:
@@ -36,7 +36,7 @@ class _Rigid:
         return bool(node.get_mass() > 0.0 and not node.is_kinematic())
 
     def push(self) -> None:
-        """Apply the impulses on the colliders in the last step to Bullet's body."""
+        """Apply to Bullet's body the impulses that its colliders received in the last step."""
         now = self._impulses()
         if self.is_pushed:
             # Bullet receives impulses one step late. Adding half of the impulse now, and subtracting it in
@@ -50,7 +50,9 @@ class _Rigid:
         self.last = now
 
     def _impulses(self) -> Floats:
-        """Total impulse and angular impulse of its colliders, about the body's origin, (2, 3)."""
+        """Return the sum of the impulses and angular impulses on the colliders, about the body's origin,
+        (2, 3).
+        """
         total = np.zeros((2, 3))
         for each in self.colliders:
             collider = each.collider
@@ -73,7 +75,7 @@ class BulletCoupling:
 
     Args:
         world: world of the soft bodies.
-        bullet_world: a BulletWorld. Nothing else must step it.
+        bullet_world: a BulletWorld. No other code must step it.
     Raises: OptionError for other arguments.
     """
 
@@ -93,7 +95,7 @@ class BulletCoupling:
         restitution: float | None = None,
         thickness: float = 0.0,
     ) -> tuple[NodeCollider, ...]:
-        """Couple a rigid body to the soft bodies. A static or kinematic body pushes but is not pushed.
+        """Couple a rigid body to the soft bodies. Soft bodies do not move a static or kinematic body.
 
         Args:
             path: NodePath of a BulletRigidBodyNode that is attached to the Bullet world.
@@ -130,8 +132,8 @@ class BulletCoupling:
     def step(self, dt: float) -> None:
         """Step Bullet by `dt` [s]. Call this in `before_step`.
 
-        First, the rigid bodies receive the impulses of soft bodies from the last step. After Bullet's step,
-        the colliders follow their bodies.
+        The method first applies the impulses that soft bodies exerted in the last step to the rigid bodies.
+        After Bullet's step, it moves the colliders with their bodies.
         Args:
             dt: length of the step [s].
         """
@@ -144,9 +146,10 @@ class BulletCoupling:
                 one.follow()
 
     def snapshot(self) -> BulletState:
-        """Return poses and velocities of the rigid bodies. Call it together with `World.snapshot`.
+        """Return the poses and velocities of the rigid bodies. Call this together with `World.snapshot`.
 
-        It does not contain Bullet's contact cache, so a restored run looks the same but is not bit-identical.
+        The result does not contain Bullet's contact cache. A restored run therefore looks the same but is not
+        bit-identical.
         """
         rows = []
         for each in self._rigid:
@@ -156,7 +159,7 @@ class BulletCoupling:
         return BulletState(tuple(rows))
 
     def restore(self, state: BulletState) -> None:
-        """Restore the rigid bodies. Call it after `World.restore`, which restores their colliders.
+        """Restore the rigid bodies. Call this after `World.restore`, which restores their colliders.
 
         Args:
             state: result of `snapshot`.

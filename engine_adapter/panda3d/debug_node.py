@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 _AWAKE, _ASLEEP, _FROZEN = (1.0, 1.0, 1.0, 1.0), (0.3, 0.5, 1.0, 1.0), (1.0, 0.1, 0.1, 1.0)
 _COLLIDER, _GRAB = (0.1, 0.9, 0.2, 1.0), (1.0, 0.9, 0.0, 1.0)
 _CROSS = 0.05
-"""Half the size of the cross at a grab's target [m]."""
+"""Half the size of the cross at the target of a grab [m]."""
 
 
 class DebugNode(core.NodePath):  # type: ignore[misc]
-    """A NodePath to lines: edges of all bodies and colliders, and targets of grabs.
+    """A NodePath that shows the edges of all bodies and colliders, and the targets of grabs, as lines.
 
     Moving bodies are white, sleeping ones blue, frozen ones red. Colliders are green, grabs are yellow
-    crosses. Bodies are drawn at their interpolated positions, as in `SoftBodyNode`, colliders at their
+    crosses. Bodies are drawn at interpolated positions, as in `SoftBodyNode`. Colliders are drawn at their
     positions after the last step. A hidden node computes nothing.
 
     Args:
@@ -37,11 +37,11 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
             raise OptionError(f"adapter must be an EngineAdapter, got {type(adapter).__name__}")
         super().__init__(core.GeomNode("soft body debug"))
         self._adapter = adapter
-        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # with their topology version
+        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # with topology versions
         self._shape_edges: dict[Shape, Floats] = {}
         self.set_light_off(1)
         self.set_texture_off(1)
-        self.set_depth_offset(1)  # in front of the surface that they lie on
+        self.set_depth_offset(1)  # draw in front of the surface that contains the lines
 
     def draw(self) -> None:
         """Update the lines, unless the node is hidden."""
@@ -57,7 +57,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
             self.node().add_geom(_lines(parts))
 
     def _of_body(self, body: Body) -> NDArray[Any]:
-        """Endpoints of the edges of a body's tetrahedra, or of a rope or cloth, (2 k, 3)."""
+        """Return the endpoints of the edges of a body's tetrahedra, or of a rope or cloth, (2 k, 3) [m]."""
         version, edges = self._body_edges.get(body, (-1, np.zeros((0, 2), dtype=np.int32)))
         if version != body.topology_version:
             edges = _edges_of(body.tets) if len(body.tets) else body.mesh.edges
@@ -65,7 +65,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
         return self._adapter.positions(body)[edges.reshape(-1)]
 
     def _of_collider(self, collider: Collider) -> Floats:
-        """Endpoints of the edges of a collider's shape at its pose, (2 k, 3)."""
+        """Return the endpoints of the edges of a collider's shape at its pose, (2 k, 3) [m]."""
         shape = collider.shape
         if shape not in self._shape_edges:
             vertices, triangles = shape.surface()
@@ -75,7 +75,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
 
 
 def _edges_of(simplices: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Unique edges of triangles (m, 3) or tetrahedra (m, 4), (k, 2)."""
+    """Return the unique edges of triangles (m, 3) or tetrahedra (m, 4), (k, 2)."""
     corners = simplices.shape[1]
     pairs = [simplices[:, [i, j]] for i in range(corners) for j in range(i)]
     edges: NDArray[np.int32] = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
@@ -94,7 +94,7 @@ def _of_grab(point: Floats) -> Floats:
 
 
 def _lines(parts: list[tuple[NDArray[Any], tuple[float, ...]]]) -> Any:
-    """Make a Geom of lines between the endpoints (2 k, 3) of each part, in its colour."""
+    """Make a Geom with the lines of each part, from its endpoints (2 k, 3) and its colour."""
     ends = np.concatenate([each for each, _ in parts]).astype(np.float32)
     colors = np.concatenate(
         [np.tile(np.array(color, dtype=np.float32), (len(each), 1)) for each, color in parts]

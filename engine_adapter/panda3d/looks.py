@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from panda3d import core
 
 _UNSET = np.full(3, 102 / 255)
-"""The grey that trimesh assigns to a material without a colour."""
+"""Grey that trimesh assigns to a material without a colour."""
 
-_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material, shared by the bodies of an asset
+_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material, for all bodies of an asset
 
 
 def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
-    """Texture coordinates of `count` vertices, float32 (count, 2) from 0 to 1, v upwards.
+    """Return the texture coordinates of `count` vertices, float32 (count, 2) from 0 to 1; None without a
+    texture.
 
-    None without a texture. In trimesh and in Panda3D, v starts at the lowest row.
+    In trimesh and in Panda3D, v = 0 is the lowest row of the image.
     """
     if getattr(visual, "kind", None) != "texture" or _picture(visual.material) is None:
         return None
@@ -28,16 +29,17 @@ def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
 
 
 def vertex_colors(visual: Any, count: int) -> NDArray[np.float32] | None:
-    """Colours of `count` vertices, float32 (count, 4) from 0 to 1; None if the mesh has none."""
+    """Return the colours of `count` vertices, float32 (count, 4) from 0 to 1; None if the mesh has none."""
     if getattr(visual, "kind", None) not in ("vertex", "face") or len(visual.vertex_colors) != count:
         return None
     return np.asarray(np.asarray(visual.vertex_colors) / 255.0, dtype=np.float32)
 
 
 def render_state(visual: Any, is_textured: bool) -> Any:
-    """RenderState of Panda3D with the texture and the colour of a material, empty if it has neither.
+    """Make a Panda3D RenderState with the texture and colour of a material; empty if the material has
+    neither.
 
-    To override the colour, set one with a priority: `node.set_color(red, 1)`.
+    To override the colour, set another colour with a priority: `node.set_color(red, 1)`.
     """
     state = core.RenderState.make_empty()
     if getattr(visual, "kind", None) != "texture":
@@ -56,13 +58,13 @@ def render_state(visual: Any, is_textured: bool) -> Any:
 
 
 def _picture(material: Any) -> Any:
-    """Image of a material (Pillow), or None."""
+    """Return the image of a material (Pillow), or None."""
     found = getattr(material, "baseColorTexture", None)
     return getattr(material, "image", None) if found is None else found
 
 
 def _texture(material: Any) -> Any:
-    """core.Texture of a material, cached while the material exists."""
+    """Return the core.Texture of a material. It is cached while the material exists."""
     kept = _textures.get(id(material))
     if kept is not None and kept[0]() is material:
         return kept[1]

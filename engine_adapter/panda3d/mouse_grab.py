@@ -14,13 +14,13 @@ from taichi_soft import Body, Grab, OptionError, World
 Floats = NDArray[np.float64]
 
 _GRAZING = 1e-3
-"""Smallest cosine between a ray and the plane's normal; flatter rays hit the plane too far away."""
+"""Smallest cosine between a ray and the normal of the drag plane. Flatter rays hit the plane too far away."""
 
 
 class MouseGrab:
     """Grabs the body under the mouse while a button is down.
 
-    The picked point follows the mouse in the plane through it that faces the camera.
+    The grabbed point follows the mouse in a plane parallel to the screen.
 
     Args:
         base: the game's ShowBase.
@@ -28,7 +28,7 @@ class MouseGrab:
         button: event of the mouse button; with None the game calls `press`, `move` and `release` itself.
         bodies: bodies that can be grabbed; None for all.
         frequency, max_force: strength of the grab, see `World.grab`.
-        sort: sort of the task that follows the mouse; it must run before the world's step.
+        sort: sort of the task that follows the mouse. The task must run before the step of the world.
     Raises: OptionError if `world` is not a World.
     """
 
@@ -49,7 +49,7 @@ class MouseGrab:
         self._bodies = None if bodies is None else tuple(bodies)
         self._frequency, self._max_force = frequency, max_force
         self._grab: Grab | None = None
-        self._plane = (np.zeros(3), np.zeros(3))  # a point and the normal
+        self._plane = (np.zeros(3), np.zeros(3))  # a point [m] and the normal
         if button is not None:
             base.accept(button, self._press_at_mouse)
             base.accept(f"{button}-up", self.release)
@@ -57,7 +57,7 @@ class MouseGrab:
 
     @property
     def grab(self) -> Grab | None:
-        """Current grab; None if there is none or the body was removed."""
+        """Current grab; None without a grab, or after its body was removed."""
         if self._grab is not None and not self._grab.is_held:
             self._grab = None
         return self._grab
@@ -86,8 +86,9 @@ class MouseGrab:
         return self._grab is not None
 
     def move(self, x: float, y: float) -> None:
-        """Move the grab to the point where the ray through a window point hits the plane, if it does.
+        """Move the target of the grab to the drag plane, on the ray through a point of the window.
 
+        If the ray misses the plane, the target does not move.
         Args:
             x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
         """
@@ -101,17 +102,18 @@ class MouseGrab:
             self.grab.move(near + distance * along)
 
     def release(self) -> None:
-        """Release the grab, if there is one."""
+        """Release the current grab. Without one, do nothing."""
         if self.grab is not None:
             self.grab.release()
         self._grab = None
 
     def ray(self, x: float, y: float) -> tuple[Floats, Floats]:
-        """Return start and end of the line of sight through a window point, (3,) [m] each.
+        """Return the start and the end of the ray through a point of the window, within the lens's range,
+        (3,) [m] each.
 
         Args:
             x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
-        Raises: OptionError if the camera's lens has no such line.
+        Raises: OptionError if the camera's lens has no ray there.
         """
         ends = core.LPoint3(), core.LPoint3()
         if not self._base.camLens.extrude(core.LPoint2(x, y), *ends):

@@ -28,15 +28,17 @@ class NodeCollider:
         return f"NodeCollider({self.path.get_name()!r}, {self.collider!r})"
 
     def follow(self) -> None:
-        """Move the collider to the node's pose over the next step, pushing bodies on the way.
+        """Move the collider to the node's pose over the next step. It pushes the bodies in its path.
 
-        Call this in `before_step`, after moving the node to its pose at the end of the step.
+        Call this in `before_step`, after setting the pose that the node has at the end of the step.
         Raises: StateError after the collider was removed.
         """
         self.collider.move_to(*self._placed.pose(self.path))
 
     def teleport(self) -> None:
-        """Jump to the node's pose without pushing. Raises: StateError after the collider was removed."""
+        """Move the collider to the node's pose at once, without pushing bodies. Raises: StateError after the
+        collider was removed.
+        """
         self.collider.teleport(*self._placed.pose(self.path))
 
 
@@ -48,13 +50,14 @@ def add_colliders(
     restitution: float | None = None,
     thickness: float = 0.0,
 ) -> tuple[NodeCollider, ...]:
-    """Add a collider for each collision solid and Bullet shape at and below a node, at their current poses.
+    """Add a collider for each collision solid and Bullet shape of a node and its descendants, at their
+    current poses.
 
     World coordinates are those of the root of the scene graph, such as `base.render`.
     Args:
         world: world before `build`, or with enough `collider_room`.
         path: NodePath of the node.
-        friction: Coulomb coefficient. None takes that of a Bullet node, and 0.5 for other nodes.
+        friction: Coulomb coefficient. None uses the friction of a Bullet node, and 0.5 for other nodes.
         restitution, thickness: see `World.add_collider`.
     Returns: the colliders, in the order of the nodes. Static colliders need no further calls.
     Raises: as `shapes_of`, with nothing changed; OptionError if there is no shape; as `World.add_collider`.
@@ -78,7 +81,7 @@ def add_colliders(
 
 
 def _nodes(path: Any) -> Iterator[Any]:
-    """Paths to the node and its descendants that can have shapes, without Bullet's ghosts."""
+    """Yield the paths of the node and its descendants that can have shapes, except Bullet's ghosts."""
     if isinstance(path.node(), (core.CollisionNode, bullet.BulletRigidBodyNode)):
         yield path
     for child in path.get_children():

@@ -16,7 +16,7 @@ from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, Shape, 
 Floats = NDArray[np.float64]
 
 _SCALE_TOLERANCE = 1e-3
-"""Largest relative difference of scales that count as uniform, because of rounding in float32."""
+"""Largest relative difference of scales that count as uniform. It covers rounding in float32."""
 
 _ADVICE = "build it from those, or add a shape with World.add_collider"
 
@@ -27,8 +27,8 @@ class PlacedShape:
 
     Args:
         shape: shape of taichi-soft, scaled.
-        position: position of its origin, (3,) [m].
-        rotation: its axes as columns, (3, 3).
+        position: position of the shape's origin, (3,) [m].
+        rotation: axes of the shape as columns, (3, 3).
     """
 
     shape: Shape
@@ -36,7 +36,8 @@ class PlacedShape:
     rotation: Floats
 
     def pose(self, path: Any) -> tuple[Floats, Floats]:
-        """Position (3,) [m] and rotation (3, 3) in the world, for the node's current pose.
+        """Return the position (3,) [m] and rotation (3, 3) of the shape in the world, for the node's current
+        pose.
 
         Args:
             path: NodePath of the node.
@@ -48,7 +49,7 @@ class PlacedShape:
 def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
     """Convert the shapes of one CollisionNode or Bullet node, in order.
 
-    Supported are CollisionSphere, CollisionBox, CollisionCapsule and CollisionPlane, with any uniform scale,
+    Supported are CollisionSphere, CollisionBox, CollisionCapsule and CollisionPlane, at any uniform scale;
     and BulletSphereShape, BulletBoxShape, BulletCapsuleShape and BulletPlaneShape, unscaled.
     Args:
         path: NodePath to the node.
@@ -69,13 +70,13 @@ def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
 
 
 def pose_of(path: Any) -> tuple[Floats, Floats]:
-    """Position (3,) [m] and rotation (3, 3) of a node relative to the root of its scene graph."""
+    """Return the position (3,) [m] and rotation (3, 3) of a node relative to the root of its scene graph."""
     transform = path.get_net_transform()
     return np.array(transform.get_pos(), dtype=np.float64), _matrix(transform.get_norm_quat())
 
 
 def _matrix(quaternion: Any) -> Floats:
-    """Rotation with axes as columns, (3, 3). Panda3D uses row vectors."""
+    """Return the rotation with the axes as columns, (3, 3), because Panda3D's rows are the axes."""
     rows = core.LMatrix3()
     quaternion.extract_to_matrix(rows)
     turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T
@@ -83,7 +84,7 @@ def _matrix(quaternion: Any) -> Floats:
 
 
 def _scale(path: Any) -> float:
-    """Uniform scale of a node. Raises: OptionError for a non-uniform scale or a shear."""
+    """Return the uniform scale of a node. Raises: OptionError for a non-uniform scale or a shear."""
     transform = path.get_net_transform()
     scale = np.array(transform.get_scale(), dtype=np.float64)
     spread = float(np.ptp(scale))
@@ -126,7 +127,7 @@ def _at(shape: Shape, position: Any, rotation: Floats | None = None) -> PlacedSh
 
 
 def _onto(axis: Floats) -> Floats:
-    """Rotation (3, 3) from z to a unit vector (3,)."""
+    """Return the rotation (3, 3) that turns z onto a unit vector (3,)."""
     across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
     turn: Floats = np.array([across, np.cross(axis, across), axis]).T
@@ -154,7 +155,7 @@ def _capsule(solid: Any, scale: float) -> PlacedShape:
 def _plane(solid: Any, scale: float) -> PlacedShape:
     normal = np.array(solid.get_plane().get_normal(), dtype=np.float64)
     length = float(np.linalg.norm(normal))
-    offset = solid.get_plane()[3] / length  # of n x + offset = 0
+    offset = solid.get_plane()[3] / length  # the plane is n x + offset = 0
     return _at(PlaneShape(normal), -scale * offset * normal / length)
 
 
@@ -167,7 +168,9 @@ def _bullet_box(shape: Any) -> PlacedShape:
 
 
 def _bullet_capsule(shape: Any) -> PlacedShape:
-    """Panda3D does not expose the axis of a capsule: it is the axis of the smallest moment of inertia."""
+    """Convert a capsule. Panda3D does not expose its axis, so this uses the axis with the smallest moment of
+    inertia.
+    """
     probe = bullet.BulletRigidBodyNode()
     probe.add_shape(shape)
     probe.set_mass(1.0)
@@ -188,7 +191,8 @@ _SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
     core.CollisionCapsule: _capsule,
     core.CollisionPlane: _plane,
 }
-"""By exact class, because CollisionPolygon is a subclass of CollisionPlane, and hollow solids of spheres."""
+"""Converters by exact class: CollisionPolygon is a subclass of CollisionPlane but no plane, and hollow solids
+are subclasses of spheres."""
 
 _BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
     bullet.BulletSphereShape: _bullet_sphere,

@@ -13,11 +13,12 @@ from engine_adapter.panda3d.looks import render_state, texture_places, vertex_co
 from taichi_soft import Body, OptionError, RenderMesh
 
 _POSITIONS, _NORMALS, _LOOK = range(3)
-"""Arrays of a vertex buffer, one per column: a kernel fills the first two in place."""
+"""Columns of a vertex buffer: arrays of positions, normals, and texture coordinates or colours. A kernel
+fills the first two in place."""
 
 
 class SoftBodyNode(core.NodePath):  # type: ignore[misc]
-    """A NodePath to a GeomNode that draws one body, in its parent's coordinates.
+    """A NodePath to a GeomNode that draws one body, in the coordinates of its parent node.
 
         node = SoftBodyNode(adapter, body)
         node.reparent_to(base.render)
@@ -26,8 +27,8 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
     A body with skins is drawn as the artist's meshes, with textures and texture coordinates; other bodies as
     their surface. A kernel writes positions and normals directly into Panda3D's vertex buffers. The node
-    makes new buffers when the body was cut, torn or restored, or changed its level of detail. A removed body
-    is not drawn, until `World.restore` brings it back.
+    makes new buffers after a cut, a tear, a restore, or a change of level of detail. It does not draw a
+    removed body until `World.restore` restores it.
 
     Args:
         adapter: adapter that steps the body's world.
@@ -55,11 +56,11 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
     @property
     def meshes(self) -> tuple[RenderMesh, ...]:
-        """Current render meshes, in the order of the Geoms; empty if the body was removed."""
+        """Current render meshes, in the order of the Geoms; empty after the body was removed."""
         return self._meshes
 
     def draw(self) -> None:
-        """Update the buffers with positions interpolated by `EngineAdapter.alpha`.
+        """Fill the buffers with positions interpolated by `EngineAdapter.alpha`.
 
         Raises: as `EngineAdapter.render_mesh`.
         """
@@ -70,14 +71,14 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
         if not self._meshes or any(mesh.is_outdated for mesh in self._meshes):
             self._make()
         for number, mesh in enumerate(self._meshes):
-            geom = self.node().modify_geom(number)  # tells the node that its bounds changed
+            geom = self.node().modify_geom(number)  # `modify_geom` also updates the node's bounds
             data = geom.modify_vertex_data()
             positions = rows_in(data, _POSITIONS, 3)
             self._adapter.render_mesh(mesh, positions, rows_in(data, _NORMALS, 3))
             geom.set_bounds(_box_round(positions))
 
     def _make(self) -> None:
-        """Make buffers for the body's current meshes."""
+        """Make buffers for the current meshes of the body."""
         skins: tuple[RenderMesh, ...] = self._body.render_meshes
         self._meshes = skins or (self._body.render_mesh(crease=self._crease),)
         self.node().remove_all_geoms()
@@ -90,14 +91,16 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
 
 def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
-    """NumPy view of an array of a GeomVertexData, float32 (n, width). Use it only briefly: Panda3D may move
-    the array between frames."""
+    """Return a NumPy view of an array of a GeomVertexData, float32 (n, width). Do not keep it: Panda3D may
+    move the array between frames."""
     view = memoryview(data.modify_array(array)).cast("B")
     return np.frombuffer(view, dtype=np.float32).reshape(-1, width)
 
 
 def _box_round(positions: NDArray[np.float32]) -> Any:
-    """BoundingBox of points (n, 3) for culling; a bounding sphere is much slower to compute in Panda3D."""
+    """Return a BoundingBox of points (n, 3) for culling, because Panda3D computes a bounding sphere much more
+    slowly.
+    """
     columns = positions.T.copy()
     corners = (
         core.LPoint3(*(float(end) for end in ends)) for ends in (columns.min(axis=1), columns.max(axis=1))
@@ -106,7 +109,9 @@ def _box_round(positions: NDArray[np.float32]) -> Any:
 
 
 def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
-    """Make buffers for a mesh, with triangles, and texture coordinates (k, 2) or colours (k, 4)."""
+    """Make buffers and triangles for a mesh. `look` has its texture coordinates (k, 2) or colours (k, 4), or
+    is None.
+    """
     width = 0 if look is None else look.shape[1]
     data = core.GeomVertexData("soft body", _vertex_format(width), core.Geom.UH_dynamic)
     data.set_num_rows(mesh.vertex_count)
@@ -123,7 +128,9 @@ def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
 
 
 def _vertex_format(look: int) -> Any:
-    """Vertex format: positions, normals, and texture coordinates (`look` 2), colours (4) or neither (0)."""
+    """Return the vertex format: positions, normals, and texture coordinates (`look` 2), colours (4) or
+    neither (0).
+    """
     columns = [
         (core.InternalName.get_vertex(), 3, core.Geom.C_point),
         (core.InternalName.get_normal(), 3, core.Geom.C_normal),

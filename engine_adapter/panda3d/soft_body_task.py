@@ -30,7 +30,7 @@ class SoftBodyTask:
         base: the game's ShowBase.
         adapter: adapter that steps the world.
         nodes: nodes to draw, in this order.
-        sort: sort of the task, see `task_mgr.add`. Panda3D renders the frame at 50.
+        sort: sort of the task, see `task_mgr.add`. Panda3D's own task that renders the frame has sort 50.
     Raises: OptionError if `adapter` is not an EngineAdapter.
 
     Attributes:
@@ -47,7 +47,7 @@ class SoftBodyTask:
         self._task = base.task_mgr.add(self._run, "soft bodies", sort=sort)
 
     def remove(self) -> None:
-        """Remove the task. The world is no longer stepped."""
+        """Remove the task, so that it no longer steps the world."""
         self._base.task_mgr.remove(self._task)
 
     def _run(self, task: Any) -> Any:

@@ -9,7 +9,7 @@ export class Rollback {
   rewindTo(step: number): void;
 }
 
-/** Use the same options on all machines, except `player`, `delay` and `patience`. */
+/** Give all machines the same options, except `player`, `delay` and `patience`. */
 export interface SessionOptions {
   /** Number of the own player, from 0. */
   player: number;
@@ -19,15 +19,15 @@ export interface SessionOptions {
   inputSize: number;
   /** Length of a tick [s]. */
   dt?: number;
-  /** Substeps per tick; 0 chooses a stable number. */
+  /** Number of substeps per tick. With 0, a stable number is chosen. */
   substeps?: number;
   /** Largest number of ticks made on predictions. */
   ticks?: number;
-  /** Ticks until an own input takes effect. */
+  /** Number of ticks until an own input takes effect. */
   delay?: number;
-  /** Ticks between comparisons of hashes. */
+  /** Number of ticks between comparisons of hashes. */
   hashEvery?: number;
-  /** Largest number of consecutive `advance` calls that wait, before one throws. */
+  /** Largest number of consecutive `advance` calls that wait for another player. Then `advance` throws an error. */
   patience?: number;
 }
 

@@ -6,7 +6,7 @@ const NO_TICK = 0xffffffff;
 const HEAD_SIZE = 42;
 const LEAD_SMOOTHING = 0.1; // weight of the newest message in the estimate of how far ahead this machine is
 
-/** Error of a refused call of `Rollback` or `RollbackSession`. Nothing was changed. */
+/** Thrown by refused calls of `Rollback` or `RollbackSession`. A refused call changes nothing. */
 export class SessionError extends Error {
   constructor(text) {
     super(text);
@@ -19,12 +19,12 @@ function whole(value, name, low, high) {
   throw new SessionError(`${name} must be a whole number from ${low} to ${high}, got ${value}`);
 }
 
-/** Snapshots of the last steps of a world: `save` before each step, `rewindTo` one of `steps`. */
+/** Snapshots of the last steps of a world. Call `save` before each step, and `rewindTo` with one of `steps`. */
 export class Rollback {
   #world;
   #ticks;
-  #snapshots = new Map(); // by the world's step count, ascending
-  #restoreCount; // the world's, while the snapshots are its past
+  #snapshots = new Map(); // by step count, ascending
+  #restoreCount; // the world's count when the snapshots were stored
 
   constructor(world, ticks) {
     this.#world = world;
@@ -32,17 +32,17 @@ export class Rollback {
     this.#restoreCount = world.restoreCount;
   }
 
-  /** Step counts that can be restored, ascending. */
+  /** Step counts that `rewindTo` can restore, ascending. */
   get steps() {
     return this.#isPast ? [...this.#snapshots.keys()] : [];
   }
 
-  // True if the snapshots lead to the current state.
+  // True if the snapshots are from the past of the current state.
   get #isPast() {
     return this.#restoreCount === this.#world.restoreCount;
   }
 
-  /** Store the current state. Call it between a step and the inputs of the next one. */
+  /** Store the current state. Call this between a step and the inputs of the next one. */
   save() {
     if (!this.#isPast) {
       this.#snapshots.clear();
@@ -51,11 +51,11 @@ export class Rollback {
     const now = this.#world.clock.steps;
     this.#snapshots.delete(now);
     this.#snapshots.set(now, this.#world.snapshot());
-    // The current state is not a step back.
+    // The newest snapshot is the current state.
     while (this.#snapshots.size > this.#ticks + 1) this.#snapshots.delete(this.#snapshots.keys().next().value);
   }
 
-  /** Restore the state that `save` stored at a step count, and drop later ones. */
+  /** Restore the state that `save` stored at a step count, and drop later states. */
   rewindTo(step) {
     if (!this.#isPast) {
       throw new SessionError(
@@ -81,9 +81,9 @@ function dropBefore(rows, tick) {
 }
 
 /**
- * One machine's side of a game. `advance` makes a tick with the own input and predicted inputs of the others. `message`
- * returns a datagram for all others. `receive` reads theirs, which can be late, repeated or out of order.
- * `act(inputs)` applies the inputs of all players, by player, before each step; a tick can be made several times.
+ * The session of one machine. `advance` makes a tick with the own input and predicted inputs of the others. `message`
+ * returns a datagram for all other machines. `receive` reads theirs, which can be late, repeated or out of order.
+ * `act(inputs)` applies the inputs of all players, by player, before each step. A tick can be made several times.
  */
 export class RollbackSession {
   #world;
@@ -93,14 +93,14 @@ export class RollbackSession {
   #rollback;
   #start;
   #tick;
-  #inputs; // known ones, by player and tick
-  #used = new Map(); // by tick
-  #heard; // by player: all inputs before this tick are known
-  #acknowledged; // by player: tick up to which it knows our inputs
+  #inputs; // known inputs, by player and tick
+  #used = new Map(); // inputs with which each tick was made
+  #heard; // by player, the first tick without a known input
+  #acknowledged; // by player, the first tick of our inputs that it lacks
   #wrong = null; // first tick with a wrong prediction
-  #hashes = new Map(); // own ones, by tick
-  #theirHashes; // not compared yet, by player and tick
-  #newest; // tick of the newest message
+  #hashes = new Map(); // own hashes, by tick
+  #theirHashes; // hashes still to compare, by player and tick
+  #newest; // by player, tick of its newest message
   #leads;
   #waits = 0;
   #rollbacks = 0;
@@ -153,17 +153,17 @@ export class RollbackSession {
     return this.#tick;
   }
 
-  /** Tick before which all inputs are known: no message can change what happened before it. */
+  /** First tick with an unknown input. No message can change what happened before it. */
   get confirmed() {
     return Math.min(...this.#heard);
   }
 
-  /** Ticks by which this machine is ahead of the slowest other one, estimated; negative if it is behind. */
+  /** Estimated number of ticks by which this machine is ahead of the slowest other one; negative if it is behind. */
   get ahead() {
     return Math.max(...this.#others.map((each) => this.#leads[each]));
   }
 
-  /** First compared tick whose initial state differs on another machine; null if all states agree. */
+  /** First compared tick at whose start the state differs on another machine; null if all states agree. */
   get desync() {
     return this.#desync;
   }
@@ -177,7 +177,7 @@ export class RollbackSession {
     return this.#longestRewind;
   }
 
-  /** Correct wrong predictions, then make a tick. Returns false if it must wait for another player. */
+  /** Correct wrong predictions, then make a tick. Returns false if this machine must wait for another player. */
   advance(ownInput) {
     const { player, inputSize, ticks } = this.#settings;
     if (!(ownInput instanceof Uint8Array) || ownInput.length !== inputSize) {
@@ -190,7 +190,7 @@ export class RollbackSession {
     }
     this.#waits = 0;
     const tick = this.#heard[player];
-    this.#learn(player, Uint8Array.from(ownInput)); // a copy, of a Buffer too
+    this.#learn(player, Uint8Array.from(ownInput)); // a copy, even of a Buffer
     try {
       this.#makeTick();
     } catch (error) {
@@ -225,7 +225,7 @@ export class RollbackSession {
     const { player, players, inputSize, ticks, hashEvery } = this.#settings;
     const first = Math.min(...this.#others.map((each) => this.#acknowledged[each]));
     const count = this.#heard[player] - first;
-    // Send no hash of a state that a rewind or a late input can still change.
+    // Leave out hashes of states that a rewind or a late input can still change.
     const final = Math.min(this.confirmed, this.#wrong ?? this.#tick);
     const tick = Math.max(...[...this.#hashes.keys()].filter((each) => each <= final));
     const data = new Uint8Array(HEAD_SIZE + 4 * players + inputSize * count);
@@ -246,7 +246,7 @@ export class RollbackSession {
     return data;
   }
 
-  /** Read a message of another machine. The next `advance` or `settle` repeats the ticks that it corrects. */
+  /** Read a message from another machine. The next `advance` or `settle` repeats the ticks that it corrects. */
   receive(data) {
     const message = this.#read(data);
     const other = message.player;
@@ -263,8 +263,8 @@ export class RollbackSession {
     if (message.hashTick !== NO_TICK) this.#theirHashes[other].set(message.hashTick, message.hash);
     if (message.tick > this.#newest[other]) {
       this.#newest[other] = message.tick;
-      // Each machine sees the other one late. If the latency is equal in both directions, half of the difference is
-      // this machine's lead.
+      // Each machine receives the other's tick late. If the latency is equal in both directions, half of the difference
+      // is this machine's lead.
       const lead = (this.#tick - message.tick - (message.tick - (heard - delay))) / 2;
       this.#leads[other] += LEAD_SMOOTHING * (lead - this.#leads[other]);
     }
@@ -321,7 +321,7 @@ export class RollbackSession {
     if (first > due) {
       throw new SessionError(`${who} sends no input before tick ${first}, and that of ${due} is missing`);
     }
-    const most = own + 2 * this.#settings.ticks; // a correct machine waits before it
+    const most = own + 2 * this.#settings.ticks; // a correct machine never sends later ticks
     if (Math.max(first + inputs.length, tick, hashTick === NO_TICK ? -1 : hashTick) > most) {
       throw new SessionError(`${who} is beyond tick ${most}, which no machine of this session can have reached`);
     }
@@ -357,7 +357,7 @@ export class RollbackSession {
     this.#used.set(tick, used);
   }
 
-  // Counts a call that made no tick.
+  // Counts a call of `advance` that made no tick.
   #wait() {
     this.#waits += 1;
     if (this.#waits < this.#settings.patience) return;
@@ -369,7 +369,7 @@ export class RollbackSession {
     );
   }
 
-  // Compares the hashes of states that no late input can change.
+  // Compares own and received hashes of states that late inputs cannot change.
   #compare() {
     for (const hashes of this.#theirHashes) {
       for (const [tick, theirs] of hashes) {
@@ -380,13 +380,13 @@ export class RollbackSession {
     }
   }
 
-  // Drops data that no rewind and no message needs.
+  // Drops data that neither a rewind nor a message needs.
   #forget() {
     const { player, ticks, delay, hashEvery } = this.#settings;
     const { confirmed } = this;
     const unsent = Math.min(...this.#others.map((each) => this.#acknowledged[each]));
     this.#inputs.forEach((known, each) => {
-      // The last known input is the prediction.
+      // Keep the last known input, for predictions.
       dropBefore(known, Math.min(each === player ? unsent : confirmed, confirmed) - 1);
     });
     dropBefore(this.#used, confirmed);

@@ -16,12 +16,12 @@ export class SoftError extends Error {
 
 export type Kind = "body" | "asset" | "collider" | "frame" | "mesh" | "joint" | "motor";
 
-/** A world file: `loadScene` reads it. Worlds of one scene share its code. */
+/** A world file, read by `loadScene`. All worlds of a scene use the same code. */
 export class Scene {
   readonly counts: Record<Kind, number>;
   /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
   nameOf(kind: Kind, number: number): string;
-  /** Number of an object, by its name. */
+  /** Number of an object with a name. */
   find(kind: Kind, name: string | number): number;
   /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name: string | number): {
@@ -33,7 +33,7 @@ export class Scene {
   };
   /** Create a world in its exported state. */
   createWorld(): World;
-  /** Free the scene when the last of its worlds is destroyed. */
+  /** Free the scene after the last of its worlds is destroyed. */
   unload(): void;
 }
 
@@ -80,71 +80,71 @@ export interface Shape {
 /** A simulation of a scene. */
 export class World {
   readonly scene: Scene;
-  /** `stepsMade` by the last `advance`, `steps`, `time` [s], `alpha`, `dropped` [s]. */
+  /** `stepsMade` by the last `advance`, `steps` in total, `time` [s], `alpha`, `dropped` time [s]. */
   readonly clock: Clock;
-  /** All bodies, by slot. */
+  /** All bodies, in the order of their slots. */
   readonly bodies: Body[];
-  /** Number of dropped events, because more than 10,000 waited, or more pairs touched than there is room for. */
+  /** Number of events dropped, because more than 10,000 were waiting, or more pairs touched than fit the table. */
   readonly droppedEvents: number;
   /** Function that is called before each step of `advance`, to move colliders and frames and to apply forces. */
   onStep: (() => void) | null;
   /** Free the world and its meshes. */
   destroy(): void;
-  /** Make one step of `dt` [s]; 0 substeps chooses a stable number. */
+  /** Make one step of `dt` [s]. With 0 substeps, a stable number is chosen. */
   step(dt?: number, substeps?: number): void;
-  /** Set the steps of `advance`. Time beyond `maxSteps` in a frame is dropped. */
+  /** Set the steps that `advance` makes. Time beyond `maxSteps` steps per frame is dropped. */
   setFixedStep(step?: { dt?: number; substeps?: number; maxSteps?: number }): void;
   /** Add the time of a frame [s] and make the steps that are due. */
   advance(seconds: number): Clock;
-  /** Substeps that a step of `dt` [s] needs. */
+  /** Return the number of substeps that a step of `dt` [s] needs. */
   stableSubsteps(dt: number): number;
   /** Wake all bodies. */
   wake(): void;
-  /** Gravity [m/s^2], from the next step on. It wakes all bodies. */
+  /** Set gravity [m/s^2] from the next step on, and wake all bodies. */
   setGravity(gravity: Vector): void;
-  /** Coulomb coefficient of the floor, from the next step on. */
+  /** Set the Coulomb coefficient of the floor from the next step on. */
   setFriction(friction: number): void;
-  /** Wind velocity [m/s], and air density [kg/m^3]. */
+  /** Set the wind velocity [m/s] and the air density [kg/m^3]. */
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
-  /** Push all bodies away from a point: `impulse` [N s] near it, none at `radius` [m]. */
+  /** Push all bodies away from a point, with an impulse from `impulse` [N s] at the point to 0 at `radius` [m]. */
   radialImpulse(center: Vector, impulse: number, radius: number): void;
-  /** Hash of the state, 16 hexadecimal digits, equal on every platform. */
+  /** Return a hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash(): string;
-  /** A copy of the state between two steps. */
+  /** Return a copy of the state between two steps. */
   snapshot(): Uint8Array;
-  /** Restore a snapshot of the same export. */
+  /** Restore the state of a snapshot from a world of the same export. */
   restore(bytes: Uint8Array | ArrayBuffer): void;
-  /** Number of `restore` calls. A stored history of states is invalid after a `restore` by other code. */
+  /** Number of `restore` calls. If it has changed, earlier stored states belong to another history. */
   readonly restoreCount: number;
-  /** Record events of these kinds, a sum of `EVENTS`; all by default, 0 for none. */
+  /** Record events of these kinds, a sum of `EVENTS`. By default all kinds are recorded, with 0 none. */
   recordEvents(kinds?: number): void;
   /** Return the events since the last call. */
   events(): SoftEvent[];
-  /** Return the body in a slot, by number or name; null if the slot is empty. */
+  /** Return the body in a slot, by number or name; null for an empty slot. */
   body(name: string | number): Body | null;
-  /** Spawn a body of an asset in a free slot; `velocity` [m/s], `spin` [rad/s]. */
+  /** Spawn a body of an asset in a free slot, with a velocity [m/s] and an angular velocity `spin` [rad/s]. */
   spawn(
     asset: string | number,
     place?: { position?: Vector; rotation?: Rotation; velocity?: Vector; spin?: Vector },
   ): Body;
-  /** Find the first surface on a ray, or null. */
+  /** Find the first surface that a ray hits; null if there is none. */
   raycast(origin: Vector, direction: Vector, reach?: number): Hit | null;
-  /** Find the closest point of all surfaces, or null. */
+  /** Find the point of all surfaces that is closest to a point; null if none is in range. */
   closest(point: Vector, reach?: number): Hit | null;
   /** Find the bodies that touch or enclose a sphere. */
   overlapSphere(center: Vector, radius: number): Body[];
   /** Find the bodies that touch or enclose a box. */
   overlapBox(pose: Pose, size: Vector): Body[];
   collider(name: string | number): Collider;
-  /** Add a plane, sphere, box or capsule. The world needs `collider_room` for it. */
+  /** Add a plane, sphere, box or capsule. The world must have free `collider_room`. */
   addCollider(shape: Shape, pose?: Pose): Collider;
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
   /** Return a grab by its index, 0 to 15, or null. */
   grab(number: number): Grab | null;
-  /** Return a joint by name or index, 0 to 63; null for none. */
+  /** Return a joint by name, or by index from 0 to 63; null if there is none. */
   joint(name: string | number): Joint | null;
-  /** Return a motor by name or index, 0 to 63; null for none. */
+  /** Return a motor by name, or by index from 0 to 63; null if there is none. */
   motor(name: string | number): Motor | null;
 }
 
@@ -152,25 +152,25 @@ export class World {
 export class Body {
   readonly world: World;
   readonly handle: bigint;
-  /** Number of its asset. */
+  /** Number of the body's asset. */
   readonly asset: number;
-  /** "active", "frozen" or "asleep". */
+  /** State of the body: "active", "frozen" or "asleep". */
   readonly status: "active" | "frozen" | "asleep";
   /** Centre of mass [m]. */
   readonly center: number[];
   /** Level of detail; 0 is the finest. */
   readonly level: number;
-  /** Number of vertices at its level. */
+  /** Number of vertices at the current level. */
   readonly vertexCount: number;
   /** Remove the body from the world. */
   despawn(): void;
   /** Change the level of detail. Fails if joints, motors or attachments cannot be kept, unless `release` is true. */
   setLevel(level: number, how?: { release?: boolean }): void;
-  /** Copy the positions of its vertices [m], interpolated from the previous step (0) to the last one (1). */
+  /** Copy the vertex positions [m], interpolated from the previous step (0) to the last one (1). */
   positions(alpha?: number): Float32Array;
-  /** Return a render mesh: the first one of its asset, or one by number or name. Call it once, not in each frame. */
+  /** Return the first render mesh of the asset and level, or one by number or name. Call this only once. */
   mesh(name?: string | number | null): Mesh;
-  /** Velocity [m/s] and angular velocity [rad/s] about the centre of mass. */
+  /** Set the velocity [m/s] of the centre of mass, and the angular velocity about it [rad/s]. */
   setVelocity(linear: Vector, spin?: Vector): void;
   /** Move the centre of mass to a position, and rotate the current shape by `turn`. */
   teleport(center: Vector, how?: { turn?: Rotation; keepsVelocity?: boolean }): void;
@@ -180,27 +180,27 @@ export class Body {
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
   /** Apply an impulse [N s] to the vertices within `radius` [m] of a point. */
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
-  /** Factor on gravity for this body. */
+  /** Set the factor on gravity for this body. */
   setGravityScale(scale: number): void;
-  /** Coulomb coefficient against other bodies, in worlds with soft contact. */
+  /** Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. */
   setFriction(friction: number): void;
-  /** Damping rate of the velocity [1/s]. */
+  /** Set the damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
   /** Shelter the body from the wind, or expose it. */
   setSheltered(isSheltered: boolean): void;
   /** Pin vertices at their positions. */
   pin(vertices: ArrayLike<number>): void;
-  /** Release pinned vertices, or all of them. */
+  /** Release pinned vertices; by default, all. */
   unpin(vertices?: ArrayLike<number> | null): void;
-  /** Positions of pinned vertices after the next step [m], 3 numbers each. */
+  /** Set the positions of pinned vertices after the next step [m], 3 numbers each. */
   setTargets(vertices: ArrayLike<number>, targets: ArrayLike<number>): void;
-  /** Attach vertices to a frame at their current positions. Set `feels` to read the load later. */
+  /** Attach vertices to a frame at their current positions. Set `feels` to read the load on the frame later. */
   attach(vertices: ArrayLike<number> | null, frame: Frame, how?: { feels?: boolean }): void;
-  /** Detach vertices from frames, or all of them. */
+  /** Detach vertices from frames; by default, all. */
   detach(vertices?: ArrayLike<number> | null): void;
-  /** `force` [N] and `torque` [N m] of the body on a frame. */
+  /** Return `force` [N] and `torque` [N m] that the body exerts on a frame. */
   load(frame: Frame): { force: number[]; torque: number[] };
-  /** Attach vertices to another body: at their current positions in it, or each to one of its vertices in `onto`. */
+  /** Attach vertices to another body, at their current positions in it, or each to one of its vertices in `onto`. */
   join(vertices: ArrayLike<number>, other: Body, how?: { onto?: ArrayLike<number> | null }): Joint;
   addMotor(
     vertices: ArrayLike<number>,
@@ -213,7 +213,7 @@ export class Body {
       point?: Vector | null;
     },
   ): Motor;
-  /** Grab the body with a spring, where a ray hit it. */
+  /** Grab the body with a spring at the hit of a ray. */
   grab(
     hit: Pick<Hit, "triangle" | "weights" | "point">,
     spring?: { frequency?: number; maxForce?: number; target?: Vector },
@@ -232,7 +232,7 @@ export class Mesh {
   readonly uv: Float32Array | null;
   /** Update `positions` [m] and `normals`. */
   update(): void;
-  /** Free its memory. `World.destroy` does this for all meshes. */
+  /** Free the memory of the mesh. `World.destroy` does this for all meshes. */
   free(): void;
 }
 
@@ -250,7 +250,7 @@ export class Grab {
 export class Joint {
   readonly number: number;
   readonly handle: bigint;
-  /** Force of the other body, mean over the last step [N]. */
+  /** Force that the other body exerts [N], averaged over the last step. */
   readonly force: number[];
   /** End the joint. */
   release(): void;
@@ -260,13 +260,13 @@ export class Joint {
 export class Motor {
   readonly number: number;
   readonly handle: bigint;
-  /** Speed of its vertices [rad/s] or [m/s]. */
+  /** Speed of the driven vertices [rad/s] or [m/s]. */
   readonly measuredSpeed: number;
-  /** Its torque [N m] or force [N], mean over the last step. */
+  /** Torque [N m] or force [N] of the motor, averaged over the last step. */
   readonly effort: number;
-  /** Target speed [rad/s] or [m/s]. */
+  /** Set the target speed [rad/s] or [m/s]. */
   setSpeed(speed: number): void;
-  /** Limit of torque [N m] or force [N]; with 0 its vertices coast. */
+  /** Set the largest torque [N m] or force [N]. With 0 the vertices move freely. */
   setLimit(limit: number): void;
   /** End the motor. */
   remove(): void;
@@ -276,15 +276,15 @@ export class Motor {
 export class Collider {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
-  /** `impulse` [N s] of bodies on it in the last step, and `moment` about its position. */
+  /** `impulse` [N s] of all bodies on the collider in the last step, and `moment` about its position. */
   readonly impulse: { impulse: number[]; moment: number[] };
-  /** Move to a pose over the next step. */
+  /** Move the collider to a pose over the next step. */
   moveTo(pose: Pose): void;
-  /** Move at a constant velocity [m/s] and angular velocity [rad/s]. */
+  /** Move the collider at a constant velocity [m/s] and angular velocity [rad/s]. */
   setVelocity(linear: Vector, spin?: Vector): void;
-  /** Coulomb coefficient, from the next step on. */
+  /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction: number): void;
-  /** Jump to a pose, without pushing bodies on the way. */
+  /** Move the collider to a pose at once, without pushing bodies in between. */
   teleport(pose: Pose): void;
   remove(): void;
 }
@@ -293,14 +293,14 @@ export class Collider {
 export class Frame {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
-  /** Move to a pose over the next step. */
+  /** Move the frame to a pose over the next step. */
   moveTo(pose: Pose): void;
   remove(): void;
 }
 
-/** Loads a folder from `taichi-soft export --for web`, and creates a world. */
+/** Loads a folder that `taichi-soft export --for web` wrote, and creates a world. */
 export function loadWorld(folder: string | URL): Promise<World>;
-/** Loads a folder from `taichi-soft export --for web`. */
+/** Loads a folder that `taichi-soft export --for web` wrote. */
 export function loadScene(folder: string | URL): Promise<Scene>;
-/** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
+/** Compiles the module of a world and reads its file, from the bytes of `kernels/web.wasm` and `world.tsw`. */
 export function sceneOf(code: BufferSource, world: Uint8Array): Promise<Scene>;

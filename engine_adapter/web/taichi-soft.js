@@ -1,4 +1,4 @@
-// Soft bodies in a browser or in node: runs worlds from `taichi-soft export --for web`.
+// Soft bodies in a browser or in Node.js: runs worlds from `taichi-soft export --for web`.
 //
 //     const world = await loadWorld("game.softworld");
 //     const jelly = world.body("jelly").mesh();
@@ -7,7 +7,7 @@
 //       jelly.update(); // jelly.positions and jelly.normals are views of the module's memory
 //     }
 //
-// All quantities use the axes for which the world was exported, and SI units; rotations are unit quaternions [x, y, z, w].
+// All quantities have the axes for which the world was exported, and SI units. Rotations are quaternions [x, y, z, w].
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
 const STATUS = ["active", "frozen", "asleep"];
@@ -16,7 +16,7 @@ const SHAPES = ["plane", "sphere", "box", "capsule"];
 const ORIGIN = [0, 0, 0];
 const UPRIGHT = [0, 0, 0, 1];
 
-/** Kinds of events, as bits. */
+/** Kinds of events as bits. */
 export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16 };
 const EVENT_NAMES = Object.fromEntries(Object.entries(EVENTS).map(([name, bit]) => [bit, name]));
 
@@ -48,16 +48,16 @@ function shown(value) {
   return typeof value === "object" ? (value?.constructor?.name ?? "null") : String(value);
 }
 
-// Requires a 32-bit integer. WebAssembly would convert other values: a text to 0, 2.7 to 2.
+// Requires a 32-bit integer. WebAssembly would convert other values: text to 0, 2.7 to 2.
 function whole(value, name, way = "a 32-bit integer") {
   if (Number.isInteger(value) && value === (value | 0)) return value;
   throw new SoftError(-1, `${name} is ${shown(value)}: give ${way}`);
 }
 
-// Converts signed or unsigned 32-bit numbers.
+// Conversions to signed or unsigned 32-bit numbers.
 const bits = (value, name) => whole(value > 0x7fffffff && value <= 0xffffffff ? value - 2 ** 32 : value, name);
 
-// Requires an object of this world. Its number or handle does not identify the world.
+// Requires an object of this world, because its number or handle does not identify the world.
 function ownOf(world, thing, Kind, name, way) {
   if (thing instanceof Kind && thing.world === world) return thing;
   const what = thing instanceof Kind ? "of another world" : shown(thing);
@@ -66,14 +66,14 @@ function ownOf(world, thing, Kind, name, way) {
 
 const poseOf = ({ position, rotation = UPRIGHT }) => [...vector(position, "position"), ...vector(rotation, "rotation", 4)];
 
-// Memory and functions of the module.
+// The memory and the functions of the module.
 class Native {
   constructor(module) {
     const refuse = (code, text) => {
       throw new SoftError(code, this.text(text));
     };
     const listeners = new Map();
-    const nothing = () => 8; // WASI's error for a bad file; the library writes no files
+    const nothing = () => 8; // WASI's error for a bad file: the library writes no files
     const imports = {
       taichi_soft: { fail: refuse, before_step: (world) => listeners.get(world)?.() },
       wasi_snapshot_preview1: new Proxy({}, { get: () => nothing }),
@@ -81,7 +81,7 @@ class Native {
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize();
     this.listeners = listeners;
-    this.small = this.allocate(1024); // buffer for arguments and results of one call
+    this.small = this.allocate(1024); // for arguments and results of one call
   }
 
   get view() {
@@ -95,7 +95,7 @@ class Native {
     return at;
   }
 
-  // Calls a function. A refused call throws, so restore the module's stack.
+  // Calls a function. A refused call throws an exception; then the stack of the module is restored.
   call(name, ...args) {
     if (!(name in this.exports)) {
       throw new SoftError(-5, `the world has no ${name}, because it is from another version of this package: export it again`);
@@ -134,7 +134,7 @@ class Native {
     return this.view.getBigUint64(at, true);
   }
 
-  // Calls a function with a temporary copy of some bytes.
+  // Calls a function with a temporary copy of bytes.
   lending(bytes, use) {
     const given = bytesIn(bytes, "bytes");
     const at = this.allocate(given.length);
@@ -150,7 +150,7 @@ class Native {
     return this.lending(new TextEncoder().encode(`${text}\0`), use);
   }
 
-  // Calls a function with a list of vertices; null means all.
+  // Calls a function with a list of vertices; null means all vertices.
   lendingVertices(vertices, use) {
     if (vertices === null) return use(0, 0);
     const numbers = Array.from(vertices);
@@ -160,7 +160,7 @@ class Native {
   }
 }
 
-// Numbers in the module's memory, which is reallocated when it grows.
+// Numbers in the memory of the module. The memory is reallocated when it grows.
 class Block {
   constructor(native, Kind, count) {
     this.native = native;
@@ -180,7 +180,7 @@ class Block {
   }
 }
 
-/** A world file: `loadScene` reads it. Worlds of one scene share its code. */
+/** A world file, read by `loadScene`. All worlds of a scene use the same code. */
 export class Scene {
   constructor(module, bytes) {
     this.native = new Native(module);
@@ -190,7 +190,7 @@ export class Scene {
     this.native.view.setUint32(small, 24, true);
     this.native.call("ts_scene_get_info", this.handle, small);
     const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
-    // Read once, because worlds can outlive the scene.
+    // Read now, because worlds can outlive the scene.
     this.names = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, this.#names(kind)]));
     const [joints, motors] = [this.names.joint.length, this.names.motor.length];
     this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes, joint: joints, motor: motors };
@@ -243,7 +243,7 @@ export class Scene {
     return found;
   }
 
-  /** Number of an object, by its name. */
+  /** Number of an object with a name. */
   find(kind, name) {
     const names = this.#namesOf(kind);
     if (typeof name === "number") return whole(name, kind);
@@ -269,7 +269,7 @@ export class Scene {
     return new World(this);
   }
 
-  /** Free the scene when the last of its worlds is destroyed. */
+  /** Free the scene after the last of its worlds is destroyed. */
   unload() {
     this.native.call("ts_scene_unload", this.handle);
   }
@@ -300,12 +300,12 @@ export class World {
     for (const mesh of [...this.#meshes]) mesh.free();
   }
 
-  /** Make one step of `dt` [s]; 0 substeps chooses a stable number. */
+  /** Make one step of `dt` [s]. With 0 substeps, a stable number is chosen. */
   step(dt = 1 / 60, substeps = 0) {
     this.#call("ts_world_step", dt, whole(substeps, "substeps"));
   }
 
-  /** Set the steps of `advance`. Time beyond `maxSteps` in a frame is dropped. */
+  /** Set the steps that `advance` makes. Time beyond `maxSteps` steps per frame is dropped. */
   setFixedStep({ dt = 1 / 60, substeps = 0, maxSteps = 8 } = {}) {
     const { view, small } = this.native;
     view.setUint32(small, 24, true);
@@ -315,7 +315,7 @@ export class World {
     this.#call("ts_world_set_fixed_step", small);
   }
 
-  /** Adds the time of a frame [s] and makes the steps that are due. Returns the `clock`. */
+  /** Add the time of a frame [s] and make the steps that are due. Returns the `clock`. */
   advance(seconds) {
     if (this.#isAdvancing) throw new SoftError(-7, "world.advance was called from its own onStep");
     const { small } = this.native;
@@ -340,7 +340,7 @@ export class World {
     }
   }
 
-  /** `stepsMade` by the last `advance`, `steps`, `time` [s], `alpha`, `dropped` [s]. */
+  /** `stepsMade` by the last `advance`, `steps` in total, `time` [s], `alpha`, `dropped` time [s]. */
   get clock() {
     this.native.view.setUint32(this.native.small, 40, true);
     this.#call("ts_world_get_clock", this.native.small);
@@ -373,17 +373,17 @@ export class World {
     this.#call("ts_world_wake");
   }
 
-  /** Gravity [m/s^2], from the next step on. It wakes all bodies. */
+  /** Set gravity [m/s^2] from the next step on, and wake all bodies. */
   setGravity(gravity) {
     this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, vector(gravity, "gravity")));
   }
 
-  /** Coulomb coefficient of the floor, from the next step on. */
+  /** Set the Coulomb coefficient of the floor from the next step on. */
   setFriction(friction) {
     this.#call("ts_world_set_friction", friction);
   }
 
-  /** Wind velocity [m/s], and air density [kg/m^3]. */
+  /** Set the wind velocity [m/s] and the air density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, vector(velocity, "velocity")), density, drag);
   }
@@ -392,13 +392,13 @@ export class World {
     this.#call("ts_world_radial_impulse", this.native.doubles(this.native.small, vector(center, "center")), impulse, radius);
   }
 
-  /** Hash of the state, 16 hexadecimal digits, equal on every platform. */
+  /** Return a hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash() {
     this.#call("ts_world_hash", this.native.small);
     return this.native.handle(this.native.small).toString(16).padStart(16, "0");
   }
 
-  /** A copy of the state between two steps. */
+  /** Return a copy of the state between two steps. */
   snapshot() {
     const { native } = this;
     this.#call("ts_world_snapshot", 0, 0, native.small);
@@ -417,12 +417,12 @@ export class World {
     this.#restoreCount += 1;
   }
 
-  /** Number of `restore` calls. A stored history of states is invalid after a `restore` by other code. */
+  /** Number of `restore` calls. If it has changed, earlier stored states belong to another history. */
   get restoreCount() {
     return this.#restoreCount;
   }
 
-  /** Record events of these kinds, a sum of `EVENTS`; all by default, 0 for none. */
+  /** Record events of these kinds, a sum of `EVENTS`. By default all kinds are recorded, with 0 none. */
   recordEvents(kinds = 31) {
     this.#call("ts_world_record_events", whole(kinds, "kinds", "a sum of EVENTS"));
   }
@@ -464,7 +464,7 @@ export class World {
     return Number(this.native.view.getBigInt64(this.native.small, true));
   }
 
-  /** Return the body in a slot, by number or name; null if the slot is empty. */
+  /** Return the body in a slot, by number or name; null for an empty slot. */
   body(name) {
     const slot = this.scene.find("body", name);
     this.#call("ts_world_get_body", slot, this.native.small);
@@ -472,7 +472,7 @@ export class World {
     return handle === 0n ? null : new Body(this, handle);
   }
 
-  /** All bodies, by slot. */
+  /** All bodies, in the order of their slots. */
   get bodies() {
     return Array.from({ length: this.scene.counts.body }, (_, slot) => this.body(slot)).filter(Boolean);
   }
@@ -488,7 +488,7 @@ export class World {
     return new Body(this, native.handle(native.small + 128));
   }
 
-  /** Find the first surface on a ray, or null. */
+  /** Find the first surface that a ray hits; null if there is none. */
   raycast(origin, direction, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
@@ -497,7 +497,7 @@ export class World {
     return this.#hit();
   }
 
-  /** Find the closest point of all surfaces, or null. */
+  /** Find the point of all surfaces that is closest to a point; null if none is in range. */
   closest(point, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
@@ -554,7 +554,7 @@ export class World {
     return new Collider(this, this.scene.find("collider", name));
   }
 
-  /** Add a plane, sphere, box or capsule. The world needs `collider_room` for it. */
+  /** Add a plane, sphere, box or capsule. The world must have free `collider_room`. */
   addCollider(
     { kind, size = ORIGIN, friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
     pose = {},
@@ -589,14 +589,14 @@ export class World {
     return handle === 0n ? null : new Grab(this, handle);
   }
 
-  /** Return a joint by name or index, 0 to 63; null for none. */
+  /** Return a joint by name, or by index from 0 to 63; null if there is none. */
   joint(name) {
     this.#call("ts_world_get_joint", this.scene.find("joint", name), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Joint(this, handle);
   }
 
-  /** Return a motor by name or index, 0 to 63; null for none. */
+  /** Return a motor by name, or by index from 0 to 63; null if there is none. */
   motor(name) {
     this.#call("ts_world_get_motor", this.scene.find("motor", name), this.native.small);
     const handle = this.native.handle(this.native.small);
@@ -637,7 +637,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** "active", "frozen" or "asleep". */
+  /** State of the body: "active", "frozen" or "asleep". */
   get status() {
     this.#call("ts_body_get_status", this.#small);
     return STATUS[this.world.native.int(this.#small)];
@@ -657,13 +657,13 @@ export class Body {
     this.#call("ts_body_set_level", whole(level, "level"), Number(release));
   }
 
-  /** Number of vertices at its level. */
+  /** Number of vertices at the current level. */
   get vertexCount() {
     this.#call("ts_body_get_vertex_count", this.#small);
     return this.world.native.int(this.#small);
   }
 
-  /** Copy the positions of its vertices [m], interpolated from the previous step (0) to the last one (1). */
+  /** Copy the vertex positions [m], interpolated from the previous step (0) to the last one (1). */
   positions(alpha = 1) {
     const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {
@@ -674,7 +674,7 @@ export class Body {
     }
   }
 
-  /** Return a render mesh: the first of its asset and level, or one by number or name. Call it once, not in each frame. */
+  /** Return the first render mesh of the asset and level, or one by number or name. Call this only once. */
   mesh(name = null) {
     const { asset, level } = this;
     const { scene } = this.world;
@@ -720,7 +720,7 @@ export class Body {
     this.#call("ts_body_set_gravity_scale", scale);
   }
 
-  /** Coulomb coefficient against other bodies, in worlds with soft contact. */
+  /** Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. */
   setFriction(friction) {
     this.#call("ts_body_set_friction", friction);
   }
@@ -741,7 +741,7 @@ export class Body {
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_unpin", list, count));
   }
 
-  /** Positions of pinned vertices after the next step [m], 3 numbers each. */
+  /** Set the positions of pinned vertices after the next step [m], 3 numbers each. */
   setTargets(vertices, targets) {
     const { native } = this.world;
     if (targets.length !== 3 * vertices.length) throw new SoftError(-6, `targets has ${targets.length} numbers: give ${3 * vertices.length}`);
@@ -765,13 +765,13 @@ export class Body {
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_detach", list, count));
   }
 
-  /** `force` [N] and `torque` [N m] of the body on a frame. */
+  /** Return `force` [N] and `torque` [N m] that the body exerts on a frame. */
   load(frame) {
     this.#call("ts_body_get_load", this.#frame(frame).number, this.#small, this.#small + 24);
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
   }
 
-  /** Attach vertices to another body: at their current positions in it, or each to one of its vertices in `onto`. */
+  /** Attach vertices to another body, at their current positions in it, or each to one of its vertices in `onto`. */
   join(vertices, other, { onto = null } = {}) {
     const { native } = this.world;
     ownOf(this.world, other, Body, "other", "a body, such as world.body(name)");
@@ -801,7 +801,7 @@ export class Body {
     return new Motor(this.world, native.handle(this.#small + 128));
   }
 
-  /** Grab the body with a spring, where a ray hit it. */
+  /** Grab the body with a spring at the hit of a ray. */
   grab({ triangle, weights, point }, { frequency = 5, maxForce = -1, target = point } = {}) {
     const { native } = this.world;
     native.view.setUint32(this.#small, 72, true);
@@ -812,7 +812,7 @@ export class Body {
   }
 }
 
-/** A render mesh. `positions` and `normals` are views that `update` fills: read them again after each call. */
+/** A render mesh. `update` fills `positions` and `normals`. They are views: read them again after each call. */
 export class Mesh {
   #blocks;
 
@@ -855,7 +855,7 @@ export class Mesh {
     throw new SoftError(-2, "this mesh was freed, or its world was destroyed");
   }
 
-  /** Free its memory. `World.destroy` does this for all meshes. */
+  /** Free the memory of the mesh. `World.destroy` does this for all meshes. */
   free() {
     this.#blocks?.positions.free();
     this.#blocks?.normals.free();
@@ -908,7 +908,7 @@ class Numbered {
 
 /** A connection between parts of two bodies. */
 export class Joint extends Numbered {
-  /** Force of the other body, mean over the last step [N]. */
+  /** Force that the other body exerts [N], averaged over the last step. */
   get force() {
     return this.readNumbers("ts_joint_get_force", 3);
   }
@@ -920,12 +920,12 @@ export class Joint extends Numbered {
 
 /** A motor that rotates or pushes a part of a body. */
 export class Motor extends Numbered {
-  /** Speed of its vertices [rad/s] or [m/s]. */
+  /** Speed of the driven vertices [rad/s] or [m/s]. */
   get measuredSpeed() {
     return this.readNumbers("ts_motor_get_speed", 1)[0];
   }
 
-  /** Its torque [N m] or force [N], mean over the last step. */
+  /** Torque [N m] or force [N] of the motor, averaged over the last step. */
   get effort() {
     return this.readNumbers("ts_motor_get_effort", 1)[0];
   }
@@ -934,7 +934,7 @@ export class Motor extends Numbered {
     this.call("ts_motor_set_speed", speed);
   }
 
-  /** Limit of torque [N m] or force [N]; with 0 its vertices coast. */
+  /** Set the largest torque [N m] or force [N]. With 0 the vertices move freely. */
   setLimit(limit) {
     this.call("ts_motor_set_limit", limit);
   }
@@ -956,7 +956,7 @@ class Placed {
     this.world.native.call(`${this.prefix}_${name}`, this.world.handle, this.number, ...args);
   }
 
-  /** Move to a pose over the next step. */
+  /** Move the object to a pose over the next step. */
   moveTo(pose) {
     this.call("move_to", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
@@ -983,7 +983,7 @@ export class Collider extends Placed {
     this.call("set_velocity", at, at + 24);
   }
 
-  /** Coulomb coefficient, from the next step on. */
+  /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction) {
     this.call("set_friction", friction);
   }
@@ -992,7 +992,7 @@ export class Collider extends Placed {
     this.call("teleport", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
 
-  /** `impulse` [N s] of bodies on it in the last step, and `moment` about its position. */
+  /** `impulse` [N s] of all bodies on the collider in the last step, and `moment` about its position. */
   get impulse() {
     const { native } = this.world;
     this.call("get_impulse", native.small, native.small + 24);
@@ -1035,11 +1035,11 @@ function checksum(bytes) {
   return ~code >>> 0;
 }
 
-// Finds an entry of a world file: offset of its bytes and count of its numbers. See archive.cpp.
+// Finds an entry of a world file: the offset of its bytes and the count of its numbers. See archive.cpp.
 function entryOf(view, wanted) {
   const filled = (size) => Math.ceil(size / 8) * 8;
   const decoder = new TextDecoder();
-  const widths = [0, 1, 4, 8, 4, 8]; // size of a number of each type [bytes]
+  const widths = [0, 1, 4, 8, 4, 8]; // size of a number by type [bytes]
   let at = 32;
   for (let left = view.getUint32(12, true); left > 0; left -= 1) {
     const [length, type, dimensions] = [0, 4, 8].map((each) => view.getUint32(at + each, true));
@@ -1054,8 +1054,8 @@ function entryOf(view, wanted) {
   throw new RangeError(`no ${wanted}`);
 }
 
-// True if a module has the size and checksum in its world file. Returns true for an invalid world file, which the library
-// refuses with a reason.
+// True if a module has the size and checksum in its world file. Also true for an invalid world file, which the
+// library then refuses with a reason.
 function isOf(world, code) {
   try {
     const view = new DataView(world.buffer, world.byteOffset, world.byteLength);
@@ -1069,14 +1069,14 @@ function isOf(world, code) {
   }
 }
 
-/** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
+/** Compiles the module of a world and reads its file, from the bytes of `kernels/web.wasm` and `world.tsw`. */
 export async function sceneOf(code, world) {
   if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
   const [module, file] = [bytesIn(code, "code"), bytesIn(world, "world")];
   if (module.subarray(0, 4).join() !== "0,97,115,109") {
     throw new SoftError(-4, "the code is not a WebAssembly module: is the folder from taichi-soft export --for web?");
   }
-  const compiling = WebAssembly.compile(module); // on another thread
+  const compiling = WebAssembly.compile(module); // runs on another thread
   compiling.catch(() => {}); // awaited below, unless the module is refused
   if (!isOf(file, module)) {
     throw new SoftError(-4, "the kernels belong to another export, or are damaged: export the world again, and ship both");
@@ -1090,14 +1090,14 @@ export async function sceneOf(code, world) {
   return new Scene(compiled, file);
 }
 
-/** Loads a folder from `taichi-soft export --for web`. */
+/** Loads a folder that `taichi-soft export --for web` wrote. */
 export async function loadScene(folder) {
   const base = String(folder).replace(/\/$/, "");
   const [code, world] = await Promise.all([bytesOf(`${base}/kernels/web.wasm`), bytesOf(`${base}/world.tsw`)]);
   return sceneOf(code, world);
 }
 
-/** Loads a folder from `taichi-soft export --for web`, and creates a world. */
+/** Loads a folder that `taichi-soft export --for web` wrote, and creates a world. */
 export async function loadWorld(folder) {
   return (await loadScene(folder)).createWorld();
 }

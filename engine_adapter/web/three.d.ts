@@ -1,15 +1,15 @@
 import type { Body, Grab, Mesh } from "./taichi-soft.js";
 
-/** A three.js mesh that follows a body. `THREE` is the module of three.js; you can choose its types. */
+/** A three.js mesh that follows a body. `THREE` is the module of three.js, whose types you can choose. */
 export class SoftMesh<ThreeMesh = any> {
   constructor(THREE: any, body: Body, material: any, name?: string | number | null);
   readonly mesh: ThreeMesh;
   readonly drawn: Mesh;
-  /** Update the mesh from the body. */
+  /** Update the mesh with the current shape of the body. */
   update(): void;
-  /** Grab the body at the hit of a `THREE.Raycaster`; null if the ray hits nothing or another body. */
+  /** Grab the body where a `THREE.Raycaster` hits it; null if the ray hits nothing or another body. */
   grab(raycaster: any): { grab: Grab; distance: number } | null;
-  /** Move a result of `grab` to the ray, at its initial distance from the origin. */
+  /** Move a grab of `grab` to the ray, at its initial distance from the ray's origin. */
   pull(held: { grab: Grab; distance: number }, raycaster: any): void;
   dispose(): void;
 }

@@ -23,7 +23,7 @@ export class SoftMesh {
     this.mesh.frustumCulled = false; // the bounding box changes in every frame
   }
 
-  /** Update the mesh from the body. */
+  /** Update the mesh with the current shape of the body. */
   update() {
     this.drawn.update();
     const { position, normal } = this.mesh.geometry.attributes;
@@ -32,7 +32,7 @@ export class SoftMesh {
     position.needsUpdate = normal.needsUpdate = true;
   }
 
-  /** Grab the body at the hit of a THREE.Raycaster; null if the ray hits nothing or another body. */
+  /** Grab the body where a THREE.Raycaster hits it; null if the ray hits nothing or another body. */
   grab(raycaster) {
     const { origin, direction } = raycaster.ray;
     const { world, handle } = this.drawn.body;
@@ -40,7 +40,7 @@ export class SoftMesh {
     return hit?.body.handle === handle ? { grab: hit.body.grab(hit), distance: hit.distance } : null;
   }
 
-  /** Move a result of `grab` to the ray, at its initial distance from the origin. */
+  /** Move a grab of `grab` to the ray, at its initial distance from the ray's origin. */
   pull({ grab, distance }, raycaster) {
     const { origin, direction } = raycaster.ray;
     grab.moveTo(origin.clone().addScaledVector(direction, distance).toArray());

@@ -9,7 +9,8 @@ from taichi_soft.core.extras import require_extra
 
 
 def main(*arguments: str) -> None:
-    """Run the command line. A TaichiSoftError prints one line and exits with 1, a wrong option with 2.
+    """Run the command line. A TaichiSoftError is printed as one line, with exit code 1; a wrong option exits
+    with 2.
 
     Args:
         arguments: command-line arguments; by default those of the process.

@@ -1,4 +1,4 @@
-"""Terminal output, options and device information that all commands share."""
+"""Functions of all commands for terminal output, options and device information."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def say(line: str) -> None:
 
 
 def progress_bar() -> Progress:
-    """Make a progress bar that only a terminal shows."""
+    """Make a progress bar that is visible only on a terminal."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     return Progress(*columns, console=errors, disable=not errors.is_terminal)
 
@@ -41,7 +41,7 @@ def progress_bar() -> Progress:
 def filming(name: str) -> Iterator[Callable[[int, int], None]]:
     """Show the progress of a film and of compilation: a bar on a terminal, one line elsewhere.
 
-    Yields a function of (frames made, total frames).
+    Yields: a function to call with (frames made, total frames).
     """
     if not errors.is_terminal:
         say(f"filming {escape(name)}")
@@ -59,7 +59,7 @@ def device_facts(device: Device) -> dict[str, Any]:
 
 
 def version_of(name: str) -> str:
-    """Version of an installed package."""
+    """Return the version of an installed package."""
     try:
         return version(name)
     except PackageNotFoundError:

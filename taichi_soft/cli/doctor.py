@@ -38,7 +38,7 @@ def doctor(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Print the problems of a mesh, and the cost of its body. Exits with 1 if it cannot become a body."""
+    """Print the problems of a mesh and the cost of its body. Exit with 1 if the mesh cannot become a body."""
     from taichi_soft.doctor import diagnose
     from taichi_soft.doctor.mending import write_mended
     from taichi_soft.meshing.surfaces import read_surfaces

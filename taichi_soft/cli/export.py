@@ -39,10 +39,11 @@ def export(
         ),
     ] = False,
 ) -> None:
-    """Write a world and its kernels, which a C library steps in an engine without Python.
+    """Write a world and its kernels for the C library, which steps them in an engine without Python.
 
-    Scripts need no changes: the world is exported in the state after the script, and built if needed. Bodies,
-    assets, colliders, frames, joints and motors are named after the script's variables.
+    Scripts need no changes. The state of the world when the script ends is exported; if necessary, the world
+    is built first. Bodies, assets, colliders, frames, joints and motors are named after the script's
+    variables.
     """
     init("cpu")
     world, names = _found_in(scene)
@@ -70,7 +71,7 @@ def _plural(report: Any) -> list[tuple[str, list[str]]]:
 
 
 def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
-    """Return the world of a script or function, and the names of its parts."""
+    """Return the world that a script or function makes, and the names of its parts."""
     from engine_adapter import EngineAdapter
     from taichi_soft import World
 
@@ -88,7 +89,9 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
 
 
 def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
-    """Name the parts of a world after the variables that hold them; in a list, with the index."""
+    """Name the parts of a world after the variables that contain them; for a part in a list, add the
+    index.
+    """
     from taichi_soft import Body, Collider, Frame, Joint, Motor, SoftBodyAsset
 
     found: dict[Any, str] = {}

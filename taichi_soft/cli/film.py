@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 MATERIAL = "gelatine"
 
 SMALLEST, LARGEST, LENGTH = 0.05, 5.0, 1.0
-"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]: its file has another
-unit, or the mesh is too large or too small to look soft."""
+"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]. Its file uses another
+unit, or its size would make it look rigid or limp."""
 
 SECONDS = 5.0
 """Default length of a film whose scene is not a Stage [s]."""
 
 DROP = 0.5
-"""Drop height [height of the mesh]."""
+"""Drop height, over the height of the mesh."""
 
 
 def film(
@@ -108,7 +108,7 @@ def _stage_of(
     seconds: float | None,
     orbit: bool,
 ) -> Stage:
-    """Return the author's stage, or a stage of a world whose camera sees all motion."""
+    """Return the author's stage, or make a stage for a world, with a camera that sees all motion."""
     from taichi_soft import World
     from taichi_soft.render.camera import Camera
     from taichi_soft.render.camera_moves import Orbit
@@ -132,7 +132,7 @@ def _stage_of(
 
     def make() -> Stage:
         if not waiting:
-            gc.collect()  # frees the fields of the first world for the next
+            gc.collect()  # free the fields of the first world
         world = waiting.pop() if waiting else find()
         if not world.is_built:
             world.build()
@@ -142,7 +142,7 @@ def _stage_of(
 
 
 def _scene_of(scene: str) -> Callable[[], Any]:
-    """Return a function that makes a new world or stage from a script or function."""
+    """Return a function that makes a new world or stage with a script or function."""
     if ":" not in scene and not scene.endswith(".py"):
         from taichi_soft.render.demos import demo_names
 
@@ -174,7 +174,7 @@ def _scene_of(scene: str) -> Callable[[], Any]:
 def _drop_of(
     file: Path, material: str, length: float | None, cells: int | None, up: Any
 ) -> Callable[[], Any]:
-    """Return a function that makes a world in which the mesh of a file falls onto the floor."""
+    """Return a function that makes a world in which the mesh from a file falls onto the floor."""
     from taichi_soft import SoftBodyAsset, World
 
     made_of = preset(material)  # type: ignore[arg-type]

@@ -48,7 +48,7 @@ def make_film(
     blur: int,
     stats: bool,
 ) -> None:
-    """Film a stage and print the result and its speed; without a path, only run it."""
+    """Film a stage, and print the result and the speed. Without a path, only run the stage."""
     from taichi_soft.render.film import film
 
     with filming(name) as show:

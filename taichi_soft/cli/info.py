@@ -26,7 +26,7 @@ def info(
     threads: Threads = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print device, versions, laws and materials."""
+    """Print the device, versions, laws and materials."""
     from taichi_soft.elements.laws import LAWS
     from taichi_soft.elements.materials import PRESETS
     from taichi_soft.profiling.baseline import find_compiler
@@ -60,7 +60,7 @@ def __say_laws(names: list[str], as_json: bool) -> None:
     from taichi_soft.profiling.profile_tables import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
-        costs = measure_laws(cast(list[LawName], names))  # checks the names
+        costs = measure_laws(cast(list[LawName], names))  # also checks the names
     if as_json:
         print(json.dumps(law_rows(costs), indent=2))
         return

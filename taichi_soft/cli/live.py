@@ -33,7 +33,7 @@ def live(
         typer.Option("--measure", help="Measure latency and the cost of a visitor instead (8 minutes)."),
     ] = False,
 ) -> None:
-    """Show a world in the browser until Ctrl-C; visitors can grab bodies and change parameters."""
+    """Show a world in the browser until Ctrl-C. Visitors can grab bodies and change parameters."""
     require_extra("live", "a live world needs")
     from taichi_soft.live.scene import found_source
     from taichi_soft.live.server import LiveServer

@@ -1,4 +1,4 @@
-"""Commands of earlier versions that are now only in a source checkout."""
+"""Commands of earlier versions that now need a source checkout."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MOVED = ("drop-test", "report")
 
 
 def add_moved(app: typer.Typer) -> None:
-    """Add hidden commands that accept any arguments and name the new command."""
+    """Add hidden commands that accept any arguments and fail with the name of the new command."""
     anything = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
     for name in MOVED:
         app.command(name, hidden=True, context_settings=anything)(_refuse)
@@ -22,5 +22,5 @@ def _refuse(context: typer.Context) -> None:
 
 
 def refuse_moved(old: str, new: str) -> None:
-    """Raise an OptionError that names the command in a source checkout."""
+    """Raise an OptionError that names the new command, which needs a source checkout."""
     raise OptionError(f"{old} needs a checkout of the sources: run python -m lab {new} there")

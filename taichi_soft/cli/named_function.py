@@ -14,7 +14,7 @@ from taichi_soft.core.errors import OptionError
 
 
 def function_of(text: str, what: str) -> Callable[[], Any]:
-    """Return the function that `place:name` names.
+    """Return the function that a text such as `game.py:make_world` names.
 
     Args:
         what: purpose of the function for error messages, such as "which worlds".
@@ -34,7 +34,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
 
 
 def variables_of(script: str) -> dict[str, Any]:
-    """Run a script, with its folder and the current one on the path. Returns: its variables, by name.
+    """Run a script with its folder and the current one on the path. Returns: the script's variables, by name.
 
     Raises: OptionError for a file that cannot be read, and every error of the script.
     """

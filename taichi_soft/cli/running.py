@@ -16,7 +16,7 @@ from taichi_soft.core.signals import INTERRUPTED, ended_by_signals
 
 
 def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
-    """Make a command of each function, with its name and the first paragraph of its docstring as summary."""
+    """Make a command from each function. The summary is the first paragraph of the function's docstring."""
     app = typer.Typer(
         help=summary,
         no_args_is_help=True,
@@ -32,7 +32,7 @@ def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
 
 
 def run_app(app: typer.Typer, *arguments: str) -> None:
-    """Run a command. A TaichiSoftError prints one line and exits with 1, a wrong option with 2.
+    """Run a command. A TaichiSoftError is printed as one line, with exit code 1; a wrong option exits with 2.
 
     Args:
         app: result of `make_app`.

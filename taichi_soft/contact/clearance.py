@@ -1,4 +1,4 @@
-"""Check that a body does not start inside a collider, which would crush it."""
+"""Check that a body does not start inside a collider, because contact would then crush it."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ if TYPE_CHECKING:
     from taichi_soft.bodies.asset import SoftBodyAsset
 
 MAX_DEPTH = 0.25
-"""Depth at which a start is refused, over the mean edge of the surface or the smallest side of the body.
-Contact moves vertices out at once; deeper ones could end too close to their neighbours."""
+"""Depth of a vertex in a collider above which a start is refused, over the mean edge of the surface or the
+smallest side of the body. Contact moves vertices out at once; deeper vertices could end too close to their
+neighbours."""
 
 
 def require_clear(
     colliders: Sequence[Collider], asset: SoftBodyAsset, points: NDArray[np.float64], name: str
 ) -> None:
-    """Check that a body starts outside of all colliders that it touches, or only slightly inside.
+    """Check that a body starts outside of all colliders that it can touch, or only slightly inside.
 
     Args:
-        points: its vertices that are not pinned, (n, 3) [m].
+        points: vertices of the body that are not pinned, (n, 3) [m].
         name: name of the body for the message.
     Raises: OptionError with the deepest collider and the depth.
     """
@@ -36,7 +37,7 @@ def require_clear(
     for collider in colliders:
         contact, shape = asset.contact, collider.shape
         if contact.group & collider.mask and collider.group & contact.mask:
-            # Row vectors times the matrix of its axes: from the world frame to the collider's.
+            # Row vectors times the matrix of axes: from the world frame to the collider's frame.
             depths = shape.depths((points - collider.position) @ collider.rotation)
             depth = float(depths.max()) + collider.thickness
             if depth > deepest:
@@ -52,7 +53,7 @@ def require_clear(
 
 
 def free_points(asset: SoftBodyAsset, rows: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the outer vertices, or hull points, that are not pinned, (n, 3) [m].
+    """Return the outer vertices, or the hull points, that are not pinned, (n, 3) [m].
 
     Args:
         rows: initial state of the body, (n, 8), see `SoftBodyAsset.placed`.

@@ -1,4 +1,4 @@
-"""A collider: a solid shape that bodies hit. It stands still, or moves as the engine says."""
+"""A collider: a solid shape that bodies collide with. It stands still, or the game moves it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from taichi_soft.core.math.rotations import length_of, matrix_of, quaternion_of,
 Floats = NDArray[np.float64]
 
 FASTEST_SPIN = 1e4
-"""[rad/s]"""
+"""Largest angular speed of a collider [rad/s]."""
 
 
 @dataclass(eq=False)
@@ -29,7 +29,7 @@ class ColliderRow:
 
     shape: Shape
     friction: float
-    restitution: float  # -1: the bodies' own elasticity
+    restitution: float  # -1 for the elasticity of the bodies
     thickness: float
     group: int
     mask: int
@@ -37,23 +37,25 @@ class ColliderRow:
     rotation: Floats  # quaternion
     velocity: Floats
     spin: Floats
-    offset: int  # first row of its samples, from `World.build` on
+    offset: int  # first row of the grid samples, after `World.build`
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
 
     @property
     def skin(self) -> float:
-        """Distance outside the shape at which bodies touch it [m]."""
+        """Distance outside the shape at which contact begins, with the additional skin of the shape [m]."""
         return self.thickness + self.shape.seam
 
     @property
     def box(self) -> tuple[Floats, Floats]:
-        """Corners of its present bounding box, (3,) [m] each."""
+        """Corners of the current bounding box of the collider, (3,) [m] each."""
         lower, upper, _ = self.swept_box(0.0)
         return lower, upper
 
     def swept_box(self, dt: float) -> tuple[Floats, Floats, Floats]:
-        """Return corners of the box swept in `dt` [s], (3,) [m] each, and the highest speed, (1,) [m/s]."""
+        """Return corners of the box swept in `dt` [s], (3,) [m] each, and the highest speed in it, (1,)
+        [m/s].
+        """
         lower, upper = self.shape.bounds
         speed, spin = length_of(self.velocity), length_of(self.spin)
         if not np.isfinite([lower, upper]).all():
@@ -74,27 +76,27 @@ class ColliderRow:
 
     @property
     def constants(self) -> tuple[Any, ...]:
-        """Everything except pose and motion."""
+        """All values except pose and motion."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
         return (id(self.shape), self.offset, self.is_alive, *surface)
 
 
 class ColliderSet(Protocol):
-    """The part of `Colliders` that a handle uses."""
+    """The part of `Colliders` that handles use."""
 
     on_jump: Callable[[Floats, Floats], None]
 
     def impulses(self) -> Floats:
-        """Return the impulses of the last step on each collider, (n, 6) [N s, N m s]."""
+        """Return the impulse on each collider in the last step, (n, 6) [N s, N m s]."""
 
     def moved(self, row: ColliderRow) -> None:
         """Record that the pose or the motion of a collider changed."""
 
     def write(self, index: int) -> None:
-        """Update the fields after a row was added or removed."""
+        """Update the fields after row `index` was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of a row changed."""
+        """Update fields and settings after the friction of row `index` changed."""
 
 
 class Collider(Handle):
@@ -110,7 +112,9 @@ class Collider(Handle):
         return f"Collider({self.index}, {self.shape!r}{'' if self.is_alive else ', removed'})"
 
     def _colliders(self) -> ColliderSet:
-        """Return the set that it belongs to. Raises: StateError if it was removed, or its world is gone."""
+        """Return the set that contains the collider. Raises: StateError if the collider was removed, or its
+        world no longer exists.
+        """
         colliders = self._set()
         if colliders is None:
             raise StateError(f"the world of collider {self.index} is gone: keep a reference to it")
@@ -120,81 +124,85 @@ class Collider(Handle):
 
     @property
     def is_alive(self) -> bool:
-        """False once the collider was removed."""
+        """False after the collider was removed."""
         return self._row.is_alive
 
     @property
     def shape(self) -> Shape:
-        """Its shape."""
+        """Shape of the collider."""
         return self._row.shape
 
     @property
     def position(self) -> Floats:
-        """Position of its origin, (3,) [m]."""
+        """Position of the collider's origin, (3,) [m]."""
         return np.array(self._row.position)
 
     @property
     def rotation(self) -> Floats:
-        """Its axes as columns, (3, 3)."""
+        """Axes of the collider as columns, (3, 3)."""
         matrix: Floats = matrix_of(self._row.rotation)
         return matrix
 
     @property
     def velocity(self) -> Floats:
-        """Velocity of its origin from the coming step on, (3,) [m/s]; zero if `move_to` moves it."""
+        """Velocity of the origin from the next step on, (3,) [m/s]; zero for a collider that `move_to`
+        moves.
+        """
         return np.array(self._row.velocity)
 
     @property
     def angular_velocity(self) -> Floats:
-        """Angular velocity from the coming step on, (3,) [rad/s]."""
+        """Angular velocity from the next step on, (3,) [rad/s]."""
         return np.array(self._row.spin)
 
     @property
     def friction(self) -> float:
-        """Coulomb's friction coefficient."""
+        """Coulomb friction coefficient."""
         return self._row.friction
 
     @property
     def restitution(self) -> float | None:
-        """Coefficient of restitution of the bodies' centres of mass; None for the bodies' own elasticity."""
+        """Coefficient of restitution for the centres of mass of bodies; None for their own elasticity."""
         return None if self._row.restitution < 0.0 else self._row.restitution
 
     @property
     def thickness(self) -> float:
-        """Distance outside the shape at which bodies touch it [m]."""
+        """Distance outside the shape at which contact begins [m]."""
         return self._row.thickness
 
     @property
     def group(self) -> int:
-        """Its groups, as bits."""
+        """Groups of the collider, as bits."""
         return self._row.group
 
     @property
     def mask(self) -> int:
-        """Groups of bodies that it touches, as bits."""
+        """Groups of bodies that the collider touches, as bits."""
         return self._row.mask
 
     @property
     def impulse(self) -> Floats:
-        """Impulse of all bodies on it in the last step, (3,) [N s]. Apply it to the engine's rigid body.
+        """Impulse that all bodies exerted on the collider in the last step, (3,) [N s].
 
-        It arrives one step late. The impulse of the coming step is about the same: add half of its effect to
-        that body's velocity before the step.
+        Apply this impulse to the engine's rigid body. It acts one step late. To compensate, add half of its
+        effect to the velocity of the rigid body before the next step, whose impulse is about the same.
         """
         return self._colliders().impulses()[self.index, :3]
 
     @property
     def angular_impulse(self) -> Floats:
-        """Angular impulse of all bodies on it in the last step, about its position, (3,) [N m s]."""
+        """Angular impulse that all bodies exerted on the collider in the last step, about its position, (3,)
+        [N m s].
+        """
         return self._colliders().impulses()[self.index, 3:]
 
     @recorded
     def set_friction(self, friction: float) -> None:
-        """Change the friction coefficient from the next step on. Wakes bodies that sleep near it.
+        """Change the friction coefficient from the next step on. Wakes sleeping bodies near the collider.
 
         Args:
-            friction: Coulomb's coefficient, 0 or more.
-        Raises: OptionError for a number out of range; StateError if it was removed.
+            friction: Coulomb coefficient, 0 or more.
+        Raises: OptionError for a number out of range; StateError if the collider was removed.
         """
         colliders, coefficient = self._colliders(), as_friction(friction)
         if coefficient != self._row.friction:
@@ -203,12 +211,13 @@ class Collider(Handle):
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Move there over the next step, in a straight line and with constant rotation, then stop.
+        """Move the collider to a pose over the next step, in a straight line and with constant rotation, then
+        stop it.
 
-        Bodies in its path are pushed with the velocity that this requires.
+        The collider pushes bodies in its path with the velocity of this motion.
         Args:
-            position: (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
+            position: new position of the collider's origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the current one.
         Raises: OptionError for bad values.
         """
         colliders = self._colliders()
@@ -217,11 +226,11 @@ class Collider(Handle):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Keep moving with this velocity until the next call.
+        """Move the collider with this velocity until the next call.
 
         Args:
-            linear: velocity of its origin, (3,) [m/s].
-            angular: angular velocity about its origin, (3,) [rad/s]; zero by default.
+            linear: velocity of the origin, (3,) [m/s].
+            angular: angular velocity about the origin, (3,) [rad/s]; zero by default.
         """
         colliders, row = self._colliders(), self._row
         velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
@@ -231,11 +240,12 @@ class Collider(Handle):
 
     @recorded
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Move there at once, without pushing bodies in between. Bodies that it covers there are moved out.
+        """Move the collider to a pose at once. It pushes no bodies in between, but moves bodies at the new
+        pose out.
 
         Args:
-            position: new position of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
+            position: new position of the collider's origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the current one.
         """
         colliders, row = self._colliders(), self._row
         pose = self._pose(position, rotation)
@@ -251,7 +261,7 @@ class Collider(Handle):
 
     @recorded
     def remove(self) -> None:
-        """Remove it from the world. Another collider can use its place."""
+        """Remove the collider from the world. Another collider can then use its place."""
         colliders = self._colliders()
         self._row.is_alive = False
         colliders.write(self.index)

@@ -1,4 +1,4 @@
-"""A collider as plain data for snapshots, and back."""
+"""Convert a collider to plain data for snapshots, and back."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vect
 
 
 def entry_of(collider: Collider) -> list[Any]:
-    """Return handle number, row and motion of a collider. A shape without a grid is in it in full."""
+    """Return handle number, row and motion of a collider. A shape without a grid is included completely."""
     row = row_of(collider)
     target = None if row.target is None else [each.tolist() for each in row.target]
     motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
@@ -27,12 +27,12 @@ def entry_of(collider: Collider) -> list[Any]:
 
 
 def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderRow:
-    """Read the row of an entry.
+    """Convert an entry to the row of a collider.
 
     Args:
         shapes: known shapes by their digests.
-        room: samples for which there is room.
-    Raises: ValueError, SnapshotError or OptionError for an entry that is no valid collider.
+        room: number of grid samples that fit.
+    Raises: ValueError, SnapshotError or OptionError for an invalid entry.
     """
     _, is_alive, digest, plain, offset, surface, motion, target = entry
     shape = shapes.get(digest)

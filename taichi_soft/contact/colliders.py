@@ -1,4 +1,4 @@
-"""All colliders of a world, and their part of a snapshot."""
+"""All colliders of a world, and their contribution to snapshots."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from taichi_soft.core.serialisation import digest_of
 Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
-"""Samples of all grids added after `World.build`, at most: 400 MB."""
+"""Largest number of grid samples for colliders added after `World.build`: 400 MB."""
 
 
 def ignore(lower: Floats, upper: Floats) -> None:
-    """Ignore a jump: the default of `Colliders.on_jump`."""
+    """Do nothing. This is the default of `Colliders.on_jump`."""
 
 
 class Colliders(Slice):
-    """All colliders of one world: the Python side of `ColliderFields`."""
+    """All colliders of a world, with the Python data behind `ColliderFields`."""
 
     name = "colliders"
 
@@ -48,17 +48,18 @@ class Colliders(Slice):
         """Start without colliders."""
         super().__init__(context)
         self._rows: list[ColliderRow] = []
-        self.shapes: dict[str, Shape] = {}  # all shapes ever added, by their digests
+        self.shapes: dict[str, Shape] = {}  # all shapes that were ever added, by digest
         self._handles: list[Collider] = []
-        self.floor: Collider | None = None  # of a world with colliders, from `World.build` on
+        self.floor: Collider | None = None  # set by `World.build` in a world with colliders
         self._contact: ColliderFields | None = None
         self._body_count = 0
         self._built_count = 0  # colliders at `World.build`, with the floor
-        self._impulses: Floats | None = None  # of the last step, once asked for
-        # Called with the box (two corners [m]) in which a collider appears, vanishes, leaves or arrives.
+        self._impulses: Floats | None = None  # impulses in the last step, once read
+        # Called with the box (two corners [m]) in which a collider appears or vanishes, or from or to which
+        # it jumps.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
-        self._is_dirty = False  # True if the fields lack new poses or velocities
-        self._movers: list[ColliderRow] = []  # with a velocity or a target
+        self._is_dirty = False  # True if poses or velocities must be written to the fields
+        self._movers: list[ColliderRow] = []  # colliders with a velocity or a target
 
     @property
     def handles(self) -> Sequence[Collider]:
@@ -66,7 +67,7 @@ class Colliders(Slice):
         return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
 
     def handle(self, index: int) -> Collider:
-        """Return the latest handle of a row."""
+        """Return the latest handle of row `index`."""
         return self._handles[index]
 
     def add(
@@ -81,7 +82,7 @@ class Colliders(Slice):
         group: int,
         mask: int,
     ) -> Collider:
-        """See `World.add_collider`."""
+        """Implement `World.add_collider`."""
         if not isinstance(shape, Shape):
             raise OptionError(f"shape must be one of taichi_soft's shapes, such as BoxShape, got {shape!r}")
         zero = np.zeros(3)
@@ -127,7 +128,9 @@ class Colliders(Slice):
         return len(self._rows)
 
     def _free_samples(self, shape: Shape) -> int:
-        """Return the first row for a new collider's grid. Raises: StateError if there is no room for it."""
+        """Return the first row for the samples of a new collider's grid. Raises: StateError if they do not
+        fit.
+        """
         needed = len(shape.samples)
         if self._contact is None or needed == 0:
             return 0
@@ -146,9 +149,9 @@ class Colliders(Slice):
         return found
 
     def capacity(self, room: int, sample_room: int, *, soft: bool) -> ContactCapacity:
-        """Return the capacity for these colliders and `room` more, with `sample_room` more samples.
+        """Return the capacity for the present colliders and `room` more, with `sample_room` more samples.
 
-        Rounded up so that similar worlds share kernels.
+        The capacity is rounded up, so that similar worlds share kernels.
         """
         count = len(self._rows) + room
         samples = sum(len(row.shape.samples) for row in self._rows) + sample_room
@@ -163,7 +166,7 @@ class Colliders(Slice):
         self._contact, self._body_count, self._impulses = colliders, body_count, None
         self._built_count = len(self._rows)
         if colliders.capacity.samples:
-            write_samples(colliders, 0, np.zeros(1, dtype=np.float32))  # compiles
+            write_samples(colliders, 0, np.zeros(1, dtype=np.float32))  # compile the kernel
         begin = 0
         for row in self._rows:
             row.offset = begin
@@ -219,7 +222,7 @@ class Colliders(Slice):
             self._movers.append(row)
 
     def prepare(self, dt: float) -> bool:
-        """Write poses and motion of the colliders for the coming step of `dt` [s] to the fields.
+        """Write poses and motion of the colliders for the next step of `dt` [s] to the fields.
 
         Returns: True if any pose or motion may differ from the last step.
         """
@@ -251,20 +254,21 @@ class Colliders(Slice):
 
     @property
     def all_handles(self) -> Sequence[Collider]:
-        """The handle of each row, including removed colliders."""
+        """Handles of all rows, including removed colliders."""
         return tuple(self._handles)
 
     def entries(self) -> list[list[Any]]:
-        """Return handle number, row and motion of each collider. A shape without a grid is in it in full."""
+        """Return handle number, row and motion of each collider. Shapes without a grid are included
+        completely.
+        """
         return [entry_of(handle) for handle in self._handles]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, ColliderRow]]:
-        """Read the rows of `entries`, with the numbers of their handles.
+        """Read the rows from the result of `entries`, with the numbers of their handles.
 
-        Raises: ValueError, SnapshotError or OptionError for an entry that is no valid collider, or lacks
-        room.
+        Raises: ValueError, SnapshotError or OptionError for an invalid entry, or if it does not fit.
         """
         room = ContactCapacity() if self._contact is None else self._contact.capacity
         if len(entries) > room.colliders:
@@ -272,7 +276,7 @@ class Colliders(Slice):
         return [(int(entry[0]), read_row(entry, self.shapes, room.samples)) for entry in entries]
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError if an impulse on a point that something holds is not finite."""
+        """Raise a ValueError if an impulse on a constrained point is not finite."""
         if self._contact is not None and self._contact.capacity.hull:
             hull = self.context.built.state.hull
             is_held = rows_of(hull.held_by).max(axis=1) > 0
@@ -281,7 +285,7 @@ class Colliders(Slice):
                     raise ValueError("impulses on hulls are too large, or not finite")
 
     def restore(self, read: Any) -> None:
-        """Replace all colliders by those that were `read`."""
+        """Replace all colliders by the result of `read`."""
         before, handles = [row.constants for row in self._rows], self.context.handles
         for handle in self._handles:
             row_of(handle).is_alive = False
@@ -305,8 +309,8 @@ class Colliders(Slice):
         if self._contact is None:
             return
         added: Collider | None = None
-        forget_collider(self._contact, self._body_count, 0)  # also without room for another
-        with contextlib.suppress(StateError):  # there is no room for it
+        forget_collider(self._contact, self._body_count, 0)  # compile this even if no collider can be added
+        with contextlib.suppress(StateError):  # raised if no collider can be added
             added = self.add(
                 SphereShape(1.0),
                 position=(0.0, 0.0, 0.0),
@@ -326,7 +330,7 @@ class Colliders(Slice):
             added.remove()
 
     def impulses(self) -> Floats:
-        """Return the impulses of the last step on each collider, (n, 6) [N s, N m s]; zero before the first
+        """Return the impulse on each collider in the last step, (n, 6) [N s, N m s]; zero before the first
         step.
         """
         if self._impulses is None:

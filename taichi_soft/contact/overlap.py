@@ -1,4 +1,6 @@
-"""Check for a body that starts inside another, for callers who prefer an error to moving the two apart."""
+"""Check that a body does not start inside another, for callers who prefer an error to moving the two
+apart.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 INSET = 0.02
-"""Depth over the mean edge above which bodies overlap. Contact itself moves shallower bodies apart."""
+"""Depth, over the mean edge, above which bodies overlap. Contact itself moves shallower bodies apart."""
 
 RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
-"""Axes whose third is the direction of the ray that decides what is inside. It meets no edge or vertex of a
-usual mesh."""
+"""Axes as rows. The third is the direction of the ray that decides whether a point is inside. The ray meets
+no edge or vertex of usual meshes."""
 
 CHUNK = 1 << 19
-"""Pairs of points and triangles that are compared at once."""
+"""Number of pairs of points and triangles that are compared at once."""
 
 
 class Placed(NamedTuple):
-    """A body and its present vertex positions."""
+    """A body and its current vertex positions."""
 
     name: str
     asset: SoftBodyAsset
@@ -38,7 +40,7 @@ class Placed(NamedTuple):
 
     @property
     def corners(self) -> Floats:
-        """Corners of the triangles by which it touches others, (t, 3, 3) [m]."""
+        """Corners of the triangles with which the body touches others, (t, 3, 3) [m]."""
         hull = self.asset.bound_hull
         if hull is not None:
             return np.asarray(self.asset.touching_points(self.positions)[hull.triangles])
@@ -48,7 +50,7 @@ class Placed(NamedTuple):
 def require_apart(body: Placed, others: Iterable[Placed]) -> None:
     """Check that a body starts outside of all other bodies that it can touch.
 
-    Raises: OptionError with the body that it overlaps deepest, and the depth.
+    Raises: OptionError with the other body that `body` overlaps deepest, and the depth.
     """
     deepest, which = 0.0, None
     for other in others:
@@ -65,7 +67,9 @@ def require_apart(body: Placed, others: Iterable[Placed]) -> None:
 
 
 def _depth(body: Placed, other: Placed) -> float:
-    """Return the depth of the deepest vertex or tetrahedron centre of a body in another [m]; 0 for none."""
+    """Return the largest depth of a vertex or tetrahedron centre of `body` in `other` [m]; 0 if none is
+    inside.
+    """
     if not len(other.tets):
         return 0.0
     corners = other.corners
@@ -85,7 +89,7 @@ def _depth(body: Placed, other: Placed) -> float:
 
 
 def _is_inside(points: Floats, corners: Floats) -> NDArray[np.bool_]:
-    """True for points from which a ray leaves a closed surface more often than it enters it."""
+    """Return True for each point from which a ray leaves a closed surface more often than it enters it."""
     seen = corners @ RAY.T - (points @ RAY.T)[:, None, None]
     x, y, z = np.moveaxis(seen, -1, 0)
     areas = np.roll(x, -1, axis=-1) * np.roll(y, -2, axis=-1) - np.roll(x, -2, axis=-1) * np.roll(

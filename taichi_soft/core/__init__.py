@@ -1,1 +1,3 @@
-"""Foundation of the package, independent of bodies: errors, checks, types, Taichi's start, serialisation."""
+"""Foundation of the package, which knows no bodies: errors, checks, types, the start of Taichi,
+serialisation.
+"""

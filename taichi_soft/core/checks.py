@@ -1,4 +1,4 @@
-"""Checks of arguments of the public interface, made before anything is changed."""
+"""Check arguments of the public interface before anything is changed."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 LARGEST_COUNT = 1_000_000
-"""Largest number of substeps, bodies or pixels: more would take too long or exceed 32 bits."""
+"""Largest number of substeps, bodies or pixels. Larger numbers would take too long or exceed 32 bits."""
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Range of fixed steps [s]: shorter ones vanish in float32, longer ones would take days of computing."""
+"""Range of the length of fixed steps [s]. Shorter steps vanish in float32; longer ones would take days to
+compute."""
 
 
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
-    """Convert `value` to a float within [low, high]. Raises: OptionError with `text`, or the range."""
+    """Convert `value` to a float within [low, high]. Raises: OptionError with `text`, or with the range if
+    `text` is "".
+    """
     wanted = text or f"a number from {low:g} to {high:g}"
     if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
         raise OptionError(f"{name} must be {wanted}, got {value!r}")
@@ -40,7 +43,7 @@ def as_number(value: Any, name: str, low: float, high: float, text: str = "") ->
 
 
 def as_positive(value: Any, name: str, unit: str) -> float:
-    """Convert `value` to a float above 0. Raises: OptionError."""
+    """Convert `value` to a float above 0. Raises: OptionError for other values."""
     number = as_number(value, name, 0.0, np.inf, f"a number above 0 {unit}")
     if number == 0.0:
         raise OptionError(f"{name} must be a number above 0 {unit}, got 0")
@@ -61,7 +64,7 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
 
 
 def choose_one_of(names: Iterable[str], given: Any) -> str:
-    """Write advice for an unknown name: the known names, and the closest one."""
+    """Return advice for an unknown name: the known names, and the closest of them."""
     known = list(names)
     close = get_close_matches(given, known, n=1) if isinstance(given, str) else []
     guess = f". Did you mean {close[0]!r}?" if close else ""
@@ -80,7 +83,7 @@ def _is_plain(value: Any) -> bool:
 
 
 def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
-    """Convert `value` to three numbers within `limit`. Raises: OptionError."""
+    """Convert `value` to three numbers with absolute values up to `limit`. Raises: OptionError."""
     if isinstance(value, tuple) and len(value) == 3 and all(_is_plain(x) and abs(x) < limit for x in value):
         return np.array(value, dtype=np.float64)  # fast path: games move many objects per frame
     vector = as_array(value, name, (3,), unit)
@@ -97,12 +100,12 @@ def as_gravity(value: ArrayLike) -> Floats:
 
 
 def as_friction(value: Any) -> float:
-    """Convert `value` to a Coulomb coefficient. Raises: OptionError."""
+    """Convert `value` to a Coulomb friction coefficient. Raises: OptionError."""
     return as_number(value, "friction", 0.0, 1e6, "a number from 0 to 1,000,000")
 
 
 def to_array(values: Any, name: str) -> NDArray[Any]:
-    """Convert `values` to an array of any type. Raises: OptionError for rows of unequal lengths."""
+    """Convert `values` to an array of any type. Raises: OptionError if rows have unequal lengths."""
     try:
         return np.asarray(values)
     except (ValueError, TypeError) as error:
@@ -110,7 +113,9 @@ def to_array(values: Any, name: str) -> NDArray[Any]:
 
 
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
-    """Copy `values` to finite float64 of a shape (None means any length). Raises: OptionError."""
+    """Copy `values` to a finite float64 array with a shape, in which None means any length. Raises:
+    OptionError.
+    """
     lengths = ", ".join("n" if length is None else str(length) for length in shape)
     wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
     array = to_array(values, name)
@@ -129,7 +134,7 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
 
 
 def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
-    """Convert `values` to unique integers from 0 to `count` - 1, ascending. Raises: OptionError."""
+    """Convert `values` to unique integers from 0 to `count` - 1, in ascending order. Raises: OptionError."""
     array = to_array(values, name)
     if array.size == 0 and array.ndim == 1:
         return np.zeros(0, dtype=np.int32)
@@ -142,7 +147,8 @@ def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
 
 
 def as_buffer(out: Any, name: str, count: int) -> Floats32:
-    """Check that `out` can receive (count, 3) positions or normals; None makes a new array.
+    """Check that `out` can receive (count, 3) positions or normals, and return it; for None, return a new
+    array.
 
     Raises: OptionError.
     """
@@ -162,7 +168,7 @@ def as_buffer(out: Any, name: str, count: int) -> Floats32:
 
 
 def as_path(value: Any) -> Path:
-    """Convert `value` to the path of a file. Raises: OptionError."""
+    """Convert `value` to a file path. Raises: OptionError."""
     if not isinstance(value, (str, os.PathLike)):
         raise OptionError(f"path must be a string or a Path, got {value!r}")
     path = Path(os.fsdecode(value))
@@ -174,7 +180,8 @@ def as_path(value: Any) -> Path:
 def as_rotation(value: Any) -> Floats:
     """Convert a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation to a rotation matrix.
 
-    Raises: OptionError if it is neither orthonormal with determinant +1 nor of length 1.
+    Raises: OptionError for a matrix that is not orthonormal with determinant +1, or a quaternion that is not
+        of length 1.
     """
     if value is None:
         return np.eye(3)
@@ -198,7 +205,7 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # their squares might overflow
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # their squares could overflow
     sound = matrices[~bad]
     gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
     bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)

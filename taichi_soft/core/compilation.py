@@ -1,4 +1,4 @@
-"""Log the compilation and loading of kernels, and show it on a terminal if it takes long.
+"""Log the compilation and loading of kernels, and show progress on a terminal if they take long.
 
 The logger `taichi_soft.core.compilation` logs each kernel with its time at level DEBUG.
 """
@@ -16,28 +16,30 @@ Show = Callable[[str], object]
 _log = logging.getLogger(__name__)
 
 PATIENCE = 1.0
-"""Compile time after which a terminal shows the progress [s]; loading a small world takes less."""
+"""Time of compilation after which a terminal shows the progress [s]. Loading a small world takes less."""
 
 PAUSE = 5.0
 """Time without a new kernel after which counting restarts [s]."""
 
 
 def _show_on_terminal(text: str) -> None:
-    """Replace the current line on the terminal, if there is one; an empty text clears it."""
+    """Replace the current line of the terminal. An empty text clears the line. Without a terminal, do
+    nothing.
+    """
     if sys.stderr is not None and sys.stderr.isatty():
         print(f"\r{text:<79}\r", end="", file=sys.stderr, flush=True)
 
 
 class Burst:
-    """Consecutive kernels."""
+    """Counts kernels that are compiled or loaded in quick succession."""
 
     def __init__(self) -> None:
         self.show: Show = _show_on_terminal
-        self.made, self.found = 0, 0  # since the start of the process
+        self.made, self.found = 0, 0  # kernels compiled and kernels loaded since the start of the process
         self._count, self._seconds, self._last = 0, 0.0, 0.0
 
     def begin(self, name: str) -> float:
-        """Record the start of a compilation. Returns: the current time [s]."""
+        """Record that a compilation starts. Returns: the current time [s]."""
         now = time.perf_counter()
         if now - self._last > PAUSE:
             self._count, self._seconds = 0, 0.0
@@ -47,7 +49,7 @@ class Burst:
         return now
 
     def end(self, name: str, start: float, is_found: bool) -> None:
-        """Record the first run of a kernel; `is_found` if it was loaded from the cache."""
+        """Record the first run of a kernel. `is_found` is True if the kernel was loaded from the cache."""
         self._last = time.perf_counter()
         took = self._last - start
         if self._seconds > PATIENCE:
@@ -62,7 +64,9 @@ BURST = Burst()
 
 @contextlib.contextmanager
 def shown_by(show: Show) -> Iterator[None]:
-    """Context in which `show` receives the lines instead of the terminal; an empty one clears the last."""
+    """Context in which `show` receives the progress lines instead of the terminal. An empty line clears the
+    last one.
+    """
     before, BURST.show = BURST.show, show
     try:
         yield

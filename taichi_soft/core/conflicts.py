@@ -1,11 +1,11 @@
-"""Options and features that exclude each other, in one list. `docs/limits.md` has the same table."""
+"""List of all options and features that exclude each other. `docs/limits.md` has the same table."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Conflict:
-    """One thing does not support another."""
+    """A pair of an option and a feature that exclude each other."""
 
     option: str
     features: str
@@ -13,7 +13,7 @@ class Conflict:
     solution: str
 
     def message(self, option: str = "", feature: str = "") -> str:
-        """The text of an error. Args: option, feature: names of this case, if they say more."""
+        """Return the text of an error. Args: option, feature: more specific names for this case."""
         said = f"{option or self.option} does not support {feature or self.features}"
         return f"{said}, because {self.reason}: {self.solution}"
 

@@ -1,4 +1,4 @@
-"""Container of bytes with a magic mark, a version, parts of any length, and a checksum."""
+"""Container for bytes, with a magic mark, a version, parts of any length, and a checksum."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ _DIGEST = 16
 
 
 def seal(mark: bytes, version: int, parts: list[bytes]) -> bytes:
-    """Join parts, with their lengths first and a BLAKE2b digest of everything at the end."""
+    """Join parts into one container. It begins with their lengths and ends with a BLAKE2b digest of
+    everything before.
+    """
     lengths = [_LENGTH.pack(len(part)) for part in parts]
     whole = b"".join([_HEAD.pack(mark, version, len(parts)), *lengths, *parts])
     return whole + _digest(whole)
 
 
 def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
-    """Check and split sealed bytes into their parts.
+    """Check a container and return its parts.
 
     Raises: OptionError for data that is not bytes; SnapshotError for other data, another version, or damage.
     """
@@ -50,7 +52,7 @@ def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
 
 
 def name_of_sealed(data: bytes) -> bytes:
-    """Unique name of sealed bytes: their digest."""
+    """Return a name for a container that is unique to its content: its digest."""
     return bytes(memoryview(data).cast("B")[-_DIGEST:])
 
 

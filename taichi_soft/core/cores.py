@@ -1,4 +1,4 @@
-"""CPU cores, and binding threads to them on Linux."""
+"""List CPU cores, and bind threads to them on Linux."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TASKS = "/proc/self/task"
 
 
 def available_cores() -> list[int]:
-    """Numbers of the cores that this process can run on, ascending."""
+    """Return the numbers of the cores that this process can use, in ascending order."""
     if hasattr(os, "sched_getaffinity"):
         return sorted(os.sched_getaffinity(0))
     return list(range(os.cpu_count() or 1))
@@ -27,7 +27,7 @@ def can_bind() -> bool:
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
-    """Check that cores are distinct and among those that are `there`. Raises: OptionError."""
+    """Check that cores are distinct and all among the cores `there`. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"
@@ -43,12 +43,14 @@ def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
 
 
 def thread_ids() -> set[int]:
-    """System ids of the threads of this process."""
+    """Return the system's ids of the threads of this process."""
     return {int(name) for name in os.listdir(_TASKS)}
 
 
 def number_now() -> int:
-    """Id of a thread that starts now; the system assigns ids in ascending order and wraps around."""
+    """Return the id of a thread that starts now. The system assigns ids in ascending order, and wraps
+    around.
+    """
     thread = threading.Thread(target=int)
     thread.start()
     thread.join()
@@ -57,11 +59,11 @@ def number_now() -> int:
 
 
 def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None:
-    """Bind the youngest threads to one core each, the oldest of them to the first core.
+    """Bind the youngest threads to one core each. The oldest of them gets the first core.
 
     Args:
-        threads: threads started after the one with the id `since`.
-    Raises: DeviceError if the system refuses. Then no binding is changed.
+        threads: ids of threads that were started after the thread `since`.
+    Raises: DeviceError if the system refuses, with no binding changed.
     """
     masks: dict[int, set[int]] = {}
     try:

@@ -1,8 +1,8 @@
-"""Errors and warnings. Every message has the value received and what to do."""
+"""Errors and warnings. Every message contains the value received and what to do."""
 
 
 class TaichiSoftError(Exception):
-    """Base of all errors of this package. Its text is always one line."""
+    """Base class of all errors of this package. The text is always one line."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
@@ -45,15 +45,15 @@ class BakeError(TaichiSoftError, OSError):
 
 
 class SlowStepWarning(UserWarning):
-    """A step takes more than 500 substeps. The text names the body, the cause and what to do."""
+    """A step takes more than 500 substeps. The text contains the body, the cause and what to do."""
 
 
 class TooSoftWarning(UserWarning):
-    """A body's pressure on its base exceeds a fifth of its Young's modulus: it collapses."""
+    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that it collapses."""
 
 
 class UnstableStepWarning(UserWarning):
-    """The substep is longer than the estimated stable step."""
+    """The substep is longer than the estimated largest stable substep."""
 
 
 class FrozenBodyWarning(UserWarning):
@@ -61,7 +61,7 @@ class FrozenBodyWarning(UserWarning):
 
 
 class DroppedEventsWarning(UserWarning):
-    """Events were dropped, because too many waited for `drain_events`."""
+    """Events were dropped, because too many were waiting for `drain_events`."""
 
 
 class SolverWarning(UserWarning):
@@ -69,4 +69,4 @@ class SolverWarning(UserWarning):
 
 
 class SkippedCellsWarning(UserWarning):
-    """A mesh file has cells that are not tetrahedra, which the body leaves out."""
+    """A mesh file has cells that are not tetrahedra. The body does not contain them."""

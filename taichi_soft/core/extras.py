@@ -1,4 +1,4 @@
-"""Extras: optional packages, and advice to install missing ones."""
+"""Extras: optional packages, and advice how to install missing ones."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ EXTRAS = {
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }
-"""By extra: its modules and the packages that provide them, as in pyproject.toml."""
+"""Modules of each extra and the packages that provide them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """Missing packages of an extra, or of these modules of it."""
+    """Return the missing packages of an extra; if `modules` are given, only of these."""
     return missing_among(EXTRAS[extra], *modules)
 
 
 def missing_among(packages: Mapping[str, str], *modules: str) -> list[str]:
-    """Missing packages of a table by module, or of these modules of it."""
+    """Return the missing packages of a table by module; if `modules` are given, only of these."""
     return [packages[module] for module in modules or packages if not _is_there(module)]
 
 
@@ -49,8 +49,8 @@ def require_extra(extra: str, what: str, *modules: str) -> None:
     """Raise a MissingExtraError if a package of the extra is missing.
 
     Args:
-        what: feature that needs it, and a verb: "a film needs".
-        modules: required modules of the extra; by default all.
+        what: feature that needs the extra, with a verb: "a film needs".
+        modules: required modules of the extra; all by default.
     """
     missing = missing_packages(extra, *modules)
     if missing:

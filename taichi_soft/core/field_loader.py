@@ -16,12 +16,14 @@ class Loader:
     """Fields that are always written together, in the same order."""
 
     def __init__(self) -> None:
-        """Start without fields; the first `write` fixes them."""
+        """Start without fields. The first `write` determines the fields and their order."""
         self.pieces: list[tuple[Any, int, int, int]] = []
         self._waiting: list[tuple[Any, NDArray[Any]]] = []
 
     def fill(self, field: Any, rows: NDArray[Any]) -> None:
-        """Set the first rows of a field with at most one dimension, and zeros for the rest, for `write`."""
+        """Set the first rows of a field, and all other rows to zero. The field must have at most one
+        dimension. `write` applies this.
+        """
         width = getattr(field, "n", 1)
         whole = np.zeros((_rows_of(field), width), np.int32 if field.dtype == ti.i32 else np.float64)
         if len(rows):
@@ -29,12 +31,14 @@ class Loader:
         self._waiting.append((field, whole.reshape(-1)))
 
     def fill_all(self, field: Any, number: float) -> None:
-        """Set all numbers of such a field, for `write`."""
+        """Set all numbers of a field to `number`. The field must have at most one dimension. `write` applies
+        this.
+        """
         rows = np.full(_rows_of(field) * getattr(field, "n", 1), number)
         self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
 
     def write(self) -> None:
-        """Write all filled fields."""
+        """Write all fields that `fill` and `fill_all` have set."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
         pieces, sizes = [], [1, 1]
         for field, rows in self._waiting:
@@ -61,7 +65,7 @@ def _write_pieces(
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
         # Serial loops become one function, which compiles much longer for many fields than one function per
-        # field. But for the few fields of a collider, starting threads is not worthwhile.
+        # field. For the few fields of a collider, starting threads takes longer than the loops.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

@@ -1,8 +1,8 @@
 """Declarations of Taichi fields.
 
-A group of fields is a class that declares each of its fields once, with `declare`. From the declarations
-follow the allocation, the initial values, the contents of a snapshot and their bounds, the layout of exported
-worlds, and the C++ headers (`engine_adapter/native/write_fields.py`).
+A group of fields is a class that declares each of its fields once, with `declare`. The declarations determine
+the allocation, the initial values, the contents of snapshots and their bounds, the layout of exported worlds,
+and the C++ headers (`engine_adapter/native/write_fields.py`).
 """
 
 from __future__ import annotations
@@ -18,30 +18,31 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""Type of a field's numbers: float32; float64 in fields that evaluate forces with doubles."""
+"""Type of a field's numbers: float32 in a world, float64 in fields made to evaluate forces in double
+precision."""
 
 LOADED = "loaded"
-"""`start` of a field whose initial values depend on the bodies: `load` of its group fills it."""
+"""`start` of a field whose initial values depend on the bodies. `load` of the group fills the field."""
 
 ANY = float("inf")
 FINITE = float(np.finfo(np.float32).max)
-"""`most` of a field with any numbers, or with any finite numbers."""
+"""`most` of a field whose numbers can be any float, or any finite float."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
-"""`rows` of a field: what each row belongs to. A contact is a pair of a body and a collider. OUTER stands for
-particles of surfaces, and WORLD for a single row."""
+"""Values of `rows`: the thing that a row of a field belongs to. A contact is a pair of a body and a collider.
+OUTER means the particles of surfaces, and WORLD a single row."""
 
 SHAPE = "shape"
-"""`keep` of the rest shapes of tetrahedra, which change only if the body is plastic."""
+"""`keep` of rest shapes of tetrahedra, which change only if the body is plastic."""
 
 
 @dataclass(frozen=True)
 class Below:
-    """Integers from 0 up to, but not including, the number of `things` plus `beside`."""
+    """Bounds of integers: from 0 up to, but not including, the number of `things` plus `beside`."""
 
-    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; "" counts none, so that `beside` is the bound
+    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; with "", `beside` alone is the bound
     beside: int = 0
 
 
@@ -50,7 +51,7 @@ FRAME = "frame"
 
 @dataclass(frozen=True, eq=False)
 class Declaration:
-    """Properties of a field: see `declare`."""
+    """Properties of a field, see `declare`."""
 
     rows: str | int
     number: Any
@@ -69,7 +70,7 @@ class Declaration:
     layout: Any
 
     def __get__(self, group: object, kind: type) -> Any:
-        """Raise an AttributeError if a group lacks the field. If it has the field, that hides this method."""
+        """Raise an AttributeError if a group lacks the field. A field that exists hides this method."""
         if group is None:
             return self
         name = next(name for name, each in kind.declarations().items() if each is self)  # type: ignore[attr-defined]
@@ -77,21 +78,21 @@ class Declaration:
 
     @property
     def is_bounded(self) -> bool:
-        """True if `require` checks its values."""
+        """True if `require` checks the values of the field."""
         return self.below is not None or self.most < ANY
 
     @property
     def is_struct(self) -> bool:
-        """True if its rows have named members."""
+        """True if the rows of the field have named members."""
         return isinstance(self.number, ti.lang.struct.StructType)
 
     def count(self, counts: Mapping[str, int]) -> int:
-        """Number of rows."""
+        """Return the number of rows."""
         rows = self.rows if isinstance(self.rows, int) else counts[self.rows]
         return rows * self.each + self.beyond
 
     def make(self, counts: Mapping[str, int], real: Any) -> Any:
-        """Allocate the field, filled with zeros."""
+        """Allocate the field, filled with zeros, and return it."""
         shape = () if self.rows == WORLD else self.count(counts)
         if self.is_struct:
             return self.number.field(shape=shape)
@@ -106,7 +107,7 @@ class Declaration:
     def require(self, rows: NDArray[Any], things: Mapping[str, int]) -> None:
         """Check rows of a snapshot. Raises: ValueError with the value and the bounds.
 
-        Args: things: number of things, by their name in `Below`.
+        Args: things: numbers of things, by their names in `Below`.
         """
         if rows.dtype.kind == "f":
             size = float(np.abs(rows).max(initial=0.0))
@@ -139,22 +140,23 @@ def declare(
     """Declare a field in the body of a `FieldGroup`.
 
     Args:
-        rows: what each row belongs to (WORLD, PARTICLE ...), or a fixed number of rows.
-        number: type of its numbers: `ti.i32`, `ti.f32`, REAL, or a `ti.dataclass` for rows with members.
-        size: numbers per row; (rows, columns) for a matrix.
-        unit: SI unit of its numbers.
-        each, beyond: number of rows per particle, edge ..., and of spare rows after the last, which code can
-            read.
-        start: initial number in all rows; LOADED if it depends on the bodies; None if a step writes the rows
-            before it reads them.
-        keep: group of rows of a snapshot that stores the field; "" if the next step does not depend on it.
+        rows: the thing that a row belongs to (WORLD, PARTICLE ...), or a fixed number of rows.
+        number: type of the field's numbers: `ti.i32`, `ti.f32`, REAL, or a `ti.dataclass` for rows with
+            members.
+        size: number of numbers per row; (rows, columns) for a matrix.
+        unit: SI unit of the numbers.
+        each, beyond: number of rows per thing, and of spare rows after the last, which code can read.
+        start: initial number in all rows; LOADED if the numbers depend on the bodies; None if a step writes
+            the rows before it reads them.
+        keep: group of rows in a snapshot that contains the field; "" if the next step does not depend on the
+            field.
         native_keep: `keep` in snapshots of the C library only, because Python stores the data with the
             handles.
-        below: bounds of integers in a snapshot; a dictionary by member for rows with members.
+        below: bounds of integers in a snapshot; for rows with members, a dictionary by member.
         most: largest absolute value of floats in a snapshot.
         native: True if the C library reads or writes the field between steps.
-        inherited: True if a piece of a cut body gets the values of the body.
-        when: attribute of the capacity that is true if it has the field; "" if all capacities have it.
+        inherited: True if each piece of a cut body gets the values of the body.
+        when: attribute of the capacity that is true if the group has the field; "" if it always has it.
         layout: a `ti.Layout` other than the default.
     """
     return Declaration(
@@ -177,25 +179,27 @@ def declare(
 
 
 class FieldGroup:
-    """Fields with one owner, declared by a subclass. Kernels get a group or a `State` as a template."""
+    """A group of fields with one owner, declared by a subclass. Kernels receive a group or a `State` as a
+    template.
+    """
 
     owner: ClassVar[str] = ""
-    """Folder of the kernels that can write it; "" if all can."""
+    """Folder of the kernels that can write the group; "" if all kernels can."""
     when: ClassVar[str] = ""
-    """Attribute of the capacity that is true if it has the group; "" if all capacities have it."""
+    """Attribute of the capacity that is true if the world has the group; "" if every world has it."""
 
     def __init_subclass__(cls) -> None:
         holds_fields(cls)
 
     def __init__(self, capacity: Any, real: Any) -> None:
-        """Allocate the fields. Args: capacity: has the `counts` of rows; real: type of REAL."""
+        """Allocate the fields. Args: capacity: object with the `counts` of rows; real: type of REAL."""
         for name, each in self.declarations().items():
             if not each.when or getattr(capacity, each.when):
                 setattr(self, name, each.make(capacity.counts, real))
 
     @classmethod
     def declarations(cls) -> dict[str, Declaration]:
-        """Declarations of all fields by name, those of base classes first."""
+        """Return the declarations of all fields by name, those of base classes first."""
         return {
             name: value
             for base in reversed(cls.__mro__)
@@ -204,7 +208,9 @@ class FieldGroup:
         }
 
     def declared(self) -> list[tuple[str, Declaration, Any]]:
-        """Name, declaration and field of each allocated field, or of each member if its rows have members."""
+        """Return name, declaration and field of each allocated field. For rows with members, return one entry
+        per member.
+        """
         found = []
         for name, each in self.declarations().items():
             if name not in vars(self):
@@ -220,7 +226,7 @@ class FieldGroup:
         return found
 
     def fill_starts(self, loader: Loader) -> None:
-        """Fill the fields whose initial number is the same in every world."""
+        """Fill the fields whose initial number is the same in all worlds."""
         for _, each, field in self.declared():
             if isinstance(each.start, (int, float)):
                 loader.fill_all(field, each.start)

@@ -1,4 +1,4 @@
-"""Handles of a world, and their serial numbers, which are equal in worlds with the same history."""
+"""Handles of a world. Their serial numbers are equal in worlds with the same history."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 
 
 class Recorder(Protocol):
-    """Recorder of API calls, if a world has one."""
+    """Recorder of API calls."""
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
@@ -24,7 +24,7 @@ class Recorder(Protocol):
 
 
 class Handle:
-    """Base of public handles: the world, bodies, colliders, frames, grabs, attachments.
+    """Base class of public handles: the world, bodies, colliders, frames, grabs, attachments.
 
     Only one thread at a time can call public methods: a concurrent call raises a StateError before anything
     is changed.
@@ -34,11 +34,11 @@ class Handle:
     _serial: int
 
     def _keep(self) -> bytes | None:
-        """Implement `keep`, for worlds only."""
+        """Return a snapshot as `keep` does. Only worlds implement this."""
         raise NotImplementedError
 
     def _undo(self, data: bytes) -> None:
-        """Implement `undo`, for worlds only."""
+        """Restore a snapshot as `undo` does. Only worlds implement this."""
         raise NotImplementedError
 
     def __init_subclass__(cls) -> None:
@@ -49,17 +49,19 @@ class Handle:
 
 
 class Handles:
-    """Numbers the handles of one world, and finds those that still exist."""
+    """Numbers the handles of a world, and finds those that still exist."""
 
     def __init__(self) -> None:
-        """Start without handles; 0 is the world itself."""
+        """Start without handles. Number 0 is the world itself."""
         self.count = 1
         self.turn = Turn()
         self.recorder: Recorder | None = None
         self._known: WeakValueDictionary[int, Handle] = WeakValueDictionary()
 
     def enlist(self, handle: Handle, serial: int | None = None) -> None:
-        """Assign a new handle the next number, or its number in an earlier state of the world."""
+        """Assign a number to a new handle: the next one, or `serial`, its number in an earlier state of the
+        world.
+        """
         if serial is None:
             serial = self.count
             self.count += 1
@@ -67,28 +69,28 @@ class Handles:
         self._known[serial] = handle
 
     def find(self, serial: int, kind: type[Kind]) -> Kind | None:
-        """Handle with a number, if it has this type and still exists."""
+        """Return the handle with a number, or None if it no longer exists or has another type."""
         handle = self._known.get(serial)
         return handle if isinstance(handle, kind) else None
 
 
 def serial_of(handle: Handle) -> int:
-    """Number of a handle, 0 for the world."""
+    """Return the number of a handle; 0 for the world."""
     return handle._serial
 
 
 def handles_of(handle: Handle) -> Handles:
-    """All handles of the same world."""
+    """Return all handles of the same world."""
     return handle._handles
 
 
 def keep(world: Handle) -> bytes | None:
-    """Snapshot for `undo`, before changes for a step; None if no step of this world can be refused."""
+    """Return a snapshot for `undo`, before changes for a step; None if this world refuses no step."""
     return world._keep()
 
 
 def undo(world: Handle, data: bytes) -> None:
-    """Restore a world to its state at `keep`, if no step was made since.
+    """Restore the state of a world at `keep`. No step must have been made since.
 
     Unlike `World.restore`, this keeps waiting events and does not change `restore_count`.
     """
@@ -96,7 +98,7 @@ def undo(world: Handle, data: bytes) -> None:
 
 
 def recorded(method: Method) -> Method:
-    """Decorate a public method that changes a world, so that its recorder records the calls."""
+    """Decorate a public method that changes a world. If the world has a recorder, it records the calls."""
 
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:
@@ -110,5 +112,5 @@ def recorded(method: Method) -> Method:
 
 
 def is_recorded(handle: Handle, name: str) -> bool:
-    """True if a handle has a recorded method with this name, which files can call."""
+    """True if a handle has a recorded method with this name. Only such methods can be called from files."""
     return hasattr(getattr(type(handle), name, None), "is_recorded")

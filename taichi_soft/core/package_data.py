@@ -1,4 +1,4 @@
-"""Folders of the demos and the thesis's meshes: inside the package, or next to it in a checkout."""
+"""Folders of the demos and of the thesis's meshes: inside the package, or next to it in a source checkout."""
 
 from pathlib import Path
 
@@ -11,7 +11,8 @@ def _folder(name: str) -> Path:
 
 
 DEMOS = _folder("demos")
-"""Python files that each define a stage."""
+"""Folder of Python files that each define a stage."""
 
 ASSETS = _folder("assets")
-"""Bodies of the thesis's experiments as .npz; see `assets/README.md` of the sources."""
+"""Folder with the bodies of the thesis's experiments as .npz, see `assets/README.md` in the source
+checkout."""

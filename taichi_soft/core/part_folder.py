@@ -1,4 +1,4 @@
-"""Hidden temporary folder next to a file's path, for incomplete files."""
+"""Hidden temporary folder for incomplete files, next to the path of the final file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:
-    """A new folder in `parent`. Removes abandoned folders of ended processes first.
+    """A new folder in `parent`. It first removes abandoned folders of ended processes.
 
-    A process locks a file in its folder. The system releases the lock when the process ends, even if it is
-    killed: a folder whose lock is free is abandoned.
+    A process locks a file in its folder. The system releases the lock when the process ends, even if the
+    process is killed. So a folder whose lock is free is abandoned.
     Raises: OSError if the folder cannot be created.
     """
 
@@ -28,14 +28,14 @@ class PartFolder:
         remove_abandoned(parent)
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         self._remove = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
-        # Rename the lock file only after locking it, so that no other process finds it free.
+        # Rename the lock file only after locking it, so that no other process finds the lock free.
         self._lock = (self.path / "new").open("wb")
         _try_lock(self._lock)
         if sys.platform != "win32":
             (self.path / "new").rename(self.path / LOCK)
 
     def remove(self) -> None:
-        """Remove the folder and its contents. Further calls do nothing."""
+        """Remove the folder and its contents. Later calls do nothing."""
         self._lock.close()
         self._remove()
 
@@ -49,9 +49,9 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def _is_abandoned(folder: Path) -> bool:
-    """True if no process holds the folder's lock. Raises: OSError if that cannot be determined."""
+    """True if no process holds the lock of a folder. Raises: OSError if that cannot be determined."""
     if sys.platform == "win32":
-        (folder / "new").unlink()  # refused while it is open
+        (folder / "new").unlink()  # fails while the file is open
         return True
     with (folder / LOCK).open("r+b") as lock:
         return _try_lock(lock)

@@ -1,10 +1,10 @@
-"""Old public names that work for one more version."""
+"""Old public names that still work in the next version."""
 
 import warnings
 
 
 def warn_renamed(old: str, new: str) -> None:
-    """Warn the caller of the calling function that a public name has changed."""
+    """Warn the caller of the calling function that a public name has been renamed."""
     warnings.warn(
         f"{old} is deprecated and will be removed in the next version: use {new}",
         DeprecationWarning,

@@ -1,7 +1,7 @@
 """Start Taichi once.
 
-Every other module takes `ti` from here, after the workarounds of `taichi_soft.core.taichi_workarounds` were
-applied to it. Only this module calls `ti.init`, which resets every field in the process.
+Every other module imports `ti` from here, after the workarounds of `taichi_soft.core.taichi_workarounds` have
+been applied. Only this module calls `ti.init`, which resets every field in the process.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ __all__ = [
 Result = TypeVar("Result")
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Environment variable: 1 turns on index checks in kernels, which are slow and only for tests."""
+"""Environment variable. The value 1 turns on index checks in kernels, which are slow and only for tests."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
@@ -81,12 +81,12 @@ class Device:
 
     arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
     threads: int  # CPU worker threads (1 on a GPU, where the host code is serial)
-    reason: str  # reason of the choice, one line
+    reason: str  # reason for the choice, one line
     cores: tuple[int, ...] = ()  # cores that the worker threads are bound to, one each; empty if unbound
 
     @property
     def is_gpu(self) -> bool:
-        """True where kernels run on a graphics processor."""
+        """True if kernels run on a graphics processor."""
         return self.arch != "cpu"
 
 
@@ -94,29 +94,28 @@ _log = logging.getLogger(__name__)
 
 _device: Device | None = None
 _process = 0  # process that started Taichi
-_checked_kernels: str | None = None  # folder of kernels with index checks
-_first_field: Any = None  # a separate layout, because an empty one cannot be exported
+_checked_kernels: str | None = None  # folder of kernels with index checks, if they are on
+_first_field: Any = None  # has its own layout, because an empty one cannot be exported
 
 
 @in_turn
 def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
     """Start Taichi for this process.
 
-    Entry points call this; an embedding program can call it first with its own choice, from any thread.
-    Calls in a process forked later raise a StateError: start processes with "spawn".
-    A second call with compatible arguments does nothing, because a restart would destroy the fields of every
-    world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels check every index.
+    `World.build` and other functions that need Taichi call this. A program can call it before them with its
+    own choice, from any thread. In a process that was forked later, calls raise a StateError: start processes
+    with "spawn". A second call with compatible arguments does nothing, because a restart would destroy the
+    fields of every world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels check every index.
     Args:
-        arch: "auto" or "cpu", or a GPU: "cuda", "vulkan" or "metal". "auto" takes the CPU, which is faster
-            for typical games (docs/speed.md) and leaves the GPU for rendering. "vulkan" and "metal" are
-            untested.
+        arch: "auto" or "cpu", or a GPU: "cuda", "vulkan" or "metal". "auto" uses the CPU, which is faster for
+            typical games (docs/speed.md) and leaves the GPU for rendering. "vulkan" and "metal" are untested.
         threads: number of unbound CPU worker threads, 1 or more, limited to the available cores. The system
             moves them between cores and can put two on one core, so short frames may gain little.
         cores: on Linux, core numbers for as many CPU worker threads, each bound to one core. Choose cores
-            that the rest of the game does not use, and call this before other code starts threads.
-            By default there is one thread per available core, bound to it on Linux if the system permits.
+            that the rest of the game does not use, and call this before other code starts threads. By default
+            there is one thread per available core. On Linux it is bound to the core if the system permits.
     Returns: the device in use.
-    Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
+    Raises: OptionError for an unknown arch, thread count or core, or if Taichi was started differently;
         DeviceError if the device is not available, or threads cannot be bound; StateError in a process that
         was forked after a start.
     """
@@ -131,14 +130,14 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     there = available_cores()
     taken = (
         () if _device is None else _device.cores
-    )  # the caller may have moved its own threads off them since
+    )  # the caller may have moved its own threads off these cores since
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(
             f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
             "leave out one or the other"
         )
-    # Taichi starts no more threads than cores, and the flat schedule waits for all of them.
+    # Taichi starts at most one thread per core, and the flat schedule waits for all threads.
     count = len(bound) or min(threads or len(there), len(there))
     if _device is not None:
         if arch not in ("auto", _device.arch):
@@ -179,14 +178,14 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
-    """Start Taichi, bind its workers to these cores if there are any, and store the device."""
+    """Start Taichi, bind its workers to `cores` unless these are empty, and store the device."""
     global _device, _process, _checked_kernels, _first_field
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     options = {}
     if is_checked:
-        # The cache key ignores changed options. But without a cache, Taichi 1.7 confuses kernels that differ
-        # only in the instance of a real function that they call.
+        # The cache key ignores the options changed here. But without a cache, Taichi 1.7 confuses kernels
+        # that differ only in the instance of a real function that they call.
         options["offline_cache_file_path"] = _checked_kernels = tempfile.mkdtemp()
     else:
         await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
@@ -200,12 +199,12 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             debug=is_checked,
             offline_cache=True,
             offline_cache_max_size_of_files=1
-            << 29,  # a game with many kinds of worlds exceeds the default 100 MB
+            << 29,  # the default of 100 MB is too small for a game with many kinds of worlds
             enable_fallback=False,
             cfg_optimization=False,  # off: halves the compile time at the same speed
-            detect_read_only=False,  # off: a GPU might miss writes of a real function
+            detect_read_only=False,  # off: on a GPU, a kernel might not see writes of a real function
             make_cpu_multithreading_loop=False,  # off: it would put up to 512 bodies into one thread
-            unrolling_limit=0,  # no warning
+            unrolling_limit=0,  # turns off a warning
             log_level=ti.ERROR,
             **options,
         )
@@ -216,7 +215,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if has_known:
         FIRST_LAUNCHES.make_flag()
     _first_field = ti.field(ti.i32, ())
-    ti.lang.impl.get_runtime().materialize()  # the first kernel would do it in any thread
+    ti.lang.impl.get_runtime().materialize()  # otherwise the first kernel would do this, in any thread
     if has_known:
         keep_kernels_apart(VERSION)
         FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), code_options()))
@@ -228,12 +227,12 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
 
 
 def kernel_folder() -> Path:
-    """Folder that stores compiled kernels for later processes when this process ends."""
+    """Return the folder in which this process stores compiled kernels for later processes when it ends."""
     return folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)
 
 
 def _end() -> None:
-    """Let Taichi store its compiled kernels now, because its own shutdown has no fixed order."""
+    """Make Taichi store its compiled kernels now, because the order of its own shutdown is not fixed."""
     if os.getpid() == _process:
         with contextlib.suppress(Exception):  # a failure only makes later starts slower
             FIRST_LAUNCHES.close()
@@ -241,17 +240,18 @@ def _end() -> None:
         ti.reset()
         if _checked_kernels is not None:
             shutil.rmtree(_checked_kernels, ignore_errors=True)
-        with contextlib.suppress(OSError):  # the folder is not writable
+        with contextlib.suppress(OSError):  # raised if the folder is not writable
             FIRST_LAUNCHES.keep()
 
 
 def _bound(
     chosen: Device, started: set[int], since: int, cores: tuple[int, ...], is_left_to_us: bool
 ) -> Device:
-    """Bind Taichi's workers, which start after its compiler threads, to cores. Returns: the device.
+    """Bind Taichi's workers to cores, and return the device. The workers start after Taichi's compiler
+    threads.
 
     With the default cores, the workers stay unbound if the system refuses, or if other code has started
-    threads meanwhile, which must not be bound.
+    threads in the meantime, because those must not be bound.
     """
     if is_left_to_us and len(started) != ti.lang.impl.current_cfg().num_compile_threads + chosen.threads:
         return chosen
@@ -265,7 +265,9 @@ def _bound(
 
 
 def make_fields(function: Callable[[], Result]) -> Result:
-    """Call a function that makes Taichi fields exclusively, and lay them out. Ctrl-C waits until then."""
+    """Call a function that makes Taichi fields, and lay the fields out. Other threads wait, and so does
+    Ctrl-C.
+    """
 
     def make() -> Result:
         made = function()
@@ -278,11 +280,11 @@ def make_fields(function: Callable[[], Result]) -> Result:
 def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
     """Write kernels for programs without Python. This process cannot use Taichi after that.
 
-    They are compiled from source, because the short body of a known kernel must not be exported.
+    Kernels are compiled from source, because the short body of a known kernel must not be exported.
 
     Args:
-        kernels: by name, each with its template arguments, and an example of each array argument.
-        fields: first fields of all layouts that they are compiled for.
+        kernels: kernels by name, each with its template arguments and an example of each array argument.
+        fields: first field of each layout for which the kernels are compiled.
     """
 
     def write() -> None:
@@ -299,14 +301,15 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
 
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:
-    """Call a function in the thread that Taichi 1.7 requires for starting and for laying out fields. On a
-    CPU this is a dedicated thread, because the first caller's thread may end. On a GPU, and with index
-    checks, which would crash a dedicated thread, it is the caller's."""
+    """Call a function in the thread in which Taichi 1.7 must start and lay out fields.
+
+    On a CPU this is a dedicated thread, because the thread of the first caller may end. On a GPU, and with
+    index checks, which would crash a dedicated thread, it is the caller's thread."""
     return function() if arch != "cpu" or os.environ.get(DEBUG) == "1" else at_home(function)
 
 
 def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
-    """Lay out fields of other code, which Taichi does at the next kernel call."""
+    """Lay out fields of other code. Taichi calls this at the next kernel call."""
     if _device is not None and must_go_home():
         _at_home(functools.partial(lay_out, is_first_call), _device.arch)
     else:
@@ -322,12 +325,12 @@ FIRST_LAUNCHES.install()
 
 
 def _after_fork() -> None:
-    """Mark a forked process, which has Taichi's memory but none of its threads."""
+    """Mark a forked process. It has Taichi's memory but none of Taichi's threads."""
     if _device is None:
         leave_home()
         return
     leave_behind(_process)
-    # Otherwise the end of this process would wait for these threads.
+    # Otherwise this process would wait for these threads when it ends.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
 
 
@@ -336,12 +339,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def device() -> Device:
-    """The device in use. Raises: DeviceError before `init`."""
+    """Return the device in use. Raises: DeviceError before `init`."""
     if _device is None:
         raise DeviceError("Taichi is not started: call taichi_soft.init() first")
     return _device
 
 
 def is_initialized() -> bool:
-    """True once `init` has run in this process."""
+    """True after `init` has run in this process."""
     return _device is not None

@@ -1,6 +1,7 @@
 """Convert the parts of worlds to plain data (numbers, texts, lists and dictionaries) for files, and back.
 
-Reading makes only objects of `serialised` classes, with their checks. No code from a file is run.
+Reading makes only objects of `serialised` classes, and runs the checks of these classes. It never runs code
+from a file.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def serialised(*fields: str, make: Callable[..., Any] | None = None) -> Callable
 
     Args:
         fields: names of the attributes to store.
-        make: function that makes an object from them, called by keyword; None for the class itself.
+        make: function that makes an object, called with the attributes as keywords; None for the class
+            itself.
     """
 
     def register(kind: type[Kind]) -> type[Kind]:
@@ -66,7 +68,9 @@ def as_plain(value: Any) -> Any:
 
 
 def from_plain(data: Any) -> Any:
-    """Convert JSON data to a value. Raises: SnapshotError for unknown data; errors of the class's checks."""
+    """Convert JSON data to a value. Raises: SnapshotError for unknown data; errors of the checks of a
+    class.
+    """
     if isinstance(data, list):
         return [from_plain(each) for each in data]
     if not isinstance(data, dict):
@@ -96,7 +100,9 @@ def to_json(data: Any) -> bytes:
 
 
 def from_json(content: bytes | memoryview) -> Any:
-    """Decode JSON. Raises: SnapshotError, also for non-finite numbers, which `to_json` never writes."""
+    """Decode JSON. Raises: SnapshotError for invalid JSON and for non-finite numbers, which `to_json` never
+    writes.
+    """
     try:
         return json.loads(bytes(content), parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
@@ -114,28 +120,32 @@ def _finite(text: str) -> float:
 
 @lru_cache(maxsize=256)
 def plain_of(value: Any) -> Any:
-    """Cached `as_plain` of an immutable object."""
+    """Return the cached `as_plain` of an immutable object."""
     return as_plain(value)
 
 
 @lru_cache(maxsize=256)
 def digest_of(value: Any) -> str:
-    """Digest of an immutable object, equal only for objects with the same content."""
+    """Return a digest of an immutable object. It is equal only for objects with the same content."""
     return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()
 
 
-# Checks of possibly damaged data.
+# Checks of data that may be damaged.
 
 
 def below(number: Any, limit: int) -> int:
-    """Check an integer from 0 to below `limit`. Raises: ValueError, TypeError."""
+    """Check that a number is an integer from 0 to below `limit`, and return it. Raises: ValueError,
+    TypeError.
+    """
     if not 0 <= int(number) < limit:
         raise ValueError(f"it has the index {number} of {limit}")
     return int(number)
 
 
 def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float64]:
-    """Check `count` finite numbers, all below `most`. Raises: ValueError."""
+    """Check that there are `count` finite numbers with absolute values below `most`, and return them. Raises:
+    ValueError.
+    """
     vector = np.array(numbers, dtype=np.float64)
     if vector.shape != (count,) or not (np.abs(vector) < most).all():
         raise ValueError("a vector is invalid")
@@ -143,7 +153,7 @@ def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float6
 
 
 def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
-    """Check at least one integer from 0 to below `limit`. Raises: ValueError."""
+    """Check that there is at least one number, all integers from 0 to below `limit`. Raises: ValueError."""
     found = np.array(numbers, dtype=np.int32)
     if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
         raise ValueError("it has invalid vertices")

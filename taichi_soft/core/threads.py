@@ -1,4 +1,4 @@
-"""Mutual exclusion: concurrent calls of a world are refused, concurrent uses of Taichi wait."""
+"""Exclude concurrent calls. A concurrent call of a world is refused; a concurrent use of Taichi waits."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from taichi_soft.core.errors import StateError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _taichi = threading.RLock()
-_left_in: int | None = None  # parent process in which Taichi runs, if this one was forked from it
+_left_in: int | None = None  # parent process in which Taichi runs, if this process was forked from it
 
 
 def thread_name(ident: int) -> str:
-    """Name of a thread for messages."""
+    """Return the name of a thread for messages."""
     names = [each.name for each in threading.enumerate() if each.ident == ident]
     return f"thread {names[0]!r}" if names else "a thread that has ended"
 
@@ -29,13 +29,15 @@ class Turn:
     __slots__ = ("holder", "lock")
 
     def __init__(self) -> None:
-        """Start without a holder. Raises: StateError as `require_here`."""
+        """Start without a holder. Raises: StateError in a forked process, see `require_here`."""
         require_here()
         self.lock = threading.Lock()
         self.holder = 0  # id of the thread with access, 0 for none
 
     def refuse(self) -> NoReturn:
-        """Raise a StateError that names this thread and the one with access; or as `require_here`."""
+        """Raise a StateError that names this thread and the thread with access. In a forked process, see
+        `require_here`.
+        """
         require_here()
         here, there = thread_name(get_ident()), thread_name(self.holder)
         raise StateError(
@@ -45,7 +47,9 @@ class Turn:
 
 
 def one_thread(method: Function) -> Function:
-    """Decorate a method of a handle to refuse calls while another thread is in one. Calls can be nested."""
+    """Decorate a method of a handle to refuse calls while another thread runs such a method. Calls can be
+    nested.
+    """
 
     @wraps(method)
     def call(
@@ -67,7 +71,7 @@ def one_thread(method: Function) -> Function:
 
 
 def in_turn(function: Function) -> Function:
-    """Decorate a function that uses Taichi to wait until no other thread is in one.
+    """Decorate a function that uses Taichi to wait until no other thread runs such a function.
 
     Such a function must not call user code, to avoid deadlocks.
     """
@@ -83,7 +87,7 @@ def in_turn(function: Function) -> Function:
 
 
 def require_here() -> None:
-    """Raise a StateError in a process that was forked from one where Taichi runs."""
+    """Raise a StateError if this process was forked from a process in which Taichi runs."""
     if _left_in is not None:
         raise StateError(
             f"process {os.getpid()} was forked from process {_left_in} after Taichi had started there, and "

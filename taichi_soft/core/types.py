@@ -1,6 +1,6 @@
-"""Enums of the public interface. Each also accepts its string.
+"""Enums of the public interface. Functions that accept a member also accept its string.
 
-The `...Name` types let editors complete the strings and mypy reject misspelt ones.
+With the `...Name` types, editors complete the strings, and mypy rejects misspelt ones.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from taichi_soft.core.errors import OptionError
 
 
 class Choice(str, Enum):
-    """A named option. `parse` converts a user's string to a member, or refuses it with a list of names."""
+    """A named option. `parse` converts a user's string to a member, or raises an error with the valid
+    names.
+    """
 
     @classmethod
     def parse(cls: type[ChoiceT], value: str | ChoiceT) -> ChoiceT:
@@ -31,29 +33,29 @@ ChoiceT = TypeVar("ChoiceT", bound=Choice)
 
 
 class Strain(Choice):
-    """Strain of a tetrahedron from its deformation gradient F = U R."""
+    """Measure of the strain of a tetrahedron with the deformation gradient F = U R."""
 
     LINEAR = "linear"  # 1/2 (F F^T - I), thesis eq. 6.7
     EXACT = "exact"  # sqrt(F F^T) - I, thesis chapter 7
 
 
 class Flips(Choice):
-    """Treatment of inverted tetrahedra."""
+    """Treatment of inverted tetrahedra by a law."""
 
-    TOLERANT = "tolerant"  # the mirrored shape is at rest too (thesis)
-    RECOVER = "recover"  # driven back to its own orientation
+    TOLERANT = "tolerant"  # the mirrored shape counts as a rest shape too (thesis)
+    RECOVER = "recover"  # forces turn the tetrahedron back
     OFF = "off"  # not handled
 
 
 class DampingModel(Choice):
-    """Velocity that the damping constant acts on."""
+    """Velocity to which the damping constant applies."""
 
     EDGE = "edge"  # relative velocity along each edge, thesis eq. 3.9
-    TET_MEAN = "tet_mean"  # velocity against the tetrahedron's mean, rejected in thesis section 6.4
+    TET_MEAN = "tet_mean"  # velocity relative to the tetrahedron's mean, rejected in thesis section 6.4
 
 
 class Integrator(Choice):
-    """Time integrator (thesis section 3.5)."""
+    """Integrator of the equations of motion (thesis section 3.5)."""
 
     EXPLICIT_EULER = "explicit_euler"
     LEAPFROG = "leapfrog"
@@ -65,15 +67,15 @@ class Schedule(Choice):
     """Loop structure of a world's substeps."""
 
     AUTO = "auto"
-    PER_BODY = "per_body"  # one thread per body, which makes all its substeps
+    PER_BODY = "per_body"  # one thread per body, which runs all substeps of that body
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
 
 
 class Overlap(Choice):
     """Treatment of a body that is placed inside others."""
 
-    PART = "part"  # move them apart over the next steps
-    REFUSE = "refuse"  # refuse to place it
+    PART = "part"  # move the bodies apart over the next steps
+    REFUSE = "refuse"  # raise an error
 
 
 StrainName: TypeAlias = Strain | Literal["linear", "exact"]

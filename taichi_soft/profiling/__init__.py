@@ -1,4 +1,4 @@
-"""Measure the cost of a frame."""
+"""Measure the time of a frame."""
 
 from taichi_soft.profiling.baseline import compile_baseline, find_compiler
 from taichi_soft.profiling.budget import measure_budget

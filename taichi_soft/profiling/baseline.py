@@ -1,4 +1,6 @@
-"""The C++ reference: compiled on this machine, on the same arrays in the same order as the Taichi kernels."""
+"""Run the C++ reference, compiled on this machine, on the same arrays in the same order as the Taichi
+kernels.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +24,11 @@ RELAXED = (
     *("-fno-math-errno", "-fno-signed-zeros", "-fno-trapping-math", "-fassociative-math"),
     *("-freciprocal-math", "-ffinite-math-only"),
 )
-"""The flags that -ffast-math implies. With -ffast-math itself, GCC also turns on flush-to-zero in the thread
-that loads the library, and scipy's trees then crash the process."""
+"""The flags that -ffast-math implies. They are listed because with -ffast-math itself, GCC also turns on
+flush-to-zero in the thread that loads the library, and scipy's trees then crash the process."""
 
 FLAGS = ("-O3", "-march=native", *RELAXED, "-shared", "-fPIC", "-std=c++17")
-"""The options with which Taichi compiles its kernels: for this processor, with relaxed rounding."""
+"""Options like those with which Taichi compiles its kernels: for this processor, with relaxed rounding."""
 
 NO_FLOOR = -1.0e9
 
@@ -40,11 +42,13 @@ def find_compiler() -> str | None:
 
 
 def compile_baseline() -> ctypes.CDLL:
-    """Compile and load the reference. Raises: DeviceError without a C++ compiler or if it fails."""
+    """Compile and load the reference. Raises: DeviceError without a C++ compiler, or if the compilation
+    fails.
+    """
     compiler = find_compiler()
     if compiler is None:
         raise DeviceError("no C++ compiler found: install g++ or clang++, or name one in CXX")
-    # A loaded library no longer needs its file, but Windows keeps it locked.
+    # A loaded library no longer needs its file, but Windows locks the file.
     with tempfile.TemporaryDirectory(prefix="taichi-soft-", ignore_cleanup_errors=True) as folder:
         library = Path(folder) / "baseline.so"
         command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
@@ -56,10 +60,12 @@ def compile_baseline() -> ctypes.CDLL:
 
 
 class Baseline:
-    """One body in plain C++."""
+    """A body that the C++ reference steps."""
 
     def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
-        """Copy the arrays of `body` in kernel order: virial law, springs or volume springs."""
+        """Copy the arrays of `body`, in the order of the kernels. The law is virial, springs or volume
+        springs.
+        """
         self._run = library.run_substeps if body.bonds is None else library.run_spring_substeps
         self._run.restype = None
         self.positions = body.rest_position.astype(np.float32)
@@ -72,14 +78,14 @@ class Baseline:
             (1.0 / body.mass).astype(np.float32),
             *elements,
         ]
-        # Plain springs use no tetrahedra.
+        # Springs without volume use no tetrahedra.
         looks_at_tets = body.bonds is None or body.bonds.expansion_modulus is not None
         tets = len(body.tet_vertices) if looks_at_tets else 0
         self._counts = [ctypes.c_int(n) for n in (len(body.mass), tets, len(body.edge_vertices))]
 
     @with_usual_floats
     def step(self, substeps: int, h: float) -> None:
-        """Make `substeps` substeps of `h` [s], in free fall."""
+        """Run `substeps` substeps of `h` [s] in free fall."""
         pointers = [rows.ctypes.data_as(ctypes.c_void_p) for rows in self._arrays]
         numbers = [ctypes.c_float(x) for x in (h, -GRAVITY_EARTH, NO_FLOOR)]
         self._run(*self._counts, *pointers, *numbers, ctypes.c_int(substeps))

@@ -1,4 +1,4 @@
-"""Estimate how many bodies fit a frame."""
+"""Estimate the number of bodies for which a frame has time."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ FRAME_RATES = (60, 120)  # [Hz]
 
 @dataclass(frozen=True)
 class Budget:
-    """Number of spheres that can be stepped and read within a frame, at its 99th percentile."""
+    """Number of spheres for which the 99th percentile of stepping and reading fits a frame."""
 
-    rate: int  # [Hz]
+    rate: int  # frames per second [Hz]
     substeps: int
     bodies: int
     tets: int
-    measured: Phases  # measurement that this is scaled from
+    measured: Phases  # measurement from which this is scaled
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each rate and scale to a full frame, including the fixed cost of a frame.
+    """Measure `count` spheres at each frame rate, and scale the result to a full frame with its fixed cost.
 
-    The material limits the substep, so a frame of half the length needs half as many substeps.
+    The material determines the substep, so a frame of half the length needs half as many substeps.
     """
     found = []
     for rate in FRAME_RATES:

@@ -1,4 +1,4 @@
-"""Compare the time per element and substep with plain C++, in turns within one run."""
+"""Compare the time per element and substep with plain C++, alternating within one run."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
-"""Cells of a box by approximate number of tetrahedra. Largest first, because the others reuse its kernels."""
+"""Number of cells of a box, by approximate number of tetrahedra. The largest is first, because the others
+reuse its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
-SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
-PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
+SUBSTEP = 1.0e-5  # [s], far below every stable step: the bodies only fall
+PUSHED_APART = 0.02  # initial stretch of the body, so that elastic forces act
 
 
 NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")
@@ -32,15 +33,15 @@ NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")
 
 @dataclass(frozen=True)
 class Comparison:
-    """One body on one thread, in Taichi and in C++."""
+    """Times of one body on one thread, in Taichi and in C++."""
 
     law: LawName
     element: str  # "tetrahedron" or "edge"
     tets: int
-    taichi: Spread  # [ns per element and substep], Python included
+    taichi: Spread  # [ns per element and substep], including Python
     native: Spread
-    ratio: Spread  # Taichi over C++, pair by pair
-    deviation: float  # largest difference in position after the same steps, over the body's size
+    ratio: Spread  # time in Taichi over time in C++, pair by pair
+    deviation: float  # largest difference of positions after the same steps, over the size of the body
 
 
 def compare_with_baseline(
@@ -49,7 +50,7 @@ def compare_with_baseline(
     sizes: dict[int, tuple[int, int, int]] = SIZES,
     laws: tuple[LawName, ...] = NATIVE_LAWS,
 ) -> list[Comparison]:
-    """Measure every law and size against the library that `compile_baseline` made."""
+    """Measure every law and size against `library`, the result of `compile_baseline`."""
     return [_compare(library, repeats, cells, law) for law in laws for cells in sizes.values()]
 
 

@@ -1,4 +1,4 @@
-"""Find the body size from which several threads should share one body."""
+"""Find the size of a body from which several threads should compute it together."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ SUBSTEPS = 20
 
 @dataclass(frozen=True)
 class Crossover:
-    """One body under both schedules [ns per tetrahedron and substep]."""
+    """Time of one body under both schedules [ns per tetrahedron and substep]."""
 
     tets: int
     flat: Spread
     per_body: Spread
-    ratio: Spread  # flat over per_body, pair by pair
+    ratio: Spread  # time of flat over time of per_body, pair by pair
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:
-    """Time bodies of increasing size under both schedules, in turns."""
+    """Time bodies of increasing size under both schedules, alternating."""
     found = []
     for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))

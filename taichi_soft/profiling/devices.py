@@ -1,4 +1,6 @@
-"""Find the number of tetrahedra from which a GPU is faster than the CPU's threads, one process per device."""
+"""Find the number of tetrahedra from which a GPU is faster than the CPU's threads, with one process per
+device.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from taichi_soft.profiling.spread import Spread, time_calls
 
 SUBSTEPS = 8
 SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
-"""Bodies, and cells along each side of a box; 0 is a sphere of 1,280 tetrahedra. The bodies do not touch."""
+"""Number of bodies, and of cells along each side of a box; 0 is a sphere of 1,280 tetrahedra. The bodies do
+not touch."""
 
 STEPS_PER_TURN = 3
 
@@ -33,24 +36,24 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class DeviceGain:
-    """Time of a frame of 8 substeps and reading all positions [ms], on the CPU and on a GPU."""
+    """Time of a frame on the CPU and on a GPU [ms]. A frame has 8 substeps and reads all positions."""
 
     bodies: int
     tets: int
     cpu: Spread
     gpu: Spread
-    gain: Spread  # the CPU's time over the GPU's, pair by pair
+    gain: Spread  # time of the CPU over time of the GPU, pair by pair
 
 
 class Frames:
-    """Times frames of several scenes in this process."""
+    """Times the frames of several scenes in this process."""
 
     def __init__(self) -> None:
         self._scene: tuple[int, int] | None = None
         self._frame: Callable[[], None] = lambda: None
 
     def time(self, bodies: int, cells: int) -> float:
-        """Median time of a few frames [s]."""
+        """Return the median time of a few frames [s]."""
         if self._scene != (bodies, cells):
             self._scene, self._frame = (bodies, cells), _make_frame(bodies, cells)
         return Spread.of(time_calls(self._frame, STEPS_PER_TURN)).median
@@ -76,11 +79,11 @@ def measure_devices(
     repeats: int,
     scenes: tuple[tuple[int, int], ...] = SCENES,
 ) -> list[DeviceGain]:
-    """Time the CPU's `threads` and a GPU, in turns.
+    """Time the CPU's `threads` and a GPU, alternating.
 
     Args:
         gpu: "cuda", "vulkan" or "metal".
-        cores: cores to bind the threads to; may be empty.
+        cores: cores to which the threads are bound; empty for none.
     Raises: DeviceError if a process fails, for example without such a GPU.
     """
     with _start("cpu", threads, cores) as one, _start(gpu, None, None) as other:

@@ -1,4 +1,6 @@
-"""Measure the cost of a game's features: unused, used, and in a heap, in turns with bodies without them."""
+"""Measure the cost of a game's features: unused, used, and in a heap. Each measurement alternates with bodies
+without the feature.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +26,20 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
-DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as in the thesis for its sphere
+DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as for the sphere of the thesis
 COUNT = 16
-SPACING = 3.0  # between spheres of radius 1 [m]
+SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
 SETTLING = 180
-"""Frames until a heap has settled or bodies on the floor sleep."""
+"""Number of frames until a heap has settled, or bodies on the floor sleep."""
 
 UNUSED_FACTOR = 25
-"""Factor on the pairs of steps for unused features: only the median of about 300 separates 1.01 from 1.03."""
+"""Factor on the number of pairs of steps for unused features, because only the median of about 300 pairs
+separates 1.01 from 1.03."""
 
 
 @dataclass(frozen=True)
 class FeatureCost:
-    """A fixed step with a feature over the same step without it, pair by pair."""
+    """Time of a fixed step with a feature over the time of the same step without it, pair by pair."""
 
     name: str
     is_used: bool
@@ -45,23 +48,23 @@ class FeatureCost:
 
 @dataclass(frozen=True)
 class Heap:
-    """A fixed step of a heap of spheres on all threads."""
+    """Time of a fixed step of a heap of spheres on all threads."""
 
     mesh: str
     bodies: int
     tets: int
     threads: int
     step: Spread  # [ms], consecutive steps
-    real_time: float  # median of simulated time over step time
-    ratio: Spread  # over a step of as many free bodies, pair by pair
-    stolen: float | None  # fraction of CPU time that the host gave to other machines
+    real_time: float  # simulated time over step time, median
+    ratio: Spread  # step time over the step time of the same number of free bodies, pair by pair
+    stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Cost of something that does not happen in every step."""
+    """Cost of an action that does not happen in every step."""
 
-    name: str  # including the unit
+    name: str  # name with the unit
     cost: Spread
 
 
@@ -76,7 +79,7 @@ def _spheres(
     damping_ratio: float = 0.0,
     **options: Any,
 ) -> World:
-    """Make spheres side by side, with centres at `height` [m]."""
+    """Make spheres in a row, with centres at `height` [m]."""
     world = bare_world(**options)
     material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
@@ -92,8 +95,8 @@ def _stepping(world: World) -> Callable[[], object]:
 
 
 def measure_features(repeats: int = 41) -> list[FeatureCost]:
-    """Measure every feature."""
-    high = 1.0e5  # [m]: they stay far from everything while they fall
+    """Measure the cost of every feature."""
+    high = 1.0e5  # [m], so that the bodies touch nothing while they fall
     free = _stepping(_spheres(high, floor=None))
     found = []
 
@@ -157,7 +160,9 @@ def _settled(world: World, frames: int = SETTLING) -> World:
 
 
 def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
-    """Measure heaps of our sphere, and of the thesis's sphere if the package's sources are available."""
+    """Measure heaps of the package's sphere, and of the thesis's sphere if the source checkout is
+    available.
+    """
     meshes = {"regular": _mesh()}
     if (ASSETS / "sphere.npz").exists():
         meshes = {"thesis": load_mesh(ASSETS / "sphere.npz"), **meshes}
@@ -165,8 +170,10 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 
 
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
-    """Drop 32 spheres into a pit and time them at rest: first alone, as in a game with one world, and then in
-    turns with as many free spheres, which evict them from the CPU's caches."""
+    """Drop 32 spheres into a pit and time their steps at rest.
+
+    The steps are timed first alone, as in a game with one world, and then alternating with the same number of
+    free spheres, which evict the heap from the CPU's caches."""
     world = bare_world(collider_room=8, soft_contact=True)
     free = bare_world(floor=None)
     for side in (-1, 1):

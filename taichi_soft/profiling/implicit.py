@@ -1,4 +1,6 @@
-"""Measure the gain of implicit Euler: over leapfrog for CMPM (thesis 4.2) and a stiff bar, and over scipy."""
+"""Measure the speed-up of implicit Euler over leapfrog for CMPM (thesis 4.2) and a stiff bar, and over
+scipy.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,11 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 GROWTH = 100
-"""Growth of the step in the thesis: from about 1e-4 s to 1e-2 s."""
+"""Ratio of the steps in the thesis: 1e-2 s over about 1e-4 s."""
 
 CMPM_MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""Leapfrog needs steps of about 1e-4 s for this stiffness. Undamped, this law gains energy at any step."""
+"""Leapfrog needs steps of about 1e-4 s for this stiffness. Without damping, this law gains energy at any
+step."""
 
 BAR_CELLS = (20, 10, 5)  # 5,000 tetrahedra
 BAR_MATERIAL = Material(young=1.0e6, poisson=0.3, density=1000.0, damping=20.0, damping_ratio=0.0)
@@ -28,20 +31,20 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ImplicitGain:
-    """Time to simulate one second with two methods, in turns."""
+    """Time to simulate one second with each of two methods, alternating."""
 
     name: str
-    step: float  # of implicit Euler [s]
-    other_step: float  # of the other method [s]
+    step: float  # step of implicit Euler [s]
+    other_step: float  # step of the other method [s]
     implicit: Spread  # [ms per simulated second]
     other: Spread
-    gain: Spread  # other over implicit, pair by pair
-    deviation: float | None  # of positions over the body's size; None if the systems differ
-    is_sound: bool  # True if the body stayed valid
+    gain: Spread  # time of the other method over that of implicit Euler, pair by pair
+    deviation: float | None  # of positions, over the body's size; None if the systems differ
+    is_sound: bool  # True if the body was valid at the end
 
 
 def measure_implicit(repeats: int = 5) -> list[ImplicitGain]:
-    """Measure all three. Raises: OptionError without scipy."""
+    """Measure the speed-up over all three. Raises: OptionError without scipy."""
     few = max(3, repeats // 2)
     return [_cmpm_against_leapfrog(repeats), _bar_against_leapfrog(few), _bar_against_scipy(few)]
 
@@ -57,7 +60,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
     limit = worlds["leapfrog"].bodies[0].stable_step.limit
     substeps = int(1.0 / worlds["leapfrog"].bodies[0].stable_step.recommended)
     steps = max(1, int(1.0 / (GROWTH * limit)))
-    share = 0.1  # of a second for each measurement
+    share = 0.1  # simulated time of each measurement [s]
     explicit = partial(worlds["leapfrog"].step, share, max(1, int(share * substeps)))
     implicit = partial(worlds["implicit_euler"].step, share, max(1, int(share * steps)))
     one, other, ratio = compare(explicit, implicit, repeats, 1e3 / share)
@@ -76,7 +79,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
 
 
 def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
-    """Measure the bar, with gradients of tetrahedra, which the thesis does not use (section 6.5)."""
+    """Measure the bar with gradients of tetrahedra, which the thesis does not use (section 6.5)."""
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}
@@ -108,7 +111,7 @@ def _bar_against_scipy(repeats: int) -> ImplicitGain:
     world.build()
     native = SparseBody(mesh, BAR_MATERIAL)
     bent = mesh.vertices.copy()
-    bent[:, 2] += 0.1 * np.sin(2.0 * bent[:, 0])  # gives the solver a nonzero right-hand side
+    bent[:, 2] += 0.1 * np.sin(2.0 * bent[:, 0])  # makes the right-hand side of the solver nonzero
     body.set_motion(bent, np.zeros_like(bent))
     native.positions[:] = bent
     ours, theirs = partial(world.step, FRAME), partial(native.step, FRAME, TOLERANCE)

@@ -1,4 +1,4 @@
-"""Measure whether a time budget is kept by bodies that take twice as long without it."""
+"""Measure whether bodies that take twice the time budget are reduced until they keep it."""
 
 from __future__ import annotations
 
@@ -23,53 +23,54 @@ from taichi_soft.world.world import World
 DT = 1 / 60
 CELLS = (10, 7, 5)
 ROWS = 5
-"""Rows of bodies."""
+"""Number of rows of bodies."""
 
 SPACING = 1.6
-"""Distance between bodies of at most 1 m [m]; they do not touch, see docs/speed.md."""
+"""Distance between bodies of at most 1 m [m]. They do not touch, see docs/speed.md."""
 
 SETTLING = 60
-"""Frames until the bodies have landed."""
+"""Number of frames until the bodies have landed."""
 
 SHARE = 0.5
-"""Budget as a fraction of the median step without a budget."""
+"""Budget over the median step without a budget."""
 
 EYE = (-8.0, 0.0, 2.0)  # [m]
 
 IN_TURN = 10
-"""A budget counts as met when the first and the median of this many steps fit it."""
+"""A budget counts as met if the first and the median of this many steps fit it."""
 
 
 @dataclass(frozen=True)
 class KeptBudget:
-    """Steps of the same bodies, without a budget or with one."""
+    """Times of the same bodies, without a budget or with one."""
 
-    budget: float  # [ms]; also the reference for the run without a budget
+    budget: float  # budget [ms]; in a run without one, only for comparison
     is_kept: bool  # True if the run had a budget
-    is_fixed: bool  # True if the levels were fixed to those at the end of a run with a budget
-    step: Spread  # [ms]: `World.step`
-    work: Spread  # [ms]: CPU time of a step, without waiting for other programs
-    settled: Spread  # [ms]: steps after the budget was met, or all steps
-    frame: Spread  # [ms]: `EngineAdapter.step`, including decisions and changes of level
+    is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
+    step: Spread  # time of `World.step` [ms]
+    work: Spread  # CPU time of a step [ms], without waiting for other programs
+    settled: Spread  # time of the steps after the budget was met, or of all steps [ms]
+    frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
-    late_settled: float  # the same after the budget was met, or of all steps
+    late_settled: float  # fraction of longer steps after the budget was met, or of all steps
     met_after: int | None  # steps until the budget was met; None if it was never met
-    deciding: Spread | None  # [ms]: `frame` minus `step`, in frames without a change of level
-    changing: Spread | None  # [ms]: `frame` minus `step`, in frames with one; None without such frames
+    deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
+    changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any
     frames_with_changes: int
-    skipped: float  # fraction of skipped steps over all bodies
-    levels: dict[int, int]  # number of bodies by level at the end
+    skipped: float  # skipped steps over all steps of all bodies
+    levels: dict[int, int]  # number of bodies by final level
     levels_in_order: tuple[int, ...]  # level of each body
-    tets: int  # at the end
+    tets: int  # number of tetrahedra at the end
     frozen: int  # bodies that became non-finite
-    stolen: float | None  # fraction of CPU time that the host gave to other machines
+    stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 
 def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
-    """Measure bodies without a budget, and with a budget of half their median step. Then measure them without
-    a budget at the final levels: longer steps in that run are noise of the machine.
+    """Measure bodies without a budget, with a budget of half their median step, and at the final levels of
+    that run.
 
-    The runs are consecutive, because a game has one world. Sleep is off, so that there is work to reduce.
+    The third run has no budget: longer steps in it are caused by other programs on the machine. The runs are
+    consecutive, because a game has one world. Sleep is off, so that there is work to reduce.
     """
     kinds = _kinds()
     levels = (0,) * ROWS**2
@@ -90,7 +91,7 @@ def _kinds() -> list[SoftBodyAsset]:
 
 
 def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
-    """Drop bodies side by side onto the floor, and then set them to `levels`."""
+    """Drop bodies onto the floor, apart from each other, and then set them to `levels`."""
     world = _TimedWorld(soft_contact=True, sleep_speed=0.0, collider_room=0)
     for kind in kinds:
         world.reserve(kind, -(-(ROWS**2) // len(kinds)))
@@ -108,31 +109,31 @@ def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
 
 
 class _TimedWorld(World):
-    """World that records the time of each step."""
+    """A world that records the time of each step."""
 
     def __init__(self, **options: Any) -> None:
-        """See World."""
+        """Make a world with the options of `World`."""
         super().__init__(**options)
-        self.took: list[float] = []  # [ms]
-        self.work: list[float] = []  # [ms]: CPU time
+        self.took: list[float] = []  # step times [ms]
+        self.work: list[float] = []  # CPU times [ms]
         self.skipped = 0
 
     def step(self, dt: float, substeps: int | None = None) -> None:
-        """See World."""
+        """Make a step, see `World.step`, and record its time."""
         start, work = perf_counter(), process_time()
         super().step(dt, substeps)
         self.took.append(1e3 * (perf_counter() - start))
         self.work.append(1e3 * (process_time() - work))
 
     def skip_step(self, bodies: Sequence[Body]) -> None:
-        """See World."""
+        """Skip the next step of bodies, see `World.skip_step`."""
         self.skipped += len(bodies)
         super().skip_step(bodies)
 
 
 @dataclass
 class Course:
-    """Times and levels of a run, step by step."""
+    """Times and levels of a run, for each step."""
 
     steps: list[float]  # step times [ms]
     frames: list[float]  # frame times [ms]
@@ -140,7 +141,7 @@ class Course:
 
 
 def first_met(steps: list[float], limit: float) -> int | None:
-    """Number of steps before the budget is met, see `IN_TURN`; None if it is never met."""
+    """Return the number of steps before the budget is met, see `IN_TURN`; None if it is never met."""
     for i in range(len(steps) - IN_TURN + 1):
         if steps[i] <= limit and np.median(steps[i : i + IN_TURN]) <= limit:
             return i
@@ -150,7 +151,7 @@ def first_met(steps: list[float], limit: float) -> int | None:
 def tell(course: Course, limit: float, **facts: Any) -> KeptBudget:
     """Summarise the steps and frames of a run.
 
-    Args: limit: the budget [ms]. facts: remaining fields of the KeptBudget.
+    Args: limit: budget [ms]. facts: remaining fields of the KeptBudget.
     """
     rest = [frame - step for frame, step in zip(course.frames, course.steps, strict=True)]
     changed = [one != other for one, other in pairwise(course.levels)]

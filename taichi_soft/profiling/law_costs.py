@@ -1,4 +1,4 @@
-"""Measure the cost of each force law, in turns with the thesis's virial law."""
+"""Measure the cost of each force law, alternating with the thesis's virial law."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ TETS, EDGES = len(MESH.tets), len(MESH.edges)
 MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 WOODEN = AnisotropicMaterial(Stiffness.isotropic(1.0e5, 0.3), density=1000.0, damping=0.1)
 SUBSTEPS = 40
-SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
+SUBSTEP = 1.0e-5  # [s], far below every stable step: the bodies only fall
 
 
 @dataclass(frozen=True)
 class LawCost:
-    """Cost of a law with one strain (None if it has no choice) and one kind of material."""
+    """Cost of a law with one strain and one kind of material. `strain` is None if the law has no choice."""
 
     law: LawName
     strain: StrainName | None
     is_anisotropic: bool
     element: str  # "tetrahedron" or "edge"
-    cost: Spread  # whole substep, including edge damping [ns per element]
-    ratio: Spread  # cost over that of "virial" with the linear strain, from runs in turns
+    cost: Spread  # time of a substep, including edge damping [ns per element]
+    ratio: Spread  # cost over the cost of "virial" with the linear strain, in alternating runs
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
-    """List each law with each strain (None if it has no choice), and once with anisotropic material."""
+    """Return each law with each strain (None if it has no choice), and once with anisotropic material."""
     found: list[tuple[Law, StrainName | None, bool]] = []
     for law in laws:
         strains: list[StrainName | None] = [strain.value for strain in law.strains] or [None]
@@ -44,7 +44,9 @@ def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
 
 
 def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
-    """Measure every kind of these laws, on one body and thus one thread. Raises: OptionError."""
+    """Measure the given laws with every strain and material, on one body and thus one thread. Raises:
+    OptionError.
+    """
     laws = [element_model(name).law for name in names]
     usual = _falling("virial", None, MATERIAL)
     found = []

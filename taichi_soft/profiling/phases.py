@@ -1,4 +1,4 @@
-"""Break down the time of a frame: by phase, and the overhead of Python."""
+"""Break down the time of a frame into phases and the overhead of Python."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
-SPACING = 3.0  # of spheres of radius 1 [m]
-TINY_H = 1.0e-6  # [s], so that separately run phases move nothing
+SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
+TINY_H = 1.0e-6  # substep so short that phases that run separately move nothing [s]
 
 
 @dataclass(frozen=True)
 class Phases:
-    """One fixed step of equal bodies."""
+    """Times of one fixed step of equal bodies."""
 
     bodies: int
     tets: int
     substeps: int
-    phases: dict[str, Spread]  # on one thread, all substeps of the step [ms]
-    frame: Spread  # advance and read all positions, on all threads [ms]
-    read: Spread  # part of `frame`: reading all positions [ms]
-    python: Spread  # advance and read a single tetrahedron: the overhead of a frame [ms]
+    phases: dict[str, Spread]  # times on one thread, summed over the substeps [ms]
+    frame: Spread  # time to advance and read all positions, on all threads [ms]
+    read: Spread  # time to read all positions, a part of `frame` [ms]
+    python: Spread  # time to advance and read a single tetrahedron: the overhead [ms]
 
 
 def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = None) -> World:
-    """Build a world of equal bodies in free fall, by default spheres of 1,280 tetrahedra."""
+    """Build a world of equal bodies in free fall; by default, spheres of 1,280 tetrahedra."""
     mesh = mesh or sphere(radius=1.0, resolution=4)
     world = bare_world(schedule=schedule)
     side = int(np.ceil(np.sqrt(count)))
@@ -48,7 +48,7 @@ def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = 
 
 
 def measure_phases(count: int = 16, dt: float = 1 / 60, repeats: int = 121) -> Phases:
-    """Measure `count` spheres at a fixed step of `dt` [s]."""
+    """Measure a world of `count` spheres with a fixed step of `dt` [s]."""
     world = spheres(count)
     substeps = world.stable_substeps(dt)
     adapter = EngineAdapter(world, FixedStep(dt=dt, substeps=substeps))

@@ -1,4 +1,4 @@
-"""Measure in separate Python processes, because Taichi's device and threads are fixed per process."""
+"""Measure in separate Python processes, because the device and threads of Taichi are fixed for a process."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Process:
         """Start the process.
 
         Args:
-            program: source code, which reads lines and prints a time [s] for each.
-            name: name for error messages.
+            program: source code that reads lines and prints a time [s] for each.
+            name: name of the process for error messages.
             advice: advice for error messages.
         """
         self._failure = f"{name} failed: {advice}"
@@ -38,7 +38,9 @@ class Process:
         self._process.communicate()
 
     def ask(self, line: str) -> float:
-        """Send a line and return the answer. Raises: DeviceError if the process has failed."""
+        """Send a line and return the time that the process answers [s]. Raises: DeviceError if the process
+        has failed.
+        """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         try:
@@ -50,9 +52,9 @@ class Process:
 
 
 def compare_processes(one: Process, other: Process, line: str, repeats: int) -> tuple[Spread, Spread, Spread]:
-    """Ask two processes in turns, after a warm-up. A temporary slowdown of the machine affects both.
+    """Ask two processes alternately, after a warm-up. A temporary slowdown of the machine affects both.
 
-    Returns: the times of each [ms], and `one` over `other`, pair by pair.
+    Returns: times of each process [ms], and times of `one` over those of `other`, pair by pair.
     """
     pairs = [(one.ask(line), other.ask(line)) for _ in range(WARM_TURNS + repeats)][WARM_TURNS:]
     ones, others = ([pair[i] for pair in pairs] for i in (0, 1))

@@ -18,7 +18,9 @@ from taichi_soft.profiling.spread import Spread
 
 
 def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """Yield title and table of each measurement in `found`, by the keys of `taichi-soft profile --json`."""
+    """Yield title and table of each measurement in `found`. Its keys are those of `taichi-soft profile
+    --json`.
+    """
     if "budget" in found:
         measured = found["budget"][0].measured
         size = f"{measured.bodies} spheres, {measured.tets:,} tetrahedra"
@@ -87,7 +89,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
 
 
 def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
-    """Rows of all laws: parameters, energy conservation, source and cost."""
+    """Return a row for each law: parameters, energy conservation, source and cost."""
     rows = []
     for each in costs:
         law = LAWS[each.law]
@@ -108,7 +110,7 @@ def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
 
 
 def law_table(costs: list[LawCost]) -> Table:
-    """Table of `law_rows` with median costs."""
+    """Make a table of `law_rows`, with median costs."""
     table = Table()
     for name in ("law", "source", "parameters", "strain", "flips", "energy", "element", "ns"):
         table.add_column(name, no_wrap=name == "law")
@@ -162,7 +164,9 @@ def _budget_table(budgets: list[Budget]) -> Table:
 
 
 def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
-    """Columns: the run without a budget, with a budget, and with its final levels."""
+    """Yield the tables of a budget. Columns: runs without a budget, with a budget, and at the final
+    levels.
+    """
     names = ("with a budget" if run.is_kept else "its levels" if run.is_fixed else "without" for run in runs)
     table = _table("", *names)
     for name, attribute in (

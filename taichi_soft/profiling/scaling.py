@@ -1,4 +1,4 @@
-"""Measure the speed-up of many bodies on several threads. Taichi's thread count is fixed per process."""
+"""Measure the speed-up of many bodies by several threads, in separate processes with fixed thread counts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from taichi_soft.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
-"""Substeps per step: the number that this body needs at 60 Hz, and the thesis's 700 per second at 50 Hz."""
+"""Substeps per step: the number that this body needs at 60 Hz, and the thesis's number, 700 per second at
+50 Hz."""
 
 STEPS_PER_TURN = 5
 
@@ -28,20 +29,20 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Scaling:
-    """One step of 64 spheres [ms], on one thread and on several."""
+    """Time of a step of 64 spheres, on one thread and on several [ms]."""
 
     substeps: int
     threads: int
     single: Spread
     parallel: Spread
-    speedup: Spread  # pair by pair
+    speedup: Spread  # time on one thread over time on several, pair by pair
 
 
 def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
-    """Time one thread and `threads`, in turns.
+    """Time one thread and `threads` threads, alternating.
 
     Args:
-        cores: cores to bind the threads to; may be empty.
+        cores: cores to which the threads are bound; empty for none.
     Raises: DeviceError if a process fails.
     """
     with _start(1) as single, _start(threads, cores) as parallel:

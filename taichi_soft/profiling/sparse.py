@@ -1,7 +1,7 @@
-"""The same implicit steps with scipy: sparse assembly of all tetrahedra, and conjugate gradients.
+"""Implicit Euler with scipy, for comparison: sparse assembly of all tetrahedra, and conjugate gradients.
 
-Only for the virial law with the linear strain, normal or inverted, in free fall. Written in numpy from the
-equations in `laws.force_gradients` and `kernels.rigid_rotation`, independently of the kernels.
+This supports only the virial law with the linear strain, normal or inverted, in free fall. It is written in
+numpy from the equations in `laws.force_gradients` and `kernels.rigid_rotation`, independently of the kernels.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def require_scipy() -> Any:
-    """scipy.sparse. Raises: MissingExtraError."""
+    """Return scipy.sparse. Raises: MissingExtraError if scipy is not installed."""
     require_extra("voronoi", "this comparison needs")
     import scipy.sparse.linalg
 
@@ -31,7 +31,7 @@ def require_scipy() -> Any:
 
 
 class SparseBody:
-    """One body in scipy's matrices, in float64."""
+    """One body as matrices of scipy, in float64."""
 
     def __init__(self, mesh: TetMesh, material: Material) -> None:
         self._sparse = require_scipy()
@@ -78,7 +78,9 @@ class SparseBody:
         self.positions += h * self.velocities
 
     def _rotation_splits(self, h: float) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-        """Products with P = 1 - W J W^T M and with P^T, see `kernels.rigid_rotation`."""
+        """Return functions for the products with P = 1 - W J W^T M and with P^T, see
+        `kernels.rigid_rotation`.
+        """
         mass, total = np.repeat(self._masses, 3), self._masses.sum()
         arms = self.positions - self._masses @ self.positions / total
         W = np.stack([np.cross(axis, arms).ravel() for axis in np.eye(3)], axis=1)
@@ -92,7 +94,7 @@ class SparseBody:
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._inverse)
 
     def _forces(self) -> Floats:
-        """P = sigma cof F, negated for inverted tetrahedra; f_i = -V0 P g_i."""
+        """Return the forces f_i = -V0 P g_i, with P = sigma cof F, negated for inverted tetrahedra."""
         F = self._deformations()
         strain = 0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3))
         lame_lambda, lame_mu = (value[:, None, None] for value in self._lame)
@@ -106,7 +108,7 @@ class SparseBody:
         return np.asarray(total)
 
     def element_stiffness(self) -> Floats:
-        """Projected stiffness matrix of every tetrahedron, (m, 12, 12) [N/m]."""
+        """Return the projected stiffness matrix of every tetrahedron, (m, 12, 12) [N/m]."""
         U, s, Vt = np.linalg.svd(self._deformations())
         for turned in (np.linalg.det(U) < 0, np.linalg.det(Vt) < 0):
             s[turned, 2] *= -1

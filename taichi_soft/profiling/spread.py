@@ -20,19 +20,19 @@ class Spread:
 
     @classmethod
     def of(cls, values: list[float]) -> Spread:
-        """Summarise at least one value."""
+        """Summarise `values`, which must not be empty."""
         rows = np.asarray(values)
         return cls(
             float(rows.min()), float(np.median(rows)), float(np.percentile(rows, 99)), float(rows.max())
         )
 
     def scaled(self, factor: float) -> Spread:
-        """Convert to another unit."""
+        """Return the numbers times `factor`, to convert them to another unit."""
         return Spread(self.least * factor, self.median * factor, self.p99 * factor, self.most * factor)
 
 
 def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
-    """Time each of `repeats` calls [s]."""
+    """Call a function `repeats` times and return the time of each call [s]."""
     times = []
     for _ in range(repeats):
         start = perf_counter()
@@ -44,10 +44,11 @@ def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
 def compare(
     one: Callable[[], object], other: Callable[[], object], repeats: int, unit: float
 ) -> tuple[Spread, Spread, Spread]:
-    """Time two calls in turns, after two warm-up rounds.
+    """Time two calls alternately, after two warm-up rounds.
 
-    A temporary slowdown of the machine then affects both, and their ratio stays valid.
-    Returns: the times of each, in seconds times `unit`, and `one` over `other`, pair by pair.
+    A temporary slowdown of the machine then affects both calls, so that their ratio stays valid.
+    Returns: times of each call, in seconds times `unit`, and times of `one` over those of `other`, pair by
+        pair.
     """
     pairs = [(time_calls(one, 1)[0], time_calls(other, 1)[0]) for _ in range(repeats + 2)][2:]
     ones, others = ([pair[i] for pair in pairs] for i in (0, 1))

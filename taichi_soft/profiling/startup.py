@@ -1,4 +1,4 @@
-"""Time the start of a new process until a game can begin, with an empty and with a full kernel cache."""
+"""Time the start of a process until its game can begin, with an empty and with a full kernel cache."""
 
 from __future__ import annotations
 
@@ -45,17 +45,18 @@ world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
 """,
 }
-"""By name: a body and a floor; soft contact, a pool and a collider; a body that can be cut."""
+"""Code of each world, by name: a body and a floor; soft contact, a pool and a collider; a body that can be
+cut."""
 
 
 @dataclass(frozen=True)
 class Startup:
-    """Time from the start of Python to the first frame, and until everything is compiled."""
+    """Time from the start of Python to the first frame, and until all kernels are compiled."""
 
     world: str  # key of `WORLDS`
-    cache: str  # "empty", or "full" after a run of the same program
+    cache: str  # "empty", or "full" after an earlier run of the same program
     first_frame: float  # [s]
-    warm: float  # [s], after `World.warm_up`
+    warm: float  # [s], until the end of `World.warm_up`
 
 
 def measure_startup(
@@ -66,7 +67,7 @@ def measure_startup(
     Python's bytecode is precompiled, as after an installation.
 
     Args:
-        cores: cores to bind the threads to; may be empty.
+        cores: cores to which the threads are bound; empty for none.
         worlds: keys of `WORLDS`.
     Raises: DeviceError if a process fails.
     """
@@ -83,7 +84,7 @@ def measure_startup(
 
 
 def _times_of(program: str, environment: dict[str, str]) -> tuple[float, float]:
-    """Return the times that a program prints, from its start [s]."""
+    """Return the times that a program prints, measured from its start [s]."""
     start = time.time()
     first_frame, warm = (float(line) - start for line in _run(program, environment).split())
     return first_frame, warm

@@ -9,14 +9,16 @@ TIMES = Path("/proc/stat")
 
 
 class Ticks(NamedTuple):
-    """CPU time of all cores since the machine started [ticks]."""
+    """CPU time of all cores since the start of the machine [ticks]."""
 
     wanted: int
     stolen: int
 
 
 def processor_ticks() -> Ticks | None:
-    """Read /proc/stat: user, nice, system, idle, iowait, irq, softirq, steal; None on other systems."""
+    """Return the CPU times in /proc/stat (user, nice, system, idle, iowait, irq, softirq, steal); None on
+    other systems.
+    """
     if not TIMES.exists():
         return None
     times = [int(number) for number in TIMES.read_text().split("\n", 1)[0].split()[1:9]]
@@ -24,7 +26,9 @@ def processor_ticks() -> Ticks | None:
 
 
 def stolen_since(before: Ticks | None) -> float | None:
-    """Stolen fraction of the requested CPU time since then; None if the system does not report it."""
+    """Return the stolen fraction of the requested CPU time since `before`; None if the system does not report
+    it.
+    """
     now = processor_ticks()
     if before is None or now is None:
         return None

@@ -1,4 +1,4 @@
-"""The context of a world with all its parts, for persistence and the world itself."""
+"""Context of a world: all its parts, for persistence and the world itself."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from taichi_soft.solver.substeps import Substeps
 
 @dataclass(eq=False, kw_only=True)
 class WorldContext(Context):
-    """A world without its public interface."""
+    """All parts of a world, without its public interface."""
 
     contact_request: ContactRequest
     substeps: Substeps
-    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # the handle of a slot
+    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # makes the handle for a slot
     fields: Simulation | None = None
-    built_with: list[str] = field(default_factory=list)  # digests of the colliders' shapes at `build`
-    structure: bytes = b""  # digest of the structure that a snapshot requires, computed on demand
+    built_with: list[str] = field(default_factory=list)  # digests of the shapes of colliders at `build`
+    structure: bytes = b""  # digest of the structure that snapshots of this world must have, cached
 
     @property
     def contact(self) -> ContactSettings:
-        """Contact and sleep settings, before `World.build` for the slots that were added so far."""
+        """Contact and sleep settings; before `World.build`, for the slots that were added so far."""
         return self._contact(can_touch=self.slots.can_touch)
 
     @property
     def contact_with_another(self) -> ContactSettings:
-        """The same for a world in which there is another body."""
+        """Contact and sleep settings for this world with one more body."""
         return self._contact(can_touch=True)
 
     def _contact(self, *, can_touch: bool) -> ContactSettings:
@@ -45,17 +45,17 @@ class WorldContext(Context):
 
     @property
     def colliders(self) -> Colliders:
-        """The colliders of the world."""
+        """Colliders of the world."""
         return self.of(Colliders)
 
     @property
     def floor_collider(self) -> Collider | None:
-        """The floor, from `build` on; None in a world without colliders."""
+        """Collider of the floor, after `World.build`; None in a world without colliders."""
         return self.colliders.floor
 
     @property
     def built(self) -> Simulation:
-        """The built world. Raises: StateError before `World.build`."""
+        """The built world, a `Simulation`. Raises: StateError before `World.build`."""
         if self.fields is None:
             raise StateError("the world is not built: call world.build() after the last add_body")
         return self.fields

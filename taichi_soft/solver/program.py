@@ -1,4 +1,4 @@
-"""The parameters that a step kernel is compiled for."""
+"""Parameters for which a step kernel is compiled."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,11 @@ from taichi_soft.solver.integrators import IntegratorModel
 
 @dataclass(frozen=True)
 class StepProgram(Program):
-    """Structure of a world's step: everything that changes the code, but no numbers."""
+    """Structure of a world's step: everything that changes the code of the kernel, but no numbers."""
 
     integrator: IntegratorModel
     has_floor: bool
-    has_contact: bool = False  # with colliders; the floor is one of them
-    has_soft_contact: bool = False  # between bodies
-    has_plasticity: bool = False  # at least one body has it
-    worker_count: int = 1  # threads that share one flat step
+    has_contact: bool = False  # contact with colliders, which include the floor
+    has_soft_contact: bool = False  # contact between bodies
+    has_plasticity: bool = False  # True if a body has plasticity
+    worker_count: int = 1  # number of threads that run a flat step together

@@ -1,4 +1,4 @@
-"""Read the fields of a built world, in the caller's order."""
+"""Read the fields of a built world in the caller's order."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ Floats32 = NDArray[np.float32]
 
 
 class Readout:
-    """Positions, velocities, render meshes and rest shapes of the bodies of one world."""
+    """Reads positions, velocities, render meshes and rest shapes of the bodies of a world."""
 
     def __init__(
         self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints
     ) -> None:
         self.settings = settings
         self._state, self._program, self._scene, self._joints = state, program, scene, joints
-        self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # positions of all
-        self._alpha: float | None = None  # of the positions in `_rows`; None if they are outdated
+        self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # all positions
+        self._alpha: float | None = None  # interpolation factor of `_rows`; None if they are outdated
 
     def has_moved(self) -> None:
         """Mark the cached positions as outdated."""
         self._alpha = None
 
     def positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
-        """See `World.read_positions`. Raises: OptionError for an `out` that does not fit."""
+        """Implement `World.read_positions`. Raises: OptionError if `out` does not fit."""
         rows = as_buffer(out, "out", body.vertex_count)
         if self._alpha != alpha:
             read_positions(self._state, alpha, self._rows)
@@ -51,7 +51,7 @@ class Readout:
     def render_mesh(
         self, mesh: RenderMesh, alpha: float, positions: Floats32 | None, normals: Floats32 | None
     ) -> tuple[Floats32, Floats32]:
-        """See `World.read_render_mesh`. Raises: OptionError for a buffer that does not fit."""
+        """Implement `World.read_render_mesh`. Raises: OptionError for a buffer that does not fit."""
         x = as_buffer(positions, "positions", mesh.vertex_count)
         n = as_buffer(normals, "normals", mesh.vertex_count)
         if np.may_share_memory(x, n):  # exact for contiguous arrays
@@ -60,7 +60,7 @@ class Readout:
         return x, n
 
     def velocities(self, body: SoftBody) -> Floats32:
-        """Velocities at the time of the positions, (n, 3) [m/s]."""
+        """Return the velocities of a body at the time of its positions, (n, 3) [m/s]."""
         state, settings = self._state, self.settings
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)
         read_velocities(state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
@@ -73,12 +73,12 @@ class Readout:
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0
-            acceleration[self._is_carried(body)] = 0.0  # their velocities already include contact
+            acceleration[self._is_carried(body)] = 0.0  # these velocities already include contact
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 
     def _is_carried(self, body: SoftBody) -> NDArray[np.bool_]:
-        """True for vertices that touched something in the last substep, (n,)."""
+        """Return True for each vertex that touched something in the last substep, (n,)."""
         if self._program.has_contact:
             begin = self._scene.ranges[body.index].particles[0]
             touches = self._state.particle_touches.to_numpy()[begin : begin + body.vertex_count]
@@ -89,7 +89,9 @@ class Readout:
         return np.asarray(body.positions()[:, 2] <= floor)
 
     def rest_inverses(self, body: SoftBody) -> Floats:
-        """A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m], in the caller's order."""
+        """Return A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m], in the caller's
+        order.
+        """
         rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
         read_rest_inverses(self._state, body.index, rows)
         inverses = np.empty(rows.shape)

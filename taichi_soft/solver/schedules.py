@@ -1,4 +1,4 @@
-"""Launch the step of a world: one function per schedule, one call per fixed step."""
+"""Launch the step of a world, with one function per schedule."""
 
 from collections.abc import Callable
 
@@ -12,32 +12,33 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 FLAT_FROM_TETS = 100_000
-"""Tetrahedra of a world's largest body from which its threads share bodies. On free cores, sharing pays for
-much smaller bodies (`taichi-soft profile --crossover`). But if another program occupies a core, a barrier
-waits milliseconds for the interrupted thread, and only the largest bodies still gain."""
+"""Number of tetrahedra of a world's largest body from which threads compute bodies together. On free cores,
+this is faster for much smaller bodies (`taichi-soft profile --crossover`). But if another program occupies a
+core, a barrier waits milliseconds for the interrupted thread, and only the largest bodies are still faster.
+"""
 
 MAX_CALL_WORK = 2_000_000
-"""Tetrahedra times substeps of one kernel call, at most. Ctrl-C waits for the end of the call: 0.03 s on one
-thread, several times longer with contact, and up to 23 times if the step is retried. A step that needs
-several calls takes a snapshot first."""
+"""Largest number of tetrahedra times substeps in one kernel call. Ctrl-C waits for the end of the call:
+0.03 s on one thread, several times longer with contact, and up to 23 times if the step is retried. A step
+that needs several calls takes a snapshot first."""
 
 ALL = 2**31 - 1
-"""Substeps of a kernel call that runs the whole step."""
+"""Number of substeps for a kernel call that runs the whole step."""
 
 Launch = Callable[[int, float], int]
 
 
 def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
-    """Return the schedule `asked` for, or for AUTO the fastest.
+    """Return the schedule that was asked for; for AUTO, the fastest schedule.
 
     A GPU needs one thread per tetrahedron. On a CPU, each body runs in one thread if there are enough bodies
-    to occupy all threads, or if none is large enough to be shared.
+    for all threads, or if no body is large enough for several threads.
     """
     if asked is not Schedule.AUTO:
         return asked
     if device.is_gpu:
         return Schedule.FLAT
-    # In bodies without tetrahedra, two edges are about as much work as one tetrahedron.
+    # For a body without tetrahedra, two edges count as one tetrahedron.
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     is_balanced = max(sizes) * device.threads <= 1.25 * sum(sizes)
     if device.threads == 1 or is_balanced or max(sizes) < FLAT_FROM_TETS:
@@ -46,7 +47,7 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
 
 
 def substeps_per_call(scene: Scene, integrator: IntegratorModel) -> int:
-    """Return the largest number of substeps in one kernel call."""
+    """Return the largest number of substeps that fits one kernel call."""
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     return max(1, MAX_CALL_WORK // max(1, integrator.work * sum(sizes)))
 
@@ -57,7 +58,7 @@ def make_launch(
     """Return a function (substeps, h) -> number of failed bodies, which runs one fixed step.
 
     Args:
-        retries: how often a failed step is retried.
+        retries: number of retries of a failed step.
     """
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count

@@ -54,27 +54,27 @@ class Simulation:
     easings: Easings
     joints: Joints
     colliders: Colliders | None  # None in a world without contact
-    sleeps: bool  # whether bodies fall asleep
+    sleeps: bool  # True if bodies fall asleep
     state: State
     program: StepProgram
     launch: Launch
-    long_from: int  # a step of more substeps takes several calls
+    long_from: int  # number of substeps from which a step takes several calls
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
-    loss: str = ""  # why the last step lost events; set once per drain
-    troubled: int = 0  # bodies of the last step with failures, lasting inversions or inexact solves
-    _skips: bool = True  # bodies may skip the coming step
-    _is_still: bool = False  # no body is awake, and nothing changed since the last step
-    _warned: set[int] = field(default_factory=set)  # slots of bodies reported for inexact solves
-    _inverted: set[int] = field(default_factory=set)  # slots of bodies reported for inverted tetrahedra
+    loss: str = ""  # why events of the last step were lost; set once per drain
+    troubled: int = 0  # number of bodies in the last step with failures, lasting inversions or inexact solves
+    _skips: bool = True  # True if bodies may skip the next step
+    _is_still: bool = False  # True if no body is awake, and nothing changed since the last step
+    _warned: set[int] = field(default_factory=set)  # slots reported for inexact solves
+    _inverted: set[int] = field(default_factory=set)  # slots reported for inverted tetrahedra
 
     def __post_init__(self) -> None:
         self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
 
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
-        """Run one fixed step of `seconds` in substeps of `h` [s]. Returns: a line for each body that it
-        froze.
+        """Run one fixed step of `seconds` [s] in `substeps` substeps of `h` [s]. Returns: a line for each
+        body that the step froze.
         """
         clock, colliders = self.clock, self.colliders
         if self.easings.by_body:
@@ -104,7 +104,7 @@ class Simulation:
         return reports
 
     def trial_step(self, seconds: float) -> None:
-        """Run a step that records nothing, and that the caller undoes."""
+        """Run a step that records nothing. The caller must undo it."""
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:
             self.colliders.prepare(seconds)
@@ -115,7 +115,7 @@ class Simulation:
         self.state.body_patience.to_numpy()  # compiles what an inverted body needs
 
     def _record_failures(self, substeps: int, h: float) -> list[str]:
-        """Record the bodies that the last step froze. Returns: a line for each."""
+        """Record the bodies that the last step froze. Returns: a line for each of them."""
         clock, reports = self.clock, []
         # The last attempt freezes the body.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
@@ -136,7 +136,7 @@ class Simulation:
         return reports
 
     def _suggest_fix(self, body: SoftBody) -> str:
-        """Suggest a fix for a body that the last step froze."""
+        """Suggest a remedy for a body that the last step froze."""
         lower, upper = body.aabb()
         moved, size = self.frames.displacement(body), float((upper - lower).max())
         if moved > size:
@@ -147,7 +147,7 @@ class Simulation:
         return "Use more substeps or a softer material"
 
     def check_shapes(self) -> None:
-        """Warn once of each body whose tetrahedra stay inverted."""
+        """Warn once about each body whose tetrahedra stay inverted."""
         patience = self.state.body_patience.to_numpy()
         for body in self.pools.occupants:
             index = body.index
@@ -162,7 +162,7 @@ class Simulation:
             )
 
     def check_solves(self) -> None:
-        """Warn once of each body whose implicit solves were inexact in the last step."""
+        """Warn once about each body whose implicit solves were inexact in the last step."""
         if not self.state.capacity.implicit:
             return
         residuals = self.state.body_residual.to_numpy()
@@ -181,7 +181,7 @@ class Simulation:
             )
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
-        """Place a body in an empty slot, as given by `rows` (see `SoftBodyAsset.placed`)."""
+        """Place a body in an empty slot. For `rows`, see `SoftBodyAsset.placed`."""
         spawn_body(self.state, slot, rows)
         self.mark_changed()
 
@@ -193,14 +193,14 @@ class Simulation:
         despawn_body(self.state, slot)
 
     def skip(self, slots: Sequence[int]) -> None:
-        """Make bodies skip the coming step."""
+        """Make bodies skip the next step."""
         if slots:
             skip_bodies(self.state, np.array(slots, dtype=np.int32))
             self._skips = True
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Return the islands of the last step, by slot. Bodies added since then are separate."""
+        """Return the islands of the last step, by slot. Bodies added since then form separate islands."""
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)
@@ -211,7 +211,7 @@ class Simulation:
         return [tuple(bodies) for bodies in found.values()]
 
     def wake(self, slot: int) -> None:
-        """Wake a body, or all for -1."""
+        """Wake the body in a slot; -1 wakes all."""
         self._is_still = False
         if self.sleeps:
             wake_body(self.state, slot)
@@ -228,7 +228,7 @@ class Simulation:
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return corners of the present box around a body and its contact hull [m]."""
+        """Return the corners of the current box around a body and its contact hull [m]."""
         lower, upper = body.aabb()
         asset = present_asset(body)
         if asset.hull is not None:
@@ -238,26 +238,32 @@ class Simulation:
         return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, first particle of a body, *arguments) that only reads."""
+        """Call a kernel (state, first particle of a body, *arguments) that only reads, and return its
+        result.
+        """
         return kernel(self.state, self.scene.ranges[slot].particles[0], *arguments)
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that changes a body, or all for -1. All control uses this."""
+        """Call a kernel (state, *arguments) that changes the body in a slot, or all for -1. All control uses
+        this.
+        """
         found = self.attempt(kernel, *arguments)
         self.mark_modified(slot)
         return found
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that can refuse. Bodies stay asleep until `mark_modified`."""
+        """Call a kernel (state, *arguments) that can refuse a change. Bodies stay asleep until
+        `mark_modified`.
+        """
         return kernel(self.state, *arguments)
 
     def mark_modified(self, slot: int) -> None:
-        """Record that control changed a body, or all for -1."""
+        """Record that control changed the body in a slot, or all for -1."""
         self.wake(slot)
         self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
-        """Move a body to other positions. Raises: OptionError for values out of range."""
+        """Set positions and velocities of a body. Raises: OptionError for values out of range."""
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
@@ -271,42 +277,42 @@ class Simulation:
         self.wake_near(*left)
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """Positions of the vertices, interpolated between the last two steps, (n, 3) [m]."""
+        """Return the vertex positions of a body, interpolated between the last two steps, (n, 3) [m]."""
         return self.readout.positions(body, alpha, out)
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
-        """Velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
+        """Return the vertex velocities of a body at the time of the positions, (n, 3) [m/s]."""
         return self.readout.velocities(body)
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m]."""
+        """Return A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m]."""
         return self.readout.rest_inverses(body)
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Vertices that are pinned now, ascending."""
+        """Return the vertices that are currently pinned, ascending."""
         return pinned_vertices(body)
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
-        """Raises: OptionError if points of a body's surface, (k, 3) [m], are too deep inside a collider.
+        """Raise an OptionError if points of a body's surface, (k, 3) [m], are too deep inside a collider.
 
-        The caller checks the floor, and names the missing height.
+        The caller must check the floor separately, because its error contains the missing height.
         """
         if self.colliders is not None:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
             require_clear(others, present_asset(body), points, f"body {body.index}")
 
     def mark_joints_changed(self) -> None:
-        """Rebuild the islands of joined bodies in worlds whose steps do not search for islands."""
+        """Rebuild the islands of joined bodies, in worlds whose steps do not search for islands."""
         if self.program.has_contact and not self.program.has_soft_contact:
             list_joined_islands(self.state, len(self.pools.slots))
 
     def apply_settings(self, settings: Settings) -> None:
-        """Change gravity or the floor's friction."""
+        """Apply changes of gravity or of the floor's friction."""
         self.settings = self.readout.settings = settings
         self.state.write_surroundings(settings)
 
     def on_placed(self, body: SoftBody) -> None:
-        """Make the next step check which bodies this body overlaps."""
+        """Make the next step check which other bodies `body` overlaps."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
 
@@ -334,10 +340,10 @@ class Simulation:
         return int(self.state.body_status[slot]) == ASLEEP
 
     def solve_residual(self, body: SoftBody) -> float | None:
-        """See `Body.solve_residual`."""
+        """Implement `Body.solve_residual`."""
         has_solved = self.state.capacity.implicit and self.clock.steps > record_of(body).first_step
         return float(self.state.body_residual[body.index]) if has_solved else None
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """Find the first failure of the body in a slot."""
+        """Return the first failure of the body in a slot."""
         return find_failure(self.state, self.program, self.scene, slot, failed)

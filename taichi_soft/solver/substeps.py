@@ -19,32 +19,34 @@ from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, Un
 _log = logging.getLogger(__name__)
 
 _PLAIN = {float, int, np.float64, type(None)}
-"""Types whose values can be compared with those of the last step."""
+"""Types whose values can safely be compared with those of the last step."""
 
 
 SOFT_CONTACT_STEP = 1 / 240
-"""Longest substep of implicit Euler [s] chosen for a world with contact between bodies. The solve ignores
-forces between bodies, so bodies in a pile look softer with longer substeps: twice this substep compresses a
-pile of three blocks about three times as much, and with four times it the pile falls."""
+"""Longest substep of implicit Euler that is chosen for a world with contact between bodies [s]. The solve
+ignores forces between bodies, so bodies in a pile look softer with longer substeps: twice this substep
+compresses a pile of three blocks about three times as much, and with four times this substep the pile falls.
+"""
 
 
 MANY_SUBSTEPS = 500
-"""Substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per step."""
+"""Number of substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per
+step."""
 
 FRAME = 1 / 60
-"""Step [s] used to judge a world when it is built."""
+"""Length of the step for which a world is checked when it is built [s]."""
 
 TET_TIME = 15e-9
 """Approximate time per tetrahedron and substep on one thread [s] (`taichi-soft profile --baseline`)."""
 
 
 class Substeps:
-    """Stable and chosen substeps of one world."""
+    """Stable and chosen numbers of substeps of one world."""
 
     def __init__(
         self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool | None, most: int | None
     ) -> None:
-        """Start without choices.
+        """Start without estimates.
 
         Args:
             has_stable_step: True if longer substeps explode.
@@ -52,19 +54,19 @@ class Substeps:
         """
         self._pools = pools
         self.has_stable_step, self._soft_contact = has_stable_step, soft_contact
-        self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
+        self._estimates: dict[BodyDescription, StableStep] = {}  # estimates for bodies with another material
         self._asked: tuple[Any, ...] = ()
-        self._chosen = (0.0, 0, 0.0)  # the answer to `_asked`
+        self._chosen = (0.0, 0, 0.0)  # result for `_asked`
         self._warned: set[float] = set()
         self._most, self._is_said = most, False
 
     @property
     def has_limit(self) -> bool:
-        """True if a step that needs too many substeps is refused."""
+        """True if the world refuses steps that need too many substeps."""
         return self._most is not None
 
     def stable_step(self, body: SoftBody) -> StableStep:
-        """See `World.stable_step`."""
+        """Implement `World.stable_step`."""
         described = record_of(body).description
         present = present_asset(body)
         if described is present.description:
@@ -75,8 +77,9 @@ class Substeps:
 
     @property
     def rule(self) -> tuple[float, float]:
-        """Factor and divisor [s] that give the number of stable substeps: length of the step times the first,
-        over the second, rounded up.
+        """Factor and divisor [s] that give the stable number of substeps.
+
+        The number is the length of the step times the factor, over the divisor, rounded up.
 
         Raises: StateError for a world without bodies.
         """
@@ -92,14 +95,14 @@ class Substeps:
         return 1.0, longest
 
     def stable_count(self, dt: float) -> int:
-        """See `World.stable_substeps`."""
+        """Implement `World.stable_substeps`."""
         share, longest = self.rule
         return max(1, math.ceil(share * as_step(dt) / longest))
 
     def review(self) -> None:
-        """Before a world is built, warn if a frame needs many substeps.
+        """Warn before a world is built if a frame needs many substeps.
 
-        Raises: OptionError if it needs more than the world allows.
+        Raises: OptionError if a frame needs more than the world allows.
         """
         if self._pools.slots and self.has_stable_step:
             self._require_few(FRAME, self.stable_count(FRAME))
@@ -120,18 +123,18 @@ class Substeps:
         warnings.warn(said, SlowStepWarning, stacklevel=6)
 
     def _stiffest(self) -> tuple[int, StableStep]:
-        """Return the slot that needs the shortest substeps, and its stable step."""
+        """Return the slot of the body that needs the shortest substeps, and its stable step."""
         found = [(asset.stable_step, slot) for slot, asset in enumerate(self._pools.assets)]
         found += [(self.stable_step(body), body.index) for body in self._pools.occupants]
         step, slot = min(found, key=lambda each: each[0].limit)
         return slot, step
 
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        """Return length of a step [s], number of substeps and their length [s], for `World.step`.
+        """Return the length of a step [s], the number of substeps and their length [s], for `World.step`.
 
         Raises: OptionError.
         """
-        asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but both are refused
+        asked = (dt, substeps, type(dt), type(substeps))  # types, because 4.0 == 4 and True == 1
         if not {type(dt), type(substeps)} <= _PLAIN or self._asked != asked:
             self._chosen = self._check(dt, substeps)
             self._asked = asked
@@ -149,7 +152,7 @@ class Substeps:
         _log.info("a step of %g s is made in %d substeps", seconds, count)
         if not self.has_stable_step:
             return seconds, count, h
-        # Bodies that were cut or changed material are not estimated: the caller chose the number.
+        # Do not estimate bodies that were cut or changed material, because the caller chose the number.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned:
@@ -164,12 +167,12 @@ class Substeps:
         return seconds, count, h
 
     def forget(self) -> None:
-        """Discard the last choice."""
+        """Discard the last choice of substeps."""
         self._asked = ()
 
     def renew(self) -> None:
         """Discard estimates of materials that are no longer used."""
         used = {record_of(each).description for each in self._pools.occupants}
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
-        if self._asked[1:2] == (None,):  # chosen for the previous materials
+        if self._asked[1:2] == (None,):  # the number was chosen for the previous materials
             self.forget()

@@ -1,4 +1,4 @@
-"""A world for measurements."""
+"""Make a world for measurements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def bare_world(**options: Any) -> World:
     """Make a world without contact between bodies, without sleep, and without room for more colliders.
 
     Use it for experiments, measurements and tests of one feature: sleep would damp slow bodies, and contact
-    between bodies takes longer to compile. Options turn these features on.
+    between bodies takes longer to compile. `options` can turn these features on.
     Args:
         options: arguments of `World`.
     """

@@ -1,4 +1,4 @@
-"""Public handle to one soft body of a world."""
+"""Public handle of one soft body of a world."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 
 class Body(BodyControl, BodyMeasures):
-    """A handle to one body. Positions and velocities are in the vertex order of its mesh."""
+    """A handle of one body. Positions and velocities are in the vertex order of its mesh."""
 
     @property
     def _context(self) -> WorldContext:
@@ -38,7 +38,9 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
-        """Attachments to frames. A piece that was cut or torn off keeps those of its vertices."""
+        """Attachments of the body to frames. A piece that was cut or torn off keeps the attachments of its
+        vertices.
+        """
         return tuple(self._context.of(Frames).holding(self))
 
     @recorded
@@ -52,17 +54,16 @@ class Body(BodyControl, BodyMeasures):
 
         A face opens if the blade passes between the centres of its two tetrahedra. Vertices keep their
         indices, and copies are appended. Mass, momentum and elastic energy are conserved. Detached pieces
-        become bodies of the same asset in free slots of its pool; this body keeps the largest piece. Pieces
-        number their vertices and tetrahedra again, in order; `vertex_origins` has the original indices.
-        Attached vertices and their copies stay attached in every piece: see `Attachment`.
+        become bodies of the same asset in free slots of its pool; this body keeps the largest piece. In each
+        piece, vertices and tetrahedra are numbered again in the same order; `vertex_origins` has the original
+        indices. Attached vertices and their copies stay attached in every piece, see `Attachment`.
         Args:
             plane: (point (3,) [m], normal (3,)) of a cut through the whole body.
             triangle: corners, (3, 3) [m], of a cut that ends at its edges.
         Returns: the detached bodies, the largest first; empty if the body stays connected.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
             `spare_vertices`; StateError if vertices or slots run out, for a body that is frozen, grabbed,
-            joined to another or driven by a motor, and before `build`.
-            Nothing is changed then.
+            joined to another or driven by a motor, and before `build`. After an error, nothing is changed.
         Example:
             pieces = body.cut(plane=((0, 0, 0.25), (1, 0, 0)))
             world.step(1 / 60)
@@ -74,7 +75,7 @@ class Body(BodyControl, BodyMeasures):
         """Make a render mesh of the body's surface, with one vertex per side of a sharp edge.
 
         `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once per frame. A cut or a
-        tear invalidates it: see `RenderMesh.is_outdated`.
+        tear invalidates the render mesh, see `RenderMesh.is_outdated`.
         Args:
             crease: angle between adjacent triangles at rest above which their edge is sharp, 0 to 180
                 [degrees]; None shades all edges smooth.
@@ -87,32 +88,34 @@ class Body(BodyControl, BodyMeasures):
     def render_meshes(self) -> tuple[SkinMesh, ...]:
         """Skins of the body (the artist's meshes), in order; empty if its asset has none.
 
-        They are drawn like a `render_mesh`, and have trimesh's `visual` with texture coordinates and
+        Draw them like a `render_mesh`. Each also has trimesh's `visual`, with texture coordinates and
         material.
         """
         return skin_meshes(self)
 
     @property
     def stable_step(self) -> StableStep:
-        """Estimate of the largest stable substep."""
+        """Estimate of the largest stable substep of the body."""
         return self._context.substeps.stable_step(self)
 
     @property
     def is_asleep(self) -> bool:
-        """True while the body sleeps and costs no time (see `sleep_speed` of `World`)."""
+        """True while the body sleeps and takes no time in a step (see `sleep_speed` of `World`)."""
         simulation = self._context.fields
         return simulation is not None and simulation.is_asleep(self.index)
 
     @property
     def solve_residual(self) -> float | None:
-        """Largest residual of the last step's implicit solves, over the load on the body; None before."""
+        """Largest residual of the last step's implicit solves, over the load on the body; None before the
+        first step.
+        """
         return self._context.built.solve_residual(self)
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
-        """Set positions and velocities between two steps. This activates a frozen body and finishes a change
-        of material.
+        """Set the positions and velocities of the vertices between two steps.
 
+        A frozen body becomes active again, and a change of material is completed at once.
         Args:
             positions: (n, 3) [m].
             velocities: (n, 3) [m/s], at the same time.
@@ -130,12 +133,12 @@ class Body(BodyControl, BodyMeasures):
 
         Position, velocity, rotation and deformation are transferred; centre of mass, momentum and angular
         momentum are conserved to round-off. Pins and attachments move to the nearest vertices. Grabs continue
-        at the same point of the rest shape, with the same target and largest force. Vertices and tetrahedra
-        change, which `topology_version` counts. `render_meshes` stay valid and follow the new mesh.
+        at the same point of the rest shape, with the same target and largest force. `topology_version` counts
+        the change of vertices and tetrahedra. `render_meshes` stay valid and follow the new mesh.
         Args:
-            level: 0 or more.
+            level: new level, 0 or more.
             release: True releases joints, motors, and attachments that have no vertex at the new level, with
-                an event `Released`. False refuses the change in that case.
+                an event `Released`. False raises an error in that case.
         Raises: OptionError for a level that the asset does not have; StateError for a body that is frozen or
             has its own material, for constraints that prevent the change, and before `build`. Then nothing is
             changed.
@@ -148,11 +151,12 @@ class Body(BodyControl, BodyMeasures):
         """Record a `StressExceeded` in every step in which tetrahedra exceed a stress.
 
         A tetrahedron is reported again only after its stress was below 0.9 of the threshold. The first call
-        in a world compiles, for many seconds with an empty cache, unless `World.warm_up` has done so.
+        in a world compiles kernels, which takes many seconds with an empty cache, unless `World.warm_up` has
+        compiled them.
         Args:
             threshold: threshold of `tet_stress` [Pa]; None stops watching.
-        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before
-            `build`. The same for `watch_tearing`.
+        Raises: OptionError for a threshold that is not above 0; MeshError for a body without tetrahedra;
+            StateError before `build`.
         """
         self._watch(StressExceeded, threshold, "threshold")
 

@@ -1,4 +1,4 @@
-"""Control of one body."""
+"""Methods that change one body."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ Ints = NDArray[np.int64]
 
 
 class BodyControl(SoftBody):
-    """Methods of a body that change it."""
+    """Methods that change a body."""
 
     @recorded
     def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
-        """Apply a force during the next step, with the same acceleration for all given particles. Calls add
-        up.
+        """Apply a force during the next step, with the same acceleration for all given particles.
 
+        Further calls before the step add their forces.
         Args:
             force: total force, (3,) [N]. The share of pinned particles goes to their constraint.
             particles: particles that it acts on; None means all.
@@ -51,17 +51,18 @@ class BodyControl(SoftBody):
         """Set the factor on gravity for this body: with 0 it floats, with -1 it rises.
 
         Args:
-            scale: factor on the world's gravity; initially 1.
+            scale: factor on the gravity of the world; 1 in a new body.
         """
         set_gravity_scale(self, scale)
 
     @recorded
     def set_friction(self, friction: float) -> None:
-        """Change the friction of its `Contact`, which applies between bodies, from the next step on.
+        """Change the friction between this body and other bodies from the next step on.
 
-        The floor and other colliders have their own: see `World.set_friction` and `Collider.set_friction`.
+        The floor and other colliders have their own friction, see `World.set_friction` and
+        `Collider.set_friction`.
         Args:
-            friction: Coulomb coefficient, 0 or more.
+            friction: Coulomb coefficient of the body's `Contact`, 0 or more.
         Raises: OptionError for a number out of range; StateError before `build`, and in a world without
             `soft_contact`.
         """
@@ -69,13 +70,13 @@ class BodyControl(SoftBody):
 
     @property
     def linear_damping(self) -> float:
-        """Damping rate of its velocities [1/s]; 0 unless it was set."""
+        """Damping rate of all velocities of the body [1/s]; 0 by default."""
         simulation = self._context.fields
         return 0.0 if simulation is None else float(simulation.state.body_damping[self.index])
 
     @property
     def is_sheltered(self) -> bool:
-        """True if it is sheltered from the wind."""
+        """True if the body is sheltered from the wind."""
         simulation = self._context.fields
         drives = 0 if simulation is None else int(simulation.state.body_drives[self.index])
         return bool(drives & SHELTERED)
@@ -85,7 +86,7 @@ class BodyControl(SoftBody):
         """Damp all velocities by exp(-rate t), relative to the world at rest.
 
         Args:
-            rate: damping rate [1/s], 0 or more; initially 0.
+            rate: damping rate [1/s], 0 or more; 0 in a new body.
         Raises: OptionError for a negative rate; StateError before `build` and with schedule "flat".
         """
         set_linear_damping(self, rate)
@@ -95,7 +96,7 @@ class BodyControl(SoftBody):
         """Shelter the body from the wind of `World.set_wind`, or expose it.
 
         Args:
-            is_sheltered: True shelters it; initially False.
+            is_sheltered: True shelters the body; False in a new body.
         """
         set_sheltered(self, is_sheltered)
 
@@ -106,8 +107,8 @@ class BodyControl(SoftBody):
         Args:
             impulse: total impulse, (3,) [N s]. The share of pinned particles goes to their constraint.
             particles: particles that it acts on; None means all.
-        Raises: OptionError for invalid numbers or vertices; StateError before `build`. The same for the
-            following methods.
+        Raises: OptionError for invalid numbers or vertices; StateError before `build`. The same applies to
+            the following methods.
         Example:
             body.apply_impulse((0, 0, 2.0 * body.masses.sum()))  # 2 m/s upwards
         """
@@ -119,7 +120,7 @@ class BodyControl(SoftBody):
         r as (1 - (r/radius)^2)^2.
 
         Args:
-            impulse: total impulse, (3,) [N s], for any number of particles.
+            impulse: total impulse on all particles within range, (3,) [N s].
             point: centre, (3,) [m].
             radius: range of the impulse [m].
         Raises: OptionError with the smallest distance if no particle is in range.
@@ -128,7 +129,8 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Set the velocities of all particles that are not pinned to a rigid motion.
+        """Set the velocities of all free particles to those of a rigid motion. Pinned particles do not
+        change.
 
         Args:
             linear: velocity of the centre of mass, (3,) [m/s].
@@ -144,11 +146,11 @@ class BodyControl(SoftBody):
         jump with it.
 
         Args:
-            position: new position of its centre of mass, (3,) [m].
+            position: new position of the centre of mass, (3,) [m].
             rotation: rotation about the centre of mass from its current orientation, matrix or quaternion
                 (x, y, z, w).
             keep_velocity: True rotates velocities with the body, False stops it.
-        Raises: OptionError if it would be below the floor or inside a collider.
+        Raises: OptionError if the body would be below the floor or inside a collider.
         """
         teleport(self, position, rotation, keep_velocity)
 
@@ -168,7 +170,7 @@ class BodyControl(SoftBody):
 
     @recorded
     def unpin(self, particles: ArrayLike | None = None) -> None:
-        """Release pinned particles; they keep the velocity of their last motion.
+        """Release pinned particles. They keep the velocity of their last motion.
 
         Args:
             particles: vertices of this body; None, the default, means all.
@@ -179,7 +181,7 @@ class BodyControl(SoftBody):
     def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
         """Move pinned particles in a straight line to `positions` over the next step.
 
-        After that they stay there, unless they get new targets.
+        Then they stay at these positions until they get new targets.
         Args:
             particles: pinned vertices, (n,).
             positions: targets, (n, 3) [m].
@@ -189,12 +191,12 @@ class BodyControl(SoftBody):
 
     @recorded
     def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
-        """Attach particles to a frame, at their current positions relative to it.
+        """Attach particles to a frame, at their current positions relative to the frame.
 
         Args:
             particles: vertices, which can be pinned.
             frame: frame of the same world.
-            two_way: record the load on the frame: `Attachment.force` and `Attachment.torque`.
+            two_way: True records the load on the frame: `Attachment.force` and `Attachment.torque`.
         Raises: OptionError for a frame of another world; StateError for a particle that is already attached,
             and for `two_way` with schedule "flat".
         """
@@ -204,17 +206,17 @@ class BodyControl(SoftBody):
     def attach_to(self, other: SoftBody, particles: ArrayLike, *, onto: ArrayLike | None = None) -> Joint:
         """Attach particles of this body to another body, until `Joint.release`.
 
-        The two then move together there, for any masses and stiffnesses. Action equals reaction, so momentum
-        and angular momentum are conserved. A gap, for example after `teleport`, closes no faster than the
-        bodies can follow. The joined parts ignore contact with each other; with `soft_contact` the rest of
-        the two bodies collides. Joined bodies sleep and wake together. `World.despawn` of either body
+        The joined parts then move together, for any masses and stiffnesses. Action equals reaction, so
+        momentum and angular momentum are conserved. A gap, for example after `teleport`, closes only as fast
+        as the bodies can follow. There is no contact between the joined parts; with `soft_contact` the rest
+        of the two bodies collides. Joined bodies sleep and wake together. `World.despawn` of either body
         removes the joint. A frozen body holds the other one in place.
         Args:
             other: another body of the same world, with tetrahedra unless `onto` is given.
             particles: vertices of this body, preferably of the finer mesh.
             onto: vertices of `other`, one per particle, to attach to. None attaches each particle at its
-                current position in a tetrahedron of `other`, or just outside of one.
-        Raises: OptionError for the same body or one of another world, for invalid vertices, and without
+                current position, which must be in a tetrahedron of `other` or just outside.
+        Raises: OptionError for the same body or a body of another world, for invalid vertices, and without
             `onto` for vertices that are too far away; StateError before `build`, in a world without contact,
             with implicit Euler, and if the world's 64 joints, or their 2,048 particles, are all in use.
         Example:
@@ -237,11 +239,11 @@ class BodyControl(SoftBody):
     ) -> Grab:
         """Grab the surface with a critically damped spring: `move` pulls the body, `release` ends the grab.
 
-        The spring holds a patch of about a quarter of the body's size. A force above the patch's strength
-        acts on the whole body, so that strong pulls tear nothing.
+        The spring holds a patch of about a quarter of the body's size. If the force exceeds the strength of
+        the patch, it acts on the whole body, so that strong pulls do not distort the patch.
         Args:
             triangle: triangle of `surface`.
-            barycentrics: point on it, (3,).
+            barycentrics: barycentric coordinates of the point on the triangle, (3,).
             frequency: frequency of the spring with the whole body attached [Hz].
             max_force: largest force [N]; None is ten times the body's weight on Earth.
         Raises: OptionError for invalid numbers; MeshError for a body without surface; StateError before
@@ -253,12 +255,12 @@ class BodyControl(SoftBody):
     def set_material(self, material: AnyMaterial) -> None:
         """Change the material to another one of the same type, as if the body had been added with it.
 
-        Positions and velocities stay, so another density changes its momentum. A stiffer material has more
-        strain energy in a deformed body, which would throw it. So a stiffer material is eased in over 0.5 s,
-        or 1.3 periods of the slowest vibration if that is longer, and vibrations are damped meanwhile.
-        `material` changes at once. `World.stable_substeps` and steps without `substeps` estimate the new
-        stable step at once (about 0.2 s for 5,000 tetrahedra); with `substeps` there is no estimate and no
-        warning.
+        Positions and velocities do not change, so a different density changes the momentum. In a deformed
+        body, a stiffer material has more strain energy, which would throw the body. So stiffness rises
+        gradually over 0.5 s, or over 1.3 periods of the slowest vibration if that is longer, and vibrations
+        are damped meanwhile. `material` changes at once. `World.stable_substeps` and steps without `substeps`
+        estimate the new stable step at once (about 0.2 s for 5,000 tetrahedra); with `substeps` there is no
+        estimate and no warning.
         Args:
             material: material of the same type, valid for the body's law and mesh.
         Raises: MaterialError for another type or invalid constants; StateError before `build`.
@@ -272,7 +274,7 @@ class BodyControl(SoftBody):
         """Change the material's damping b.
 
         Args:
-            damping: [N s/m], 0 or more: one number, or one per element.
+            damping: damping b, one number or one per element [N s/m], 0 or more.
         Raises: as `set_material`.
         """
         set_damping(self, damping)

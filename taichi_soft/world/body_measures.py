@@ -15,7 +15,7 @@ Ints = NDArray[np.int64]
 
 
 class BodyMeasures(SoftBody):
-    """Quantities of a body, computed at each call in float64 from its float32 state."""
+    """Quantities of a body. Each call computes them in float64 from the body's float32 state."""
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]; negative if it is inverted."""
@@ -30,11 +30,11 @@ class BodyMeasures(SoftBody):
         return len(self.flipped_tets())
 
     def flipped_tets(self) -> NDArray[np.int64]:
-        """Inverted tetrahedra, ascending."""
+        """Indices of the inverted tetrahedra, ascending."""
         return np.flatnonzero(self.volumes() < 0)
 
     def pose(self) -> Pose:
-        """Rigid motion of the rest shape that fits the body best, weighted by mass.
+        """Rigid motion that fits the rest shape to the body best, weighted by mass.
 
         `mesh.vertices @ pose.rotation.T + pose.position` is the best fit to the positions. The rotation never
         mirrors, even for a flat or inverted body. For a straight rope, the rotation about its axis is
@@ -61,16 +61,16 @@ class BodyMeasures(SoftBody):
     def elastic_energy(self) -> float:
         """Elastic energy [J] of springs and of the laws "st_venant_kirchhoff" and "neo_hookean".
 
-        For the other laws it is 1/2 sum V0 sigma : eps of the linear strain, an indicator that is not
-        conserved. Their stress is not the derivative of an energy (except of another one at poisson = 1/4),
-        so the total energy can drift without damping.
+        For the other laws this returns 1/2 sum V0 sigma : eps with the linear strain, which is only an
+        indicator. The stress of these laws is not the derivative of this energy, so without damping the total
+        energy can drift.
         """
         return measures.elastic_energy(self)
 
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
 
-        For a body with plasticity it is the elastic part, relative to the current rest shape. The same
+        For a body with plasticity, F is the elastic part, relative to the current rest shape. The same
         applies to all strains and stresses.
         """
         return measures.deformations(self)
@@ -80,24 +80,26 @@ class BodyMeasures(SoftBody):
         return measures.strains(self)
 
     def plastic_strains(self) -> Floats:
-        """Permanent equivalent (von Mises) logarithmic strain of each tetrahedron, (m,)."""
+        """Permanent (plastic) logarithmic strain of each tetrahedron, as equivalent von Mises strain,
+        (m,).
+        """
         return measures.plastic_strains(self)
 
     def stresses(self) -> Floats:
         """Stress of each tetrahedron, (m, 3, 3) [Pa], in world axes; tension is positive.
 
         This is the Cauchy stress of the body's law, force per current area, without damping. Laws along edges
-        have no stress of their own and use Hooke's law with linear strain. For inverted tetrahedra it is
-        finite: that of the mirror image, or for "neo_hookean" that of the negative volume.
+        define no stress; for them, it is computed by Hooke's law with the linear strain. Inverted tetrahedra
+        have a finite stress: that of the mirror image, or with "neo_hookean" that of the negative volume.
         """
         return measures.tet_stresses(self)
 
     def force_across(self, point: ArrayLike, normal: ArrayLike) -> Floats:
         """Elastic force across a plane, (3,) [N].
 
-        It is the force of the part on the side of `normal` on the other part: the sum of `stresses` times the
-        areas in which the plane cuts the tetrahedra. In a body at rest it balances the load beyond the
-        plane, as exactly as the mesh resolves the stress.
+        The part of the body on the side of `normal` exerts this force on the other part. It is the sum of
+        `stresses` times the areas in which the plane cuts the tetrahedra. In a body at rest, the force
+        balances the load beyond the plane, to the accuracy with which the mesh resolves the stress.
         Args:
             point: point of the plane, (3,) [m].
             normal: normal of the plane, (3,), of any nonzero length.
@@ -106,13 +108,15 @@ class BodyMeasures(SoftBody):
         return measures.force_across(self, point, normal)
 
     def tet_stress(self) -> Floats:
-        """Von Mises stress of each tetrahedron, (m,) [Pa], of `stresses`."""
+        """Von Mises stress of each tetrahedron, computed from `stresses`, (m,) [Pa]."""
         return measures.tet_stress(self)
 
     def tet_strain(self) -> Floats:
-        """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.
+        """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), where e is the deviator of
+        `strains`.
 
-        It is the strain of uniaxial tension at constant volume; a pure change of volume has none.
+        Under uniaxial tension at constant volume this equals the strain of the tension. A pure change of
+        volume has the equivalent strain 0.
         """
         return measures.tet_strain(self)
 

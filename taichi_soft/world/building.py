@@ -42,7 +42,7 @@ _log = logging.getLogger(__name__)
 
 
 def build(context: WorldContext) -> Simulation:
-    """Build a world for `World.build`."""
+    """Implement `World.build`."""
     pools, scene, colliders = context.slots, context.layout, context.colliders
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
@@ -93,7 +93,7 @@ def build(context: WorldContext) -> Simulation:
     )
     if has_contact:
         colliders.load(state.colliders, len(pools.slots))
-        woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would be a cycle
+        woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would make a cycle
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
     _log.info(
         "built a world of %d slots for bodies and %d tetrahedra: schedule %s, %s, %s; %d substeps in 1/60 s",
@@ -108,7 +108,7 @@ def build(context: WorldContext) -> Simulation:
 
 
 def _add_floor(context: WorldContext) -> None:
-    """Add the floor to the colliders."""
+    """Add a collider for the floor."""
     settings = context.settings
     if settings.floor is not None:
         floor = context.colliders.floor = context.colliders.add(
@@ -125,7 +125,7 @@ def _add_floor(context: WorldContext) -> None:
 
 
 def _schedule(context: WorldContext, device: Device) -> Schedule:
-    """Choose the schedule of a world. Raises: OptionError if the requested one lacks a feature."""
+    """Choose the schedule of a world. Raises: OptionError if the requested schedule lacks a feature."""
     settings, request = context.settings, context.contact_request
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
@@ -193,7 +193,7 @@ def _is_plastic(context: WorldContext) -> bool:
 
 
 def _fill(context: WorldContext, contact: ContactSettings, state: State, program: StepProgram) -> None:
-    """Write all bodies to the fields. Their slots stay empty."""
+    """Write the data of all bodies to the fields. The slots stay empty."""
     fill, assets = state.loader.fill, context.slots.assets
     if program.has_plasticity:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
@@ -210,7 +210,7 @@ def _fill(context: WorldContext, contact: ContactSettings, state: State, program
 
 
 def _warm_up(context: WorldContext, state: State) -> None:
-    """Spawn and despawn each kind of body, so that nothing compiles during the game."""
+    """Spawn and despawn a body of each kind, so that nothing compiles during the game."""
     for asset in context.slots.kinds:
         slot = context.slots.assets.index(asset)
         if asset.spare_vertices or asset.coarser:

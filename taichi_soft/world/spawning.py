@@ -24,17 +24,17 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body import Body
 
 MOST_VERTICES = 10_000_000
-"""Largest number of vertices of a world, for which indices of all element constants fit 32 bits."""
+"""Largest number of vertices of a world. With more, the indices of element constants would exceed 32 bits."""
 
 
 def require_open(context: WorldContext) -> None:
-    """Raise a StateError after `World.build`."""
+    """Raise a StateError if the world is already built."""
     if context.fields is not None:
         raise StateError("the world is already built: add_body and reserve come first, then build() once")
 
 
 def require_own(context: WorldContext, body: Any) -> None:
-    """Raise an OptionError for a body of another world, and a StateError for a removed one."""
+    """Raise an OptionError for a body of another world, and a StateError for a removed body."""
     if not isinstance(body, Body) or not belongs_to(body, context):
         raise OptionError(f"body must be a body of this world, got {body!r}")
     require_alive(body)
@@ -49,7 +49,9 @@ def add_body(
     on_floor: bool,
     overlap: OverlapName,
 ) -> Body:
-    """Implement `World.add_body` for a new asset; copies share the first one."""
+    """Implement `World.add_body` for a new asset. If the asset is a copy of an earlier one, use the earlier
+    one.
+    """
     rule, key = Overlap.parse(overlap), _content(new)
     asset = context.slots.added.get(key, new)
     place = _place(context, asset, position, rotation, on_floor)
@@ -61,7 +63,7 @@ def add_body(
 
 
 def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
-    """Key of an asset's content, equal for copies while one of them exists."""
+    """Return a key of an asset's content. It is equal for copies while one of them exists."""
     made_of = asset.description
     return (
         id(asset.mesh),
@@ -120,7 +122,7 @@ def _place(
     rotation: ArrayLike | None,
     on_floor: bool,
 ) -> ArrayLike:
-    """Position of the mesh's origin, (3,) [m].
+    """Return the position of the mesh's origin, (3,) [m].
 
     With `on_floor`, `position` is relative to a body that stands on the floor: its z is the height of the
     lowest point above the floor.
@@ -140,7 +142,9 @@ def _place(
 
 
 def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:
-    """Raise an OptionError if a body with the initial state `rows` overlaps others and `rule` forbids it."""
+    """Raise an OptionError if `rule` forbids overlaps and a body with the initial state `rows` overlaps
+    another.
+    """
     if rule is Overlap.REFUSE and context.contact_with_another.soft:
         mesh, starts = asset.mesh, context.slots.starts
         others = (
@@ -173,7 +177,7 @@ def despawn(context: WorldContext, body: Body) -> None:
 
 
 def _release_all(context: WorldContext, body: Body) -> None:
-    """Release all constraints of a body, and reset its own settings, before its slot is emptied."""
+    """Release all constraints of a body and reset its own settings. Call this before its slot is emptied."""
     for each in context.slices:
         each.release_body(body)
     present = present_asset(body)
@@ -201,14 +205,14 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
-        else:  # the slot can hold data of a restored body that was cut or had another level
+        else:  # the slot can contain data of a restored body that was cut or had another level
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return make_handle(context, asset)
 
 
 def make_handle(context: WorldContext, asset: SoftBodyAsset) -> Body:
-    """Make a handle to the next free slot of an asset."""
+    """Make a handle for the next free slot of an asset."""
     body = Body(context, context.slots.next_slot(asset), asset)
     context.handles.enlist(body)
     context.slots.enter(body)

@@ -1,4 +1,4 @@
-"""Call everything that a game can do with a world once, so that nothing compiles during the game.
+"""Call every function of a world once, so that nothing compiles during the game.
 
 Taichi compiles a kernel at its first call, which takes 0.1 s to 1 s with an empty cache.
 """
@@ -29,13 +29,13 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
 
 SHORTEST = 1e-6
-"""Length of a step in which nothing moves noticeably [s]."""
+"""Length of a step in which no visible motion occurs [s]."""
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def warm_up_step(context: WorldContext) -> None:
-    """Compile only the kernels of a step. The world's state stays bit-identical."""
+    """Compile only the kernels of a step. The state of the world stays bit-identical."""
     before = take_snapshot(context)
     try:
         context.built.trial_step(SHORTEST)
@@ -77,13 +77,13 @@ def warm_up(context: WorldContext) -> None:
 
 
 def _find_stable_step(context: WorldContext) -> None:
-    """Compute the stable step, unless it is known."""
+    """Compute the stable step if it is not yet known."""
     if context.slots.occupants:
         context.substeps.stable_count(FRAME)
 
 
 def _fill_pools(context: WorldContext) -> None:
-    """Spawn bodies until there is one of every kind, and two in total, as far as slots allow."""
+    """Spawn bodies until there is one of every kind and at least two in total, if slots allow."""
     pools = context.slots
     for wanted in (1, 2):
         for asset in pools.kinds:
@@ -101,7 +101,7 @@ def _has_drives(context: WorldContext) -> bool:
 
 
 def _free(context: WorldContext, body: Body) -> None:
-    """Release a body from all constraints; restart a frozen one."""
+    """Release a body from all constraints, and reactivate a frozen body."""
     for each in context.slices:
         each.release_body(body)
     if len(body.pinned):
@@ -125,7 +125,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
         level, version = body.level, body.topology_version
         for other_level in (1 if level == 0 else 0, level):
             body.set_level(other_level)
-        record_of(body).topology_version = version  # render meshes stay valid
+        record_of(body).topology_version = version  # keeps render meshes valid
     body.set_material(body.material)
     give_friction(context.built.state, body, record_of(body).friction)
     body.pin([0])
@@ -134,17 +134,17 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.unpin([0])
     for each in context.slices:
         each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
-    carry([body], np.eye(3), place, place, keep=True)  # like `teleport`, without its checks
+    carry([body], np.eye(3), place, place, keep=True)  # like `teleport`, but without its checks
     body.set_motion(body.positions(), body.velocities())
 
 
 def _measure(context: WorldContext, body: Body) -> None:
-    """Read all measurements of a body."""
+    """Call all measurements of a body."""
     _ = body.positions(), body.velocities(), body.pinned
     if len(body.tets):
         body.tet_stress()
     if body.asset.plasticity is not None:
-        body.plastic_strains()  # compiles the kernel that stress and tearing use too
+        body.plastic_strains()  # compiles the kernel that stress and tearing also use
 
 
 def _ask(context: WorldContext) -> None:
@@ -152,7 +152,7 @@ def _ask(context: WorldContext) -> None:
     context.built.islands()
     state, slots, far = context.built.state, context.slots.slots, np.array([0.0, 0.0, 1e4])
     cast_ray(state, slots, far, -UP, math.inf, None, True)
-    for count in (1, 1000):  # one thread traces few rays, all threads trace many
+    for count in (1, 1000):  # a few rays are traced by one thread, many by all threads
         cast_rays(state, slots, np.tile(far, (count, 1)), np.tile(-UP, (count, 1)), math.inf, None, True)
     find_closest_point(state, slots, far, math.inf, None)
     find_in_sphere(state, slots, far, 1.0, None)

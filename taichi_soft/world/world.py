@@ -1,4 +1,4 @@
-"""The world: add bodies, build, step, read."""
+"""The class `World`: add bodies, build, step, read."""
 
 from __future__ import annotations
 
@@ -39,51 +39,54 @@ from taichi_soft.world.world_queries import WorldQueries
 from taichi_soft.world.world_states import WorldStates
 
 MOST_RETRIES = 10
-"""Largest `retries`: 1,024 times the requested substeps."""
+"""Largest value of `retries`. It allows 1,024 times the requested substeps."""
 
 
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
     By default bodies touch each other and fall asleep, and colliders can be added after `build`. For an
-    experiment that must not be disturbed by sleep, or whose bodies pass through each other, turn this off:
+    experiment that sleep would disturb, or in which bodies pass through each other, turn these features off:
     `World(soft_contact=False, sleep_speed=0, collider_room=0)`. The schedule "flat" and the integrator
-    "explicit_euler" support none of this, so it is off there by default. "auto" chooses "flat" for a single
-    large body.
+    "explicit_euler" support none of these features, so they are off there by default. "auto" chooses "flat"
+    for a single large body.
 
-    Any thread can call a world and its handles, but only one at a time: a concurrent call raises a StateError
-    that names both threads, and changes nothing. So does a call in a process forked after Taichi started.
+    Any thread can call a world and its handles, but only one at a time. A concurrent call raises a StateError
+    that names both threads, and changes nothing. A call in a process that was forked after Taichi started
+    also raises a StateError.
 
     Args:
-        gravity: (3,) [m/s^2].
+        gravity: acceleration of gravity, (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 to 1, as in `add_collider`; None leaves bodies their own elasticity. With
-            the schedule "flat" the floor reflects each vertex separately: at 0, the default there, bodies
-            keep their own elasticity, and a damped body can bounce lower at 1 than at 0.
+        restitution: restitution of the floor, 0 to 1, as in `add_collider`; None applies only the elasticity
+            of the bodies. With the schedule "flat" the floor reflects each vertex separately: with 0, the
+            default there, only the elasticity of the bodies acts, and a damped body can bounce lower with 1
+            than with 0.
         friction: Coulomb coefficient of the floor, 0 or more.
-        integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". The last one is stable
-            for every step, but solves a linear system per step and has damping that grows with the step. It
-            divides a step in which edges would change by more than half their length into 2 to 32 parts.
-        tolerance: of implicit solves, residual over the load on the body: 1e-6 to 0.5.
-        most_iterations: of an implicit solve. A solve that needs more continues with its last iterate, with a
-            `SolverWarning`.
-        schedule: "auto", "per_body" or "flat": loop structure of the computation; no effect on the physics.
-        soft_contact: True for contact between soft bodies. None: True if anything can touch, that is, with
-            more than one slot for bodies, or an asset that touches itself.
-        sleep_speed: bodies fall asleep if their particles, and those of bodies that they may touch, were
-            slower than this [m/s] for 0.5 s. They wake when something approaches or acts on them. None: 0.02
-            m/s. 0 turns sleep off.
-        collider_room: number of colliders that can be added after `build`, at least. None: 15.
-        sample_room: grid samples of these colliders: a `HeightFieldShape` or `MeshShape` uses
+        integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". "implicit_euler" is
+            stable for every step, but solves a linear system per step, and its damping grows with the step.
+            It divides a step in which edges would change by more than half their length into 2 to 32 parts.
+        tolerance: largest residual of implicit solves, over the load on the body, 1e-6 to 0.5.
+        most_iterations: largest number of iterations of an implicit solve. If a solve needs more, its last
+            iterate is used, with a `SolverWarning`.
+        schedule: "auto", "per_body" or "flat", the loop structure of the computation. It does not change the
+            physics.
+        soft_contact: True for contact between soft bodies. None is True if bodies can touch, that is, if
+            there is more than one slot for bodies, or an asset that touches itself.
+        sleep_speed: a body falls asleep if its particles, and those of bodies that it may touch, were slower
+            than this [m/s] for 0.5 s. It wakes when something approaches it or acts on it. None is 0.02 m/s;
+            0 turns sleep off.
+        collider_room: smallest number of colliders that can be added after `build`. None is 15.
+        sample_room: number of grid samples for these colliders. A `HeightFieldShape` or `MeshShape` uses
             `len(shape.samples)` while its collider exists.
-        retries: how often a step that fails for a body is retried, each time with twice the substeps, and
-            then once more with damped vibrations. 0 freezes the body at once, to study a law at a given step.
-            Implicit Euler divides its steps itself.
+        retries: number of times that a step that fails for a body is retried, each time with twice the
+            substeps; then there is one more retry with damped vibrations. 0 freezes the body at once, to
+            study a law at a given step. Implicit Euler divides its steps itself.
         max_substeps: largest number of substeps of a step, and of 1/60 s at `build`; a world that needs more
             refuses the build or the step. None only warns above 500.
         record: number of steps that the flight recorder stores, with all calls between them; 0 turns it off.
             See `save_recording`.
-        record_to: file that it writes when a body freezes for the first time.
+        record_to: file that the flight recorder writes when a body freezes for the first time.
     Raises: OptionError for a value out of range or an unknown name.
     Example:
         arena = World(floor=0.0)
@@ -176,17 +179,17 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def settings(self) -> Settings:
-        """Current gravity, floor, integrator and schedule."""
+        """Current settings: gravity, floor, integrator and schedule."""
         return self._context.settings
 
     @property
     def step_count(self) -> int:
-        """Number of fixed steps made."""
+        """Number of fixed steps that the world has made."""
         return self._context.clock.steps
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Time that the world has simulated [s]."""
         return self._context.clock.time
 
     @property
@@ -205,8 +208,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         Warns: SlowStepWarning with the cause if 1/60 s takes more than 500 substeps; TooSoftWarning for
         bodies
             that collapse under their weight.
-        Raises: StateError without bodies or for a second call; OptionError for a body that starts inside a
-            collider, or if 1/60 s takes more substeps than `max_substeps`.
+        Raises: StateError in a world without bodies and for a second call; OptionError for a body that starts
+            inside a collider, or if 1/60 s takes more substeps than `max_substeps`.
         """
         if self.is_built:
             raise StateError("the world is already built")
@@ -218,18 +221,18 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     def stable_substeps(self, dt: float) -> int:
         """Number of substeps that a fixed step of `dt` [s] needs for the stiffest asset, with a margin.
 
-        It includes all assets with slots, even empty ones, so that spawning changes neither the time of a
-        frame nor the motion of other bodies. After a cut or a change of material, the stable step of that
-        body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with `damping`); give
-        `substeps` to avoid this. For implicit Euler it is 1, or with `soft_contact` the number of substeps
-        of at most 1/240 s.
+        The number considers all assets with slots, even empty slots, so that spawning changes neither the
+        time of a frame nor the motion of other bodies. After a cut or a change of material, the stable step
+        of that body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with
+        `damping`); give `substeps` to avoid this. For implicit Euler the number is 1, or with `soft_contact`
+        the number of substeps of at most 1/240 s.
         Args:
             dt: length of the fixed step [s], above 0.
         """
         return self._context.substeps.stable_count(dt)
 
     def step(self, dt: float, substeps: int | None = None) -> None:
-        """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
+        """Make one fixed step of `dt` [s].
 
         If a body becomes non-finite, the step is retried for it and the bodies that it may touch, with up to
         eight times the substeps (`World(retries=3)`). If that fails, the body is frozen in its state before
@@ -242,13 +245,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
             asset; SlowStepWarning as `build`, once per world; SolverWarning for inexact solves of implicit
             Euler, and once for a body with inverted tetrahedra for 120 steps.
-        Raises: OptionError if dt is not a positive number or substeps is not a positive integer, or for more
-            than `max_substeps`; StateError before `build`.
+        Raises: OptionError if dt is not a positive number, substeps is not a positive integer, or more than
+            `max_substeps` are needed; StateError before `build`.
         Example:
             world.step(1 / 60)  # the stable number of substeps
             world.step(1 / 60, substeps=10)  # the same cost in every frame
         """
-        simulation = self._context.fields or self._built  # raises
+        simulation = self._context.fields or self._built  # raises an error before `build`
         seconds, count, h = self._context.substeps.choose(dt, substeps)
         if count > simulation.long_from:
             reports = self._make_long_step(simulation, seconds, count, h)
@@ -267,7 +270,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             simulation.check_solves()
 
     def _push(self) -> None:
-        """Apply the force field to the next step, if there is one."""
+        """Apply the force field, if there is one, to the next step."""
         if self._force_field is not None:
             rows = apply_force_field(self._context, self._force_field)
             if self._recorder is not None:
@@ -286,7 +289,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._recorder.rewind(self._context, data)
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
-        """Make an interruptible step; on Ctrl-C, restore the state before it."""
+        """Make a step that Ctrl-C can interrupt. On Ctrl-C, restore the state before it."""
         before = take_snapshot(self._context)
         try:
             self._push()
@@ -300,10 +303,11 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         """Compile all kernels that a game can call, for example behind a loading screen, to avoid pauses
         later.
 
-        Without it each kind of call compiles at its first use: 0.1 s to 1 s with an empty cache, less in
-        later processes; the first step with contact and the first `Body.watch_stress` take many seconds. A
-        terminal shows the progress. The world's state stays bit-identical. `Body.failure` is not compiled,
-        because it is rarely needed.
+        Without this call, each kind of call compiles kernels at its first use: 0.1 s to 1 s with an empty
+        cache, less in later processes. The first step with contact and the first `Body.watch_stress` take
+        many seconds. A terminal shows the progress. The world's state stays bit-identical. `Body.failure` is
+        not compiled, because it is rarely needed.
+
         Raises: StateError before `build`.
         """
         warm_up(self._context)
@@ -319,8 +323,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
         Args:
             function: (positions float32 (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2], called once
-                per step for each body that is not frozen. They act during the whole step. If it raises or
-                returns an invalid result, `step` raises and makes no step.
+                per step for each body that is not frozen. The accelerations act during the whole step. If the
+                function raises an error or returns an invalid result, `step` raises an error and makes no
+                step.
         Raises: OptionError for an argument that is not callable; StateError with schedule "flat".
         """
         field = require_field(function)
@@ -330,10 +335,10 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
 
 def context_of_world(world: World) -> WorldContext:
-    """Internal context of a world, for other modules of the library."""
+    """Return the internal context of a world, for other modules of the library."""
     return world._context
 
 
 def force_field_of(world: World) -> ForceField | None:
-    """Current force field of a world."""
+    """Return the current force field of a world."""
     return world._force_field

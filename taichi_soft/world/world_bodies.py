@@ -1,4 +1,4 @@
-"""Bodies of a world: add, spawn, remove and read."""
+"""Methods of a world that add, spawn, remove and read bodies."""
 
 from __future__ import annotations
 
@@ -36,11 +36,13 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldBodies(WorldParts):
-    """Methods of a world for its bodies."""
+    """Methods of a world that concern its bodies."""
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """All bodies, by slot; bodies of `add_body` in the order of adding."""
+        """All bodies, in the order of their slots. Bodies of `add_body` are in the order in which they were
+        added.
+        """
         return cast("tuple[Body, ...]", self._context.slots.occupants)
 
     @property
@@ -72,32 +74,33 @@ class WorldBodies(WorldParts):
 
         Bodies with the same mesh, material and options share an asset.
         Args:
-            mesh: rest shape [m], or a `SoftBodyAsset`, which has all options of a kind of body: then give
-                only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
-            material: constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a mesh.
-            law: force law, a key of `LAWS`; None takes "neo_hookean", or the law that the material and the
+            mesh: rest shape [m], or a `SoftBodyAsset`. An asset contains all options of a kind of body: with
+                it, give only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
+            material: material constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a
+                mesh.
+            law: force law, a key of `LAWS`; None uses "neo_hookean", or the law that the material and the
                 options below require.
-            strain: "linear" or "exact", for laws that support both; None takes the default of the law.
-            flips: treatment of inverted tetrahedra: "tolerant", "recover" or "off"; None takes the default of
+            strain: "linear" or "exact", for laws that support both; None uses the default of the law.
+            flips: treatment of inverted tetrahedra: "tolerant", "recover" or "off"; None uses the default of
                 the law.
             damping_model: "edge" damps along edges, "tet_mean" towards the mean of each tetrahedron.
-            position: position of the mesh's origin, (3,) [m]. Built-in shapes have it at their centre, an
-                artist's mesh as in its file.
-            rotation: rotation about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w); None for
-                none.
+            position: position of the mesh's origin, (3,) [m]. The origin of built-in shapes is their centre;
+                the origin of an artist's mesh is that of its file.
+            rotation: rotation about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w); None for no
+                rotation.
             velocity: velocity of all vertices that are not pinned, (3,) [m/s].
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
-            overlap: "part" or "refuse": if bodies touch each other, one that starts inside another is moved
-                apart from it in the first steps, or it is refused.
+            overlap: for a body that starts inside another body, in a world in which bodies touch: "part"
+                moves the two apart in the next steps, "refuse" raises an error.
             pinned: vertices that stay fixed.
-            contact: friction, thickness and groups of its surface.
+            contact: friction, thickness and groups of the body's surface.
             plasticity: permanent deformation; None for none.
             spare_vertices: capacity for the vertices that `Body.cut` adds, about n^(2/3) for a cut through n
                 vertices; 0 for a body that cannot be cut.
-            tearing: tearing by stress, into the spare vertices; None for none.
-        Returns: a handle.
-        Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
+            tearing: tearing by stress, which uses the spare vertices; None for none.
+        Returns: a handle of the body.
+        Raises: MeshError, MaterialError or OptionError for invalid arguments; StateError after `build`.
         Example:
             arena = World(floor=0.0)
             table = arena.add_body(box((2, 1, 0.2), (8, 4, 1)), jelly, on_floor=True)
@@ -127,7 +130,7 @@ class WorldBodies(WorldParts):
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Reserve slots for `count` more bodies of an asset before `build`, for `spawn`.
 
-        Empty slots take memory, and no time in a step.
+        Empty slots take memory, but no time in a step.
         Args:
             asset: kind of body.
             count: number of bodies, 1 or more.
@@ -151,19 +154,21 @@ class WorldBodies(WorldParts):
 
         Args:
             asset: asset with reserved slots, or the `asset` of an added body.
-            position: where the origin of the mesh goes, (3,) [m]. Built-in shapes have it in their centre,
-                an artist's mesh where its file has it.
-            rotation: about the origin of the mesh, matrix (3, 3) or quaternion (x, y, z, w); None for none.
+            position: position of the mesh's origin, (3,) [m]. The origin of built-in shapes is their centre;
+                the origin of an artist's mesh is that of its file.
+            rotation: rotation about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w); None for no
+                rotation.
             velocity: velocity of the centre of mass, (3,) [m/s].
-            angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices are at rest.
+            angular_velocity: angular velocity about the centre of mass, (3,) [rad/s]. Pinned vertices are at
+                rest.
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
-            overlap: "part" or "refuse": if bodies touch each other, one that starts inside another is moved
-                apart from it over the next steps, or it is refused.
+            overlap: for a body that starts inside another body, in a world in which bodies touch: "part"
+                moves the two apart in the next steps, "refuse" raises an error.
         Returns: a new handle.
         Raises: OptionError for a value or a position out of range, a position below the floor, inside a
             collider or, with "refuse", inside another body; StateError for an asset without slots in this
-            world, or without a free one.
+            world, or without a free slot.
         Example:
             shot = world.spawn(ball, position=(-2, 0, 1), velocity=(6, 0, 1))
             world.step(1 / 60)
@@ -183,13 +188,13 @@ class WorldBodies(WorldParts):
 
     @recorded
     def skip_step(self, bodies: Sequence[Body]) -> None:
-        """Skip the next step of bodies, to save time for distant ones.
+        """Make bodies skip the next step, for example distant bodies to save time.
 
-        They keep their velocities and continue in the step after: a body that skips every other step moves at
-        half its speed. Gravity and force fields do not act on a skipping body; impulses take effect in the
-        step after. A body does not skip if a body of its island (see `islands`) makes the step, if it is
-        attached, near a moving collider, pushed by `apply_force`, or has moving targets. Sleeping and frozen
-        bodies are unaffected. Further calls add bodies.
+        The bodies keep their velocities and continue in the step after the next. A body that skips every
+        other step moves at half its speed. Gravity and force fields do not act on a skipping body; impulses
+        take effect when it continues. A body does not skip if a body of its island (see `islands`) makes the
+        step, if it is attached, near a moving collider, pushed by `apply_force`, or has moving targets.
+        Sleeping and frozen bodies do not change. Further calls before the step add bodies.
         Args:
             bodies: bodies of this world.
         Raises: OptionError if `bodies` is not a list of this world's bodies; StateError for a removed body,
@@ -204,35 +209,37 @@ class WorldBodies(WorldParts):
 
     @property
     def islands(self) -> list[tuple[Body, ...]]:
-        """Groups of bodies that came near each other in the last step or are joined, directly or through
-        others.
+        """Islands: groups of bodies that came near each other in the last step or are joined, directly or
+        through others.
 
-        Each body is in one island, by slot. With `soft_contact=False` only joints form islands. A body
-        spawned since the last step forms its own island.
+        Each body is in exactly one island, and islands are sorted by slot. With `soft_contact=False` only
+        joints form islands. A body spawned since the last step is a separate island.
         Raises: StateError before `build`.
         """
         return cast("list[tuple[Body, ...]]", self._built.islands())
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate the largest stable substep of a body; bodies of one asset share it until they are cut.
+        """Estimate the largest stable substep of a body. Bodies of one asset have the same estimate until
+        they are cut.
 
         Args:
             body: body of any world.
-        Raises: OptionError if it is not a body.
+        Raises: OptionError if `body` is not a body.
         """
         if not isinstance(body, Body):
             raise OptionError(f"body must be a body of a world, got {body!r}")
         return self._context.substeps.stable_step(body)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
-        """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
+        """Read the positions of a body, interpolated between the previous step (alpha 0) and the last one
+        (alpha 1), (n, 3) [m].
 
-        The first read after a step copies all bodies at once; further bodies at the same alpha come from
-        that copy, because calling a kernel costs more than copying a thousand vertices.
+        The first call after a step copies the positions of all bodies. Further calls with the same alpha read
+        that copy, because calling a kernel takes longer than copying a thousand vertices.
         Args:
             body: body of this world.
             alpha: interpolation factor, 0 to 1.
-            out: C-contiguous float32 array (n, 3) to fill and return; None makes a new one.
+            out: C-contiguous float32 array (n, 3) to fill and return; None allocates a new one.
         Raises: OptionError for a body of another world, an alpha out of range or an `out` that does not
             fit; StateError before `build`.
         """
@@ -249,16 +256,16 @@ class WorldBodies(WorldParts):
         positions: Floats32 | None = None,
         normals: Floats32 | None = None,
     ) -> tuple[Floats32, Floats32]:
-        """Positions and normals of a render mesh between the previous step (alpha 0) and the last one (alpha
-        1).
+        """Read the positions and normals of a render mesh, interpolated between the previous step (alpha 0)
+        and the last one (alpha 1).
 
-        A normal is the mean of the normals of the triangles around its vertex, weighted by area. So
-        degenerate triangles do not contribute, as in films. If all of them are degenerate, it is (0, 0, 1).
-        One call is one kernel.
+        A normal is the mean of the normals of the triangles around its vertex, weighted by area, so
+        degenerate triangles do not contribute. If all triangles are degenerate, the normal is (0, 0, 1). Each
+        call runs one kernel.
         Args:
-            mesh: render mesh of a body of this world, see `Body.render_mesh`; a body stands for the first of
-                its `render_meshes`.
-            positions, normals: C-contiguous float32 arrays (k, 3) to fill; None makes a new one.
+            mesh: render mesh of a body of this world, see `Body.render_mesh`; or a body, for the first of its
+                `render_meshes`.
+            positions, normals: C-contiguous float32 arrays (k, 3) to fill; None allocates new ones.
             alpha: interpolation factor, 0 to 1.
         Returns: positions [m] and outward unit normals of the render vertices.
         Raises: OptionError for a body of another world, an alpha out of range or a buffer that does not
@@ -280,7 +287,7 @@ class WorldBodies(WorldParts):
 
 
 def _require_defaults(material: AnyMaterial | None, options: dict[str, Any]) -> None:
-    """Raise an OptionError for options that an asset already has."""
+    """Raise an OptionError for options that were given although the asset already contains them."""
     defaults = {field.name: field.default for field in fields(SoftBodyAsset)}
     given = [name for name, value in options.items() if value is not defaults[name]]
     if material is not None or given:

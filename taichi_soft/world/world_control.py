@@ -1,4 +1,4 @@
-"""Control of a whole world: colliders, frames, grabs, motors, gravity, wind."""
+"""Methods of a world for colliders, frames, grabs, motors, gravity and wind."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
 
 SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears, Easings)
-"""Slices in the order in which a snapshot restores them: each after those that it depends on."""
+"""Slices in the order in which a snapshot restores them. Each is after those on which it depends."""
 
 
 class WorldControl(WorldParts):
@@ -64,7 +64,9 @@ class WorldControl(WorldParts):
 
     @property
     def floor_collider(self) -> Collider | None:
-        """Collider of the floor after `build`, in worlds with colliders, for reading impulses on it."""
+        """Collider of the floor after `build`, in worlds with colliders, for example to read impulses
+        on it.
+        """
         return self._context.floor_collider
 
     @recorded
@@ -80,22 +82,23 @@ class WorldControl(WorldParts):
         group: int = 1,
         mask: int = ALL_GROUPS,
     ) -> Collider:
-        """Add a collider. After `build` there is room for `World(collider_room=15)` more, and for
-        `sample_room` samples of height fields and meshes.
+        """Add a collider, which the vertices of bodies collide with.
 
-        The vertices of bodies collide with it; a shape smaller than a body's triangles can slip between them.
+        A shape smaller than the triangles of a body can slip between its vertices. After `build` there is
+        room for `World(collider_room=15)` more colliders, with `sample_room` samples of height fields and
+        meshes.
         Args:
             shape: `PlaneShape`, `SphereShape`, `BoxShape`, `CapsuleShape`, `HeightFieldShape` or `MeshShape`.
-            position: position of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+            position: position of the collider's origin, (3,) [m].
+            rotation: rotation of the collider, matrix (3, 3) or quaternion (x, y, z, w).
             friction: Coulomb coefficient, 0 or more.
-            restitution: 0 to 1: ratio of the speeds of a body's centre of mass after and before the impact,
-                for impacts faster than 0.5 m/s, limited by the body's own elasticity. None applies only that
+            restitution: speed of a body's centre of mass after an impact over its speed before, 0 to 1, for
+                impacts faster than 0.5 m/s. The elasticity of the body limits it; None applies only that
                 elasticity.
             thickness: distance outside the shape at which contact begins [m].
-            group, mask: bits. A body and a collider collide if the mask of each has a bit of the other's
-                group.
-        Returns: a handle, to move it and to read the impulse on it.
+            group, mask: groups as bits. A body and a collider collide if the mask of each contains a bit of
+                the other's group.
+        Returns: a handle, to move the collider and to read the impulse on it.
         Raises: OptionError for invalid values; StateError if there is no room left.
         Example:
             lift = world.add_collider(BoxShape((1, 1, 0.1)), position=(3, 0, 0.2))
@@ -123,8 +126,8 @@ class WorldControl(WorldParts):
         """Add a frame: a pose that the game moves and bodies can be attached to. Allowed at any time.
 
         Args:
-            position: position of its origin, (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+            position: position of the frame's origin, (3,) [m].
+            rotation: rotation of the frame, matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError for invalid numbers.
         Example:
             hand = world.add_frame(position=(0, 0, 0.5))
@@ -147,15 +150,15 @@ class WorldControl(WorldParts):
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab | None:
-        """Grab the first body that a ray hits: `raycast`, then `Body.grab`.
+        """Grab the first body that a ray hits, as `raycast` and `Body.grab` do.
 
-        Colliders do not stop the ray: use `max_distance` if your level blocks the view.
+        Colliders do not stop the ray. If your level blocks the view, limit the ray with `max_distance`.
 
         Args:
             origin, direction, max_distance, bodies: see `raycast`.
             frequency: frequency of the critically damped spring [Hz].
             max_force: largest force [N]; None is ten times the body's weight on Earth.
-        Returns: a handle to move and release it, or None if the ray hits nothing.
+        Returns: a handle to move and release the grab, or None if the ray hits nothing.
         Raises: OptionError for numbers out of range or a body of another world; StateError before `build`,
             with schedule "flat", or if all grabs are in use.
         Example:
@@ -186,19 +189,21 @@ class WorldControl(WorldParts):
         is_fixed: bool = False,
         point: ArrayLike | None = None,
     ) -> Motor:
-        """Rotate a part of a body about an axis, or push it along one, towards a speed, until `Motor.remove`.
+        """Add a motor, which rotates a part of a body about an axis, or pushes it along the axis, up to a
+        target speed.
 
-        The particles are accelerated as a rigid part; the rest of the body follows by its elasticity. The
-        torque or force is external, as from a shaft in the level: no other body receives a reaction. The
-        motor does not hold the body on the axis. With implicit Euler, elastic forces act after the motor, so
-        heavily loaded particles stay below the speed; more substeps help.
+        The motor accelerates the particles as a rigid part; the rest of the body follows by its elasticity.
+        The torque or force is external, as from a shaft in the level: no other body receives a reaction. The
+        motor does not keep the body on the axis. With implicit Euler, elastic forces act after the motor, so
+        heavily loaded particles stay below the target speed; more substeps reduce the difference.
         Args:
             body: body of this world.
-            particles: vertices to drive; pinned ones stay fixed.
+            particles: vertices to drive. Pinned vertices stay fixed.
             axis: direction (3,), of any nonzero length, for the current pose of the body.
-            speed: target speed, right-handed about the axis [rad/s] or along it [m/s]. 0 brakes.
-            max_torque: give this to rotate: largest torque about the axis [N m].
-            max_force: give this to push: largest force along the axis [N].
+            speed: target speed, right-handed about the axis [rad/s] or along it [m/s]. 0 brakes the
+                particles.
+            max_torque: largest torque about the axis [N m]. Give this to rotate the particles.
+            max_force: largest force along the axis [N]. Give this to push the particles.
             is_fixed: False rotates the axis with the particles, as for a wheel or a rocket. True fixes its
                 direction in space, as for a mill or for steering.
             point: point of a fixed axis, (3,) [m], with `is_fixed` and `max_torque`. By default the axis
@@ -217,37 +222,36 @@ class WorldControl(WorldParts):
         """Push all bodies away from a point: an explosion.
 
         A particle of mass m at the distance r receives impulse m/M (1 - (r/radius)^2)^2, where M is the mass
-        of its body: a light body is thrown farther than a heavy one, and only the part of a body within the
-        radius is pushed.
+        of its body: a light body is thrown farther than a heavy one, and the impulse acts only on the part of
+        a body within the radius.
         Args:
-            center: centre, (3,) [m].
+            center: centre of the explosion, (3,) [m].
             impulse: impulse on a small body near the centre [N s]; a negative one pulls.
-            radius: distance beyond which nothing is pushed [m].
+            radius: range of the impulse [m].
         Raises: OptionError for a number out of range; StateError before `build`.
         """
         apply_radial_impulse(self._context, center, impulse, radius)
 
     @recorded
     def set_gravity(self, gravity: ArrayLike) -> None:
-        """Change gravity from the next step on, and wake all bodies. It can be called before `build`.
+        """Change gravity from the next step on, and wake all bodies. Can also be called before `build`.
 
-        Leapfrog's velocities lag by half a substep, for which the new gravity applies too. There is no
-        warning for bodies that are too soft for their new weight.
+        With leapfrog, velocities lag by half a substep, and the new gravity also applies to that half. Bodies
+        that are too soft for their new weight cause no warning.
         Args:
-            gravity: (3,) [m/s^2].
+            gravity: acceleration of gravity, (3,) [m/s^2].
         Raises: OptionError for numbers out of range.
         """
         set_gravity(self._context, gravity)
 
     @recorded
     def set_friction(self, friction: float) -> None:
-        """Change the floor's Coulomb coefficient from the next step on, and wake all bodies. It can be called
-        before `build`.
+        """Change the floor's Coulomb coefficient from the next step on, and wake all bodies.
 
-        It does not affect other colliders and contact between bodies: see `Collider.set_friction` and
-        `Body.set_friction`.
+        Can also be called before `build`. For other colliders, see `Collider.set_friction`; for contact
+        between bodies, see `Body.set_friction`.
         Args:
-            friction: 0 or more.
+            friction: Coulomb coefficient, 0 or more.
         Raises: OptionError for a number out of range; StateError in a world without a floor.
         """
         floor = self._context.floor_collider
@@ -260,13 +264,14 @@ class WorldControl(WorldParts):
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
         """Set the wind, which acts on the surfaces of all bodies.
 
-        A triangle of area A, with the relative air speed v_n along its normal n, receives the force
-        1/4 density drag A |v_n| v_n n. This is half of the drag of a plate, because a closed body, or a
-        sheet with triangles for each side, has one triangle facing the wind and one facing away. So a box
-        has the drag coefficient `drag` and a sphere half of it. The wind never accelerates a vertex beyond
-        the wind's speed.
+        A triangle of area A, with the relative air speed v_n along its normal n, receives the force 1/4
+        density drag A |v_n| v_n n. This is half of the drag of a plate, because a closed body, or a sheet
+        with triangles for each side, has one triangle facing the wind and one facing away. So the drag
+        coefficient of a box is `drag`, and that of a sphere is half of it. The wind never accelerates a
+        vertex beyond the wind's speed.
         Args:
-            velocity: velocity of the air, (3,) [m/s]; zero is still air, which brakes; None is no air.
+            velocity: velocity of the air, (3,) [m/s]; zero means still air, which brakes bodies; None means
+                no air.
             density: density of the air [kg/m^3].
             drag: drag coefficient of a plate perpendicular to the wind.
         Raises: OptionError for a number out of range; StateError before `build` and with schedule "flat".

@@ -1,4 +1,4 @@
-"""Events of a world."""
+"""Methods of a world for events."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ Happened = TypeVar("Happened", bound=Event)
 
 
 class WorldEvents(WorldParts):
-    """Methods of a world for events."""
+    """Methods of a world that record and return events."""
 
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
-        """Record only events of these kinds from the next step on, for `drain_events`.
+        """Record only events of these kinds for `drain_events`, from the next step on.
 
-        Existing contacts count as beginning in that step. `StressExceeded` and `TearCandidates` are sent
-        only for bodies on which you called `Body.watch_stress` or `Body.watch_tearing`.
+        Contacts that already exist are reported as beginning in that step. `StressExceeded` and
+        `TearCandidates` are sent only for bodies on which you called `Body.watch_stress` or
+        `Body.watch_tearing`.
         Args:
-            kinds: classes of events; `Event` means all that this world supports, an empty list none.
+            kinds: classes of events; `Event` means all kinds that this world supports; an empty list means
+                none.
         Raises: OptionError for a class that is not an event; StateError before `build`, and for contacts in a
             world without colliders and soft contact.
         """
         self._built.events.record(kinds)
 
     def on(self, kind: type[Happened], function: Callable[[Happened], object]) -> Listener:
-        """Call a function for all events of a kind, and record that kind.
+        """Call a function for each event of a kind, and record that kind.
 
-        `drain_events` calls it, never inside a step, so it can make any call that is allowed between steps.
-        `StressExceeded` and `TearCandidates` are sent only for bodies on which you called
-        `Body.watch_stress` or `Body.watch_tearing`.
+        `drain_events` calls the function, never during a step, so the function can make any call that is
+        allowed between steps. `StressExceeded` and `TearCandidates` are sent only for bodies on which you
+        called `Body.watch_stress` or `Body.watch_tearing`.
         Args:
-            kind: a class of events; `Event` means all that this world supports.
-            function: called with the event.
-        Returns: a listener, whose `remove` ends it.
+            kind: a class of events; `Event` means all kinds that this world supports.
+            function: function that is called with each event.
+        Returns: a listener. Call its `remove` to end it.
         Raises: as `record_events`; OptionError for a function that is not callable.
         Example:
             listener = world.on(ContactBegan, lambda event: print(event.a, "touches", event.b))
@@ -48,17 +50,19 @@ class WorldEvents(WorldParts):
     def drain_events(self) -> list[Event]:
         """Call the listeners, and return all events since the last call.
 
-        They are sorted by step; within a step by kind (released before it, contacts begun and ended, stress,
-        tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. Up to 10,000 events
-        wait; then the oldest are dropped, with a `DroppedEventsWarning` in the step.
+        Events are sorted by step; within a step by kind (released before the step, contacts begun and ended,
+        stress, tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. Up to
+        10,000 events can wait; beyond that, the oldest are dropped, with a `DroppedEventsWarning` in the
+        step.
 
-        If a listener raises, the others are still called, and the first exception is raised at the end. The
-        next call then returns these events together with new ones, and calls no listener twice for an event.
-        Raises: StateError before `build`, before anything is recorded, and inside a listener.
+        If a listener raises an exception, the other listeners are still called, and the first exception is
+        raised at the end. The next call then returns the same events together with new ones, and calls no
+        listener twice for an event.
+        Raises: StateError before `build`, before any kind is recorded, and inside a listener.
         """
         return self._built.events.drain()
 
     @property
     def dropped_events(self) -> int:
-        """Total number of events dropped because too many waited."""
+        """Total number of events that were dropped because too many were waiting."""
         return self._built.events.dropped

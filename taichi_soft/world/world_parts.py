@@ -1,4 +1,4 @@
-"""Base of all parts of `World`."""
+"""Base class of all parts of `World`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from taichi_soft.solver.simulation import Simulation
 
 
 class WorldParts(Handle):
-    """Base class of the mixins of `World`."""
+    """Base class of the classes from which `World` inherits."""
 
     _context: WorldContext
     _recorder: Recorder | None
@@ -17,5 +17,5 @@ class WorldParts(Handle):
 
     @property
     def _built(self) -> Simulation:
-        """The simulation. Raises: StateError before `build`."""
+        """The simulation of the built world. Raises: StateError before `build`."""
         return self._context.built

@@ -1,4 +1,4 @@
-"""Queries of a world: raycasts, closest points, overlaps."""
+"""Methods of a world for raycasts, closest points and overlaps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldQueries(WorldParts):
-    """Methods of a world for queries."""
+    """Methods of a world that search its surfaces."""
 
     def raycast(
         self,
@@ -39,11 +39,11 @@ class WorldQueries(WorldParts):
         Bodies without triangles, such as ropes, cannot be hit. Between equally near triangles, the first one
         of the first body wins. All queries include frozen bodies.
         Args:
-            origin: (3,) [m].
-            direction: (3,), of any nonzero length.
+            origin: start of the ray, (3,) [m].
+            direction: direction of the ray, (3,), of any nonzero length.
             max_distance: largest distance of a hit [m]; infinity for no limit.
             bodies: bodies to test; None for all.
-            cull_back: ignore back faces, so that a ray from inside a body leaves it.
+            cull_back: True ignores back faces, so that a ray from inside a body leaves it.
         Returns: the hit, or None.
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
@@ -67,8 +67,8 @@ class WorldQueries(WorldParts):
         """Find the first hits of many rays in one call, on all threads.
 
         Args:
-            origins, directions: (n, 3) each.
-            max_distance, bodies, cull_back: see `raycast`; for all rays.
+            origins, directions: starts [m] and directions of the rays, (n, 3) each.
+            max_distance, bodies, cull_back: as in `raycast`, for all rays.
         Returns: arrays with one row per ray, with the results of `raycast`.
         Raises: as `raycast`.
         """
@@ -78,11 +78,11 @@ class WorldQueries(WorldParts):
     def closest_point(
         self, point: ArrayLike, *, max_distance: float = math.inf, bodies: Iterable[Body] | None = None
     ) -> ClosestPoint | None:
-        """Find the closest point of all surfaces to `point`, from outside or inside.
+        """Find the point of all surfaces that is closest to `point`, from outside or inside.
 
-        For a body without triangles (a rope) the closest vertex counts.
+        For a body without triangles, such as a rope, this is the closest vertex.
         Args:
-            point: (3,) [m].
+            point: point to search from, (3,) [m].
             max_distance: largest distance [m]; infinity for no limit.
             bodies: bodies to test; None for all.
         Returns: the closest point, or None if none is in range.
@@ -94,13 +94,14 @@ class WorldQueries(WorldParts):
     def overlap_sphere(
         self, center: ArrayLike, radius: float, *, bodies: Iterable[Body] | None = None
     ) -> tuple[Overlap, ...]:
-        """Find the bodies that touch or enclose a sphere; for a body without triangles its vertices count.
+        """Find the bodies that touch or enclose a sphere.
 
+        Of a body without triangles, only the vertices are tested.
         Args:
-            center: (3,) [m].
-            radius: above 0 [m].
+            center: centre of the sphere, (3,) [m].
+            radius: radius of the sphere [m], above 0.
             bodies: bodies to test; None for all.
-        Returns: the bodies, in the world's order, each with its vertices in the sphere.
+        Returns: the bodies, in the world's order, each with its vertices that are inside the sphere.
         Raises: OptionError for numbers that are not finite, a radius not above 0 or a body of another world;
             StateError before `build`.
         """
@@ -114,14 +115,15 @@ class WorldQueries(WorldParts):
         *,
         bodies: Iterable[Body] | None = None,
     ) -> tuple[Overlap, ...]:
-        """Find the bodies that touch or enclose a box; for a body without triangles its vertices count.
+        """Find the bodies that touch or enclose a box.
 
+        Of a body without triangles, only the vertices are tested.
         Args:
-            center: (3,) [m].
-            size: (3,) lengths of its edges, above 0 [m].
-            rotation: about its centre, matrix (3, 3) or quaternion (x, y, z, w).
+            center: centre of the box, (3,) [m].
+            size: lengths of the edges of the box, (3,) [m], above 0.
+            rotation: rotation about the centre, matrix (3, 3) or quaternion (x, y, z, w).
             bodies: bodies to test; None for all.
-        Returns: the bodies, in the world's order, each with its vertices in the box.
+        Returns: the bodies, in the world's order, each with its vertices that are inside the box.
         Raises: OptionError for numbers that are not finite, a size not above 0, an invalid rotation or a body
             of another world; StateError before `build`.
         """

@@ -1,4 +1,4 @@
-"""Snapshots, hashes and recordings of a world."""
+"""Methods of a world for snapshots, hashes and recordings."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldStates(WorldParts):
-    """Methods of a world for its state."""
+    """Methods of a world that save, restore and compare states."""
 
     def snapshot(self) -> bytes:
         """Return the complete state between two steps, for `restore` in this world or an identical one.
 
-        It contains bodies, colliders, frames, grabs, attachments and joints, gravity, wind, changed
-        materials and frictions, all forces of the next step, and running contacts of recorded events; but no
-        force field. It contains only numbers, no code. The first call compiles, for a few seconds at most.
+        The snapshot contains bodies, colliders, frames, grabs, attachments and joints, gravity, wind, changed
+        materials and frictions, all forces of the next step, and current contacts if their events are
+        recorded, but no force field. It contains no code. The first call compiles kernels for a few seconds
+        at most.
         Raises: StateError before `build`.
         Example:
             before = world.snapshot()  # bytes: keep them in a file, or send them
@@ -30,13 +31,14 @@ class WorldStates(WorldParts):
         return data
 
     def restore(self, data: bytes) -> None:
-        """Restore a state of `snapshot`. With the same calls, the following steps are bit-identical.
+        """Restore a state that `snapshot` returned. After the same calls, the following steps are
+        bit-identical.
 
         Handles of objects in the state stay valid, or become valid again; other handles become invalid, as
         after a removal. `bodies` and `colliders` provide new handles for objects that have none. The force
-        field and listeners do not change. Watched stress is restored, and bodies that are watched only now
-        stay watched. Waiting events of undone steps are dropped; repeating the steps records them again, even
-        those that were drained before.
+        field and listeners do not change. The bodies whose stress is watched are restored, and bodies watched
+        only now stay watched. Waiting events of undone steps are dropped. Repeating the steps records these
+        events again, even those that were drained before.
         Args:
             data: result of `snapshot`, from this world or one that was built the same way.
         Raises: SnapshotError for damaged data, or for a world that was built differently, with the first
@@ -49,35 +51,37 @@ class WorldStates(WorldParts):
 
     @property
     def restore_count(self) -> int:
-        """Number of `restore` calls, for detecting that stored earlier states belong to another history."""
+        """Number of `restore` calls. If it has changed, earlier stored states belong to another history."""
         return self._restore_count
 
     def state_hash(self) -> str:
-        """Hash of the state, 16 hexadecimal digits, equal in two synchronised worlds.
+        """Return a hash of the state, 16 hexadecimal digits. Two synchronised worlds have the same hash.
 
-        It covers step count, gravity, positions, velocities, pins, the status of bodies, colliders, frames,
-        grabs and joints, and does not depend on the number of threads.
+        The hash covers step count, gravity, positions, velocities, pins, the status of bodies, colliders,
+        frames, grabs and joints. It does not depend on the number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self._context)
 
     def bodies_hash(self) -> str:
-        """Hash of the state of all bodies, 16 hexadecimal digits: the same as in the exported world.
+        """Return a hash of the state of all bodies, 16 hexadecimal digits. The exported world has the same
+        hash.
 
-        There it is `ts_world_hash` in C and `world.hash()` in JavaScript. It covers positions, velocities,
-        pins, and the status of bodies. `state_hash`, which exported worlds do not have, also covers step
-        count, gravity, colliders, frames, grabs and joints.
+        In an exported world, call `ts_world_hash` in C and `world.hash()` in JavaScript. The hash covers
+        positions, velocities, pins, and the status of bodies. `state_hash`, which exported worlds do not
+        have, also covers step count, gravity, colliders, frames, grabs and joints.
         Raises: StateError before `build`.
         """
         return bodies_hash(self._context)
 
     def save_recording(self, path: str | Path) -> Path:
-        """Write the calls of at least the last `record` steps, and the snapshot before them, to a file.
+        """Write a recording of at least the last `record` steps to a file: the snapshot before them, and all
+        calls.
 
-        It excludes steps that `restore` has undone. After a `restore` of a state that is not stored here, the
-        recording starts again from that state.
-        `taichi-soft replay FILE` replays it anywhere, bit by bit on the same kind of machine. The file also
-        contains the assets and shapes, and the accelerations of a force field, but no code.
+        The recording excludes steps that `restore` has undone. After a `restore` of a state that the recorder
+        does not store, the recording starts again from that state. `taichi-soft replay FILE` replays it on
+        any machine, bit by bit on the same kind of machine. The file also contains the assets and shapes, and
+        the accelerations of a force field, but no code.
         Args:
             path: path of the file.
         Returns: the path.

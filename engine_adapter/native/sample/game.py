@@ -1,4 +1,6 @@
-"""World of the sample: balls fall onto a lift. `taichi-soft export game.py --out game.softworld`"""
+"""World of the sample: balls fall onto a lift. Export it with `taichi-soft export game.py --out
+game.softworld`.
+"""
 
 from taichi_soft import BoxShape, Material, SoftBodyAsset, World, sphere
 

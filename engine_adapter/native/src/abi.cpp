@@ -55,7 +55,7 @@ ts_result guarded(Function function) noexcept {
 #endif
 }
 
-// Lists valid names, as many as fit into an error's text.
+// Lists valid names, as many as fit into the text of an error.
 std::string choice(const std::vector<std::string>& names) {
   if (names.empty()) return "the world file has none of that kind";
   std::string found = "give one of ";
@@ -79,12 +79,12 @@ class Turn {
   const Axes& axes() const { return world_->scene().axes; }
 
  private:
-  Kept<World> world_;  // declared before the lock, which is released first
+  Kept<World> world_;  // declared before the lock, so that the lock is released first
   Attempt lock_;
 };
 
-// The steps of one frame. Between steps the world is unlocked for the same thread only, whose callback can move
-// colliders. If a step fails, the time of the remaining steps is dropped.
+// Makes the steps of one frame. Between steps, the world is unlocked for the same thread only, whose callback can
+// move colliders. If a step fails, the time of the remaining steps is dropped.
 class Frame {
  public:
   Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
@@ -147,7 +147,7 @@ Vector place(const Turn& world, const double* host, const char* name) {
   return found;
 }
 
-// Converts a velocity or an impulse, which have the axes and the unit of positions.
+// Converts a velocity or an impulse. Both have the axes and the unit of positions.
 Vector vector(const Turn& world, const double* host, const char* name) {
   const Vector found = world.axes().place_in(finite(host, 3, name));
   for (double each : found) {
@@ -172,7 +172,7 @@ Quaternion rotation(const Turn& world, const double* host, const char* name) {
 
 Pose pose(const Turn& world, const ts_pose* host) {
   given(host, "pose");
-  // The same conversion as in Python, which accepts matrices too.
+  // The same conversion as in Python, which also accepts matrices.
   const Quaternion turn = quaternion_of(matrix_of(rotation(world, host->rotation, "rotation")));
   return {place(world, host->position, "position"), turn};
 }
@@ -189,7 +189,7 @@ double length(const Turn& world, double host, double least, const char* name) {
   return found;
 }
 
-// Fills in a collider's shape, the same as taichi_soft/contact/shapes.
+// Fills in the shape of a collider, in the same way as taichi_soft/contact/shapes.
 void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   constexpr double kShortest = 1e-6;
   Vector half = {0.0, 0.0, 0.0};
@@ -236,7 +236,7 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->mask = shape.mask;
 }
 
-// A rotating motor has rad/s and a torque, a pushing motor has length/s and a force.
+// A rotating motor has a speed in rad/s and a torque; a pushing motor has a speed in length/s and a force.
 double motor_speed_in(const Turn& world, bool turns, double host) {
   return turns ? host : world.axes().length_in(host);
 }
@@ -454,7 +454,7 @@ ts_result ts_world_create(ts_scene scene, ts_world* world) {
 
 ts_result ts_world_destroy(ts_world world) {
   return guarded([&] {
-    const Turn turn(world);  // not while another thread is in a call
+    const Turn turn(world);  // wait until no other thread is in a call
     worlds().remove(world);
   });
 }

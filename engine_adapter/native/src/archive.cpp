@@ -35,7 +35,7 @@ constexpr uint32_t kType<double> = 5;
 
 size_t filled_up(size_t size) { return (size + 7) / 8 * 8; }
 
-// Reads numbers in sequence, and fails at the end of the bytes.
+// Reads numbers in sequence. Reading beyond the end of the bytes fails.
 class Reader {
  public:
   Reader(const char* begin, size_t size) : at_(begin), left_(size) {}

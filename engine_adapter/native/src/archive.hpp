@@ -1,4 +1,4 @@
-// Named arrays in one file: see taichi_soft/export/archive.py, which writes them.
+// Named arrays in one file. taichi_soft/export/archive.py writes such files.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,13 @@
 namespace taichi_soft {
 
 std::vector<char> read_file(const std::string& path);
-uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32 (IEEE 802.3), continued from `before`
+uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32 (IEEE 802.3), continues `before`
 
 class Archive {
  public:
   Archive(std::vector<char> bytes, const std::string& name);  // the name is for error messages
 
-  // Numbers of an array, valid while the archive exists. Fails if there is no array of that type.
+  // Numbers of an array, valid while the archive exists. Fails if there is no array with this name and type.
   template <typename Number>
   struct View {
     const Number* data;
@@ -28,7 +28,7 @@ class Archive {
 
   template <typename Number>
   View<Number> get(const std::string& name) const;
-  // The same, and fails unless each row has `width` numbers.
+  // Numbers of an array. Also fails unless each row has `width` numbers.
   template <typename Number>
   View<Number> rows(const std::string& name, size_t width) const;
   std::vector<std::string> texts(const std::string& name) const;

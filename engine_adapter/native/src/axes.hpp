@@ -1,4 +1,4 @@
-// Converts between the engine's axes and unit of length and ours: z up, right-handed, metres.
+// Converts between the engine's axes and unit of length and those of this library: z up, right-handed, metres.
 #pragma once
 
 #include "rotations.hpp"
@@ -7,14 +7,14 @@ namespace taichi_soft {
 
 class Axes {
  public:
-  // Rows of the matrix from our positions to the engine's: each has one nonzero number, all of equal size.
+  // Rows of the matrix from this library's positions to the engine's. Each row has one nonzero number, all of equal size.
   explicit Axes(const double* rows);
 
   Vector place_in(const double* host) const { return in(host, 1.0 / scale_); }
   void place_out(const Vector& ours, double* host) const { out(ours, scale_, host); }
   void normal_out(const Vector& ours, double* host) const { out(ours, 1.0, host); }
   Vector normal_in(const double* host) const { return in(host, 1.0); }
-  // Converts axial vectors: angular velocities, and moments (in the engine's unit squared).
+  // Converts axial vectors: angular velocities, and moments (with the square of the engine's unit).
   Vector turn_in(const double* host) const { return in(host, handedness_); }
   void moment_out(const Vector& ours, double* host) const { out(ours, handedness_ * scale_ * scale_, host); }
   Quaternion rotation_in(const double* host) const {
@@ -28,7 +28,7 @@ class Axes {
   double length_in(double host) const { return host / scale_; }
   double scale() const { return scale_; }
   bool are_left_handed() const { return handedness_ < 0; }
-  // Converts positions or normals from our rows of 3 numbers to the engine's; both can be the same memory.
+  // Converts positions or normals from this library's rows of 3 numbers to the engine's. Both can be the same memory.
   void rows_out(const float* ours, size_t count, bool are_places, float* host) const;
   void rows_in(const float* host, size_t count, float* ours) const;
 
@@ -42,7 +42,7 @@ class Axes {
     for (int i = 0; i < 3; ++i) host[i] = sign_[i] * ours[from_[i]] * factor;
   }
 
-  int from_[3];  // our axis for each axis of the engine
+  int from_[3];  // the library's axis for each axis of the engine
   double sign_[3];
   double scale_;
   double handedness_;  // -1 if the engine's axes are left-handed

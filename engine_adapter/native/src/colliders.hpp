@@ -26,17 +26,17 @@ struct Collider {
   Pose pose;
   Vector velocity, spin;
   bool has_target;
-  Pose target;   // at the end of the next step
-  Box bounds;    // in its own frame
-  double skin;   // thickness, plus the margin for edges
-  int32_t kind;  // as in taichi_soft/contact/distances/shape_kind.py
+  Pose target;   // pose at the end of the next step
+  Box bounds;    // bounding box in the frame of the shape
+  double skin;   // thickness, and an additional margin for edges
+  int32_t kind;  // number from taichi_soft/contact/distances/shape_kind.py
   float parameters[8];
-  double friction, restitution;  // a restitution of -1 uses that of the bodies
+  double friction, restitution;  // restitution -1: elasticity of the bodies
   int32_t group, mask;
-  uint32_t serial;  // differs for each collider in the row
+  uint32_t serial;  // different for each collider that uses the row
 
   bool moves() const;
-  // Box around its path during `dt` [s], and its highest speed [m/s].
+  // Box around the collider's path during `dt` [s], and its highest speed [m/s].
   Box way(double dt, double* fastest) const;
 };
 
@@ -49,15 +49,15 @@ class Colliders {
   Colliders() = default;
   explicit Colliders(const Archive& archive);
 
-  // Fills `motion` and returns true if the pose or motion of any collider may differ from the previous step.
+  // Fills `motion`. Returns: true if the pose or motion of any collider may differ from the previous step.
   bool prepare(double dt, std::vector<ColliderMotion>* motion);
   void finish(double dt);
 
-  int32_t free_row() const;  // for a new collider; can be one after the last row
+  int32_t free_row() const;  // row for a new collider; can be one after the last row
 
   std::vector<Collider> rows;
   double seam = 0.0;     // additional skin of shapes with flat faces [m]
-  bool is_dirty = true;  // true if poses or velocities differ from the fields
+  bool is_dirty = true;  // true if the fields lack new poses or velocities
 };
 
 }  // namespace taichi_soft

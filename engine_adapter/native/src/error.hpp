@@ -1,4 +1,4 @@
-// Errors of a call, which abi.cpp catches and converts to a code and a text.
+// Errors of a call. abi.cpp catches them and converts them to a code and a text.
 #pragma once
 
 #include <cstdarg>
@@ -17,7 +17,7 @@ struct Error : std::runtime_error {
 };
 
 #if defined(__wasm__)
-// WebAssembly has no exceptions here: the host throws its own and restores the stack.
+// In WebAssembly there are no exceptions: the host throws its own exception and restores the stack.
 extern "C" __attribute__((import_module("taichi_soft"), import_name("fail"))) [[noreturn]] void taichi_soft_fail(
     ts_result code, const char* text);
 #endif

@@ -1,4 +1,4 @@
-// Events of steps, identical to those of taichi_soft/events.
+// Events of steps, the same as those of taichi_soft/events.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ using Pair = std::array<int32_t, 3>;  // a slot, the kind of the other object, a
 
 struct Contact {    // current contact
   ts_body a, b;     // b is 0 for a collider
-  uint32_t serial;  // of the collider
+  uint32_t serial;  // serial number of the collider
   int32_t slot, kind, other;
   double began, touched, pause;  // [s]: start of the first step, end of the last one, time since the last impulse
   double impulse[3];
@@ -25,7 +25,7 @@ struct Contact {    // current contact
 
 // Bodies and colliders that exist after a step.
 struct Present {
-  std::vector<ts_body> bodies;      // by slot, 0 if empty
+  std::vector<ts_body> bodies;      // by slot, 0 for an empty slot
   std::vector<uint32_t> colliders;  // serial numbers, 0 for none
 };
 
@@ -39,7 +39,7 @@ class Events {
   static bool looks_for(int32_t kinds) {
     return (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED | TS_FELL_ASLEEP | TS_WOKE)) != 0;
   }
-  // Starts recording from the current state. `status` must be up to date if `looks_for(kinds)`.
+  // Starts to record from the current state. `status` must be up to date if `looks_for(kinds)`.
   void record(int32_t kinds, const Present& present);
   void take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
@@ -47,7 +47,7 @@ class Events {
   size_t drain(ts_event* events, size_t capacity);
   int64_t dropped() const { return dropped_; }
 
-  // State that later events depend on.
+  // State on which later events depend.
   struct Memory {
     int32_t kinds;
     std::vector<int32_t> status;
@@ -55,12 +55,12 @@ class Events {
     std::vector<Contact> contacts;
   };
   Memory memory() const;
-  // The world was restored to a step count: drops waiting events of later steps.
+  // Drops waiting events after a step count, because the world was restored to it.
   void recall(const Memory& memory, int64_t steps, const Present& present);
   size_t contact_count() const { return (kinds_ & kContacts) != 0 ? going_on_.size() : 0; }
 
-  std::vector<int32_t> status;  // by slot after the last step, and two numbers: see `read_touches`
-  size_t touch_rows = 0;        // largest number of touching pairs in a step
+  std::vector<int32_t> status;  // by slot, after the last step, then two numbers: see `read_touches`
+  size_t touch_rows = 0;        // largest number of touching pairs in any step
 
  private:
   static constexpr int32_t kContacts = TS_CONTACT_BEGAN | TS_CONTACT_ENDED, kSleep = TS_FELL_ASLEEP | TS_WOKE;
@@ -73,7 +73,7 @@ class Events {
   double pause_ = 0.0;
   size_t most_ = 0;
   std::map<Pair, Contact> going_on_;
-  std::vector<ts_body> sleepers_;  // by slot, 0 if no body sleeps there
+  std::vector<ts_body> sleepers_;  // by slot, 0 if no sleeping body occupies it
   std::deque<ts_event> waiting_;
   int64_t dropped_ = 0;
 };

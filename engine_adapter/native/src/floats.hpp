@@ -1,4 +1,4 @@
-// Calls follow IEEE 754, including subnormal numbers, for any floating-point mode of the game's threads.
+// Makes calls follow IEEE 754, including subnormal numbers, in any floating-point mode of the game's threads.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace taichi_soft {
 
-// CPU register with the rounding mode and flush-to-zero.
+// CPU register that contains the rounding mode and flush-to-zero.
 #if defined(__x86_64__) || defined(_M_X64)
 constexpr uint64_t kUsualFloats = 0x1F80;
 inline uint64_t float_control() { return _mm_getcsr(); }
@@ -22,7 +22,7 @@ inline uint64_t float_control() {
 }
 inline void set_float_control(uint64_t control) { asm volatile("msr fpcr, %0" : : "r"(control)); }
 #else
-constexpr uint64_t kUsualFloats = 0;  // other CPUs have no known register
+constexpr uint64_t kUsualFloats = 0;  // the register of other CPUs is unknown
 inline uint64_t float_control() { return 0; }
 inline void set_float_control(uint64_t) {}
 #endif

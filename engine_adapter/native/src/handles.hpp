@@ -1,4 +1,4 @@
-// Maps handles to objects. Handles are numbers, because a dangling pointer could not be detected.
+// Maps handles to objects. Handles are numbers, because dangling pointers cannot be detected.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace taichi_soft {
 
-// Reference to an object during a call. In WebAssembly a refused call runs no destructors, so this is a raw pointer,
-// which is safe with a single thread.
+// Reference to an object during a call. In WebAssembly a refused call runs no destructors, so there this is a raw
+// pointer, which is safe because there is only one thread.
 #if defined(__wasm__)
 template <typename Thing>
 using Kept = Thing*;
@@ -23,7 +23,7 @@ using Kept = std::shared_ptr<Thing>;
 template <typename Thing>
 class Handles {
  public:
-  // Each kind of object has its own number, so that kinds cannot be confused.
+  // Each kind of object has its own number, so that handles of different kinds differ.
   Handles(const char* name, uint64_t kind) : name_(name), kind_(kind << 56) {}
 
   uint64_t add(std::shared_ptr<Thing> thing) {
@@ -50,7 +50,7 @@ class Handles {
     return row_of(handle).thing;
   }
 
-  // Removes a handle; running calls keep the object until they end.
+  // Removes a handle. Running calls keep the object until they end.
   std::shared_ptr<Thing> remove(uint64_t handle) {
     const Guard lock(mutex_);
     return std::move(row_of(handle).thing);

@@ -1,4 +1,4 @@
-// Loads and calls the machine code of a world from `taichi-soft export`: from a file, or linked into the game.
+// Loads and calls the machine code that `taichi-soft export` wrote for a world, from a file or linked into the game.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@ namespace taichi_soft {
 
 struct Runtime;
 
-// Memory layout of Taichi 1.7, which the kernels' code relies on.
+// Memory layout of Taichi 1.7, on which the code of kernels relies.
 struct Context {
-  void* arguments;  // struct of the arguments, in order
+  void* arguments;  // struct of the kernel's arguments, in order
   Runtime* runtime;
   int32_t thread;
   int64_t* result;
@@ -29,13 +29,13 @@ struct Runtime {
   } chunks[2];
   void* functions[4];
   void* unused;
-  char* roots[512];  // roots of field layouts; a world file has one
+  char* roots[512];  // roots of field layouts; a world file has one root
   int64_t root_sizes[512];
   void* pool;
-  // Runs tasks 0 to count - 1 on any threads, started in this order. Taichi's number of threads is ignored.
+  // Runs tasks 0 to count - 1 on any threads, and starts them in this order. Taichi's number of threads is ignored.
   void (*parallel_for)(void* pool, int32_t count, int32_t threads, void* closure, Task task);
   void* lists[3][1024];
-  char* temporaries;  // values passed between parts of a kernel
+  char* temporaries;  // values that one part of a kernel passes to the next
   void* rest[512];
 };
 
@@ -43,8 +43,8 @@ class Kernels {
  public:
   using Kernel = void (*)(Context* context);
 
-  // Loads the file for this platform from a folder. Fails if there is none, or if its length and checksum differ from
-  // those of the exported file.
+  // Loads the file for this platform from a folder. Fails if there is no such file, or if its length or checksum is not
+  // that of the exported file.
   Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums);
   // Uses kernels that are linked into the game.
   explicit Kernels(const ts_linked_kernel* rows) : rows_(rows) {}

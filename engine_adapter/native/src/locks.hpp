@@ -1,4 +1,4 @@
-// Locks between threads; WebAssembly has one thread and needs none.
+// Locks between threads. WebAssembly has only one thread and needs no locks.
 #pragma once
 
 #if !defined(__wasm__)
@@ -16,13 +16,13 @@ class Guard {
   explicit Guard(Mutex&) {}
 };
 
-class Attempt {  // tries to lock
+class Attempt {  // a lock that is taken only if it is free
  public:
   explicit Attempt(Mutex&) {}
   bool has_succeeded() const { return true; }
 };
 
-using ThreadId = int;  // 0 for none
+using ThreadId = int;  // 0 means no thread
 inline ThreadId this_thread() { return 1; }
 #else
 using Mutex = std::mutex;

@@ -1,4 +1,4 @@
-// Memory of one world, and calls of its kernels.
+// The memory of one world, and calls of its kernels.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace taichi_soft {
 
 class Scene;
 
-// Growing memory for kernel arguments.
+// Memory for kernel arguments, which grows on demand.
 class Buffer {
  public:
   template <typename Number>
@@ -34,14 +34,14 @@ struct Argument {
   int32_t whole;
   float real;
   const void* data;
-  int32_t rows, width;  // a width of 0 means one dimension
+  int32_t rows, width;  // a width of 0 means that there is only one dimension
 };
 
 class Machine {
  public:
   explicit Machine(const Scene& scene);
 
-  char* root() const { return root_; }  // start of the fields
+  char* root() const { return root_; }  // address of the fields
 
   // Kernel arguments.
   static Argument whole(int32_t value) { return {Argument::kWhole, value, 0.0f, nullptr, 0, 0}; }

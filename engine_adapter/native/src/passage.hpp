@@ -1,4 +1,4 @@
-// Motion of a body whose level of detail changes, and the nearest vertices of its levels.
+// Motion of a body whose level of detail changes, and nearest vertices between its levels.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace taichi_soft {
 
-// Rows of `read_motion` in taichi_soft/fracture/kernels/topology.py.
+// Numbers of the rows of `read_motion` in taichi_soft/fracture/kernels/topology.py.
 struct Motion {
   enum Column : size_t {
     kPosition = 0,
@@ -26,7 +26,7 @@ struct Motion {
   std::vector<double> numbers;
 };
 
-// Unique vertices of the target, ascending, that are nearest at rest to given vertices of the source.
+// Vertices of the target that are nearest at rest to given vertices of the source, unique and ascending.
 std::vector<int32_t> nearest_vertices(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
 // Nearest vertex of the target for each given vertex, in order.
 std::vector<int32_t> nearest_of_each(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);

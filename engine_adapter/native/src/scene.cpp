@@ -50,7 +50,7 @@ bool is_surface_valid(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
     const size_t limit = i < blocks * kStride ? k : body_vertices;
     if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= limit) return false;
   }
-  size_t before = head + blocks + 2;  // skips the number of blocks with small rings, which is harmless
+  size_t before = head + blocks + 2;  // after the number of blocks with small rings, whose value is harmless
   for (size_t block = 0; block <= blocks; ++block) {
     const int32_t begin = mesh.ints[head + block];
     if (begin < 0 || size_t(begin) < before || size_t(begin) > mesh.ints.count) return false;
@@ -66,7 +66,7 @@ bool is_surface_valid(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
   return true;
 }
 
-// The same for a skin: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
+// True if all indices of a skin's table are in range: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
 bool is_skin_valid(const Mesh::Table& mesh, size_t k, size_t n) {
   constexpr size_t kSkinLanes = 16, kRow = 10;
   const size_t blocks = (k + kSkinLanes - 1) / kSkinLanes;
@@ -146,7 +146,7 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   read_fields();
   read_assets();
   read_meshes();
-  // Snapshots stay valid if the same scene is exported again.
+  // Snapshots remain valid if the same scene is exported again.
   for (const char* name : {"fields/kept", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
@@ -165,7 +165,7 @@ void Scene::read_fields() {
   const size_t image = archive.get<unsigned char>("fields/image").count;
   if (rows.count != 5 * field_names_.size()) invalid_file("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
-  std::map<size_t, const Bound*> bounds;  // by where their field lies
+  std::map<size_t, const Bound*> bounds;  // by the address of their field
   for (const Bound& each : kBounds) {
     const auto name = std::find(field_names_.begin(), field_names_.end(), each.field);
     if (name != field_names_.end()) bounds[places_[size_t(name - field_names_.begin())].offset] = &each;
@@ -228,7 +228,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
   return asset;
 }
 
-// Rows of one level. The first world checks that they fit the slots.
+// Rows of one level. The first world of the scene checks that they fit the slots.
 SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, size_t most) const {
   constexpr size_t kCornerRows = 4 * kLanes, kEdgeRows = 6 * kLanes;
   const std::string slot = prefix + "slot/", touching = prefix + "touching/";
@@ -266,7 +266,7 @@ SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, si
   rows.touching_triangles = archive.rows<int32_t>(touching + "triangles", 3);
   rows.carriers = archive.rows<int32_t>(touching + "carriers", 4);
   rows.weights = archive.rows<float>(touching + "weights", 4);
-  // Points of a hull come after all particles of the slot's capacity.
+  // The points of a hull follow all particles of the slot's capacity.
   const size_t room = most + asset.hull.count / 4;
   if (rows.carriers.count != rows.weights.count || rows.carriers.count != asset.hull.count ||
       !are_below(rows.carriers, n) || !are_below(rows.touching_outer, room) ||

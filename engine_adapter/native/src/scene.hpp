@@ -1,4 +1,4 @@
-// A world file in memory: the data that its worlds share.
+// A world file in memory: the data that all worlds of a scene use.
 #pragma once
 
 #include <map>
@@ -13,7 +13,7 @@
 
 namespace taichi_soft {
 
-// Layout of a field: element i starts at `offset + stride * i` [bytes] and has `width` numbers of 4 bytes.
+// Layout of a field. Element i starts at `offset + stride * i` [bytes] and has `width` numbers of 4 bytes.
 struct Place {
   size_t offset, stride, count, width;
   bool is_whole;
@@ -26,25 +26,25 @@ struct KeptField {  // a field in snapshots, and the number of its elements ther
   Place place;
   size_t count;  // per row of joints or motors, for their fields
   int whose;
-  const Bound* bound;  // of its numbers, or null
+  const Bound* bound;  // bounds of its numbers, or null
 };
 
-struct SlotRows {  // data that kernels write into a slot: see `body_rows` in taichi_soft/fracture/cutting.py
+struct SlotRows {  // data that kernels write into a slot, see `body_rows` in taichi_soft/fracture/cutting.py
   Archive::View<float> rest, rest_inverses, edge_damping, kind, weights;
   Archive::View<int32_t> tet_vertices, tet_edges, edges, edge_blocks, triangles, outer;
   Archive::View<int32_t> touching_outer, touching_triangles, carriers;  // only if any asset has a hull
-  std::vector<Archive::View<float>> constants;                          // of tetrahedra, by field
+  std::vector<Archive::View<float>> constants;                          // constants of tetrahedra, by field
 };
 
-// Map from the vertices of one level of detail to those of another: see taichi_soft/levels/passage.py.
+// Map from the vertices of one level of detail to those of another, see taichi_soft/levels/passage.py.
 struct Passage {
   Archive::View<int32_t> sources, begins;
   Archive::View<double> weights;
 };
 
 struct Asset {
-  Archive::View<float> rest_rows;  // (n, 8) position, velocity, inverse mass, mass of each vertex
-  Archive::View<double> vertices;  // (n, 3)
+  Archive::View<float> rest_rows;  // position, velocity, inverse mass, mass of each vertex, (n, 8)
+  Archive::View<double> vertices;  // positions at rest, (n, 3)
   Archive::View<double> masses;
   Vector center;
   Archive::View<int32_t> pinned, outer, rank, surface;
@@ -52,14 +52,14 @@ struct Asset {
   Archive::View<double> element_stiffness;
   size_t element_width;
   Archive::View<int32_t> tets;
-  Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if the surface is used for contact
+  Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if bodies touch by their surface
   Archive::View<double> hull_weights;
   double thickness, friction, wave_speed;
   int32_t slot_count;
-  // Levels of detail. The following members are empty with a single level.
+  // Levels of detail. With a single level, the following members are empty.
   SlotRows rows;
   std::vector<Asset> coarser;
-  std::vector<Passage> passages;  // from level i to j at [i * level_count() + j]
+  std::vector<Passage> passages;  // passage from level i to j at [i * level_count() + j]
   size_t vertex_count() const { return masses.count; }
   size_t level_count() const { return 1 + coarser.size(); }
   const Asset& level(size_t number) const { return number == 0 ? *this : coarser[number - 1]; }
@@ -72,12 +72,12 @@ struct Mesh {
     Archive::View<int32_t> ints;
     Archive::View<float> floats;
   };
-  int32_t asset, level;  // a level of -1 means every level of detail
+  int32_t asset, level;  // a level of -1 means all levels of detail
   bool is_skin;
   size_t vertex_count;
   Archive::View<int32_t> triangles;
   Archive::View<float> uv;
-  std::vector<Table> tables;  // one, or one per level
+  std::vector<Table> tables;  // one table, or one per level
   const Table& table(int32_t of_level) const { return tables[level < 0 ? size_t(of_level) : 0]; }
 };
 
@@ -86,7 +86,7 @@ class Scene {
   explicit Scene(const std::string& folder);
   Scene(std::vector<char> world, const ts_linked_kernel* kernels);
 
-  const std::vector<std::string>& names(int32_t kind) const;  // of a kind such as TS_BODY
+  const std::vector<std::string>& names(int32_t kind) const;  // names of objects of a kind such as TS_BODY
   // Fails if the field is missing, or has fewer or narrower elements.
   Place place(const std::string& field, size_t count = 0, size_t width = 1) const;
 
@@ -101,16 +101,16 @@ class Scene {
   double floor;
   int32_t floor_collider;  // collider of the floor, or -1
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
-  double pull_in_weights, highest_pull_speed;  // of grabs; the first in N/kg
-  Archive::View<double> patch_limits;          // that the kernel shape_patch takes
+  double pull_in_weights, highest_pull_speed;  // the first in N/kg
+  Archive::View<double> patch_limits;          // limits that the kernel shape_patch receives
   size_t patch_rows;
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;
   bool has_levels = false, has_hulls = false;  // true if any asset has levels of detail, or a hull
-  std::vector<std::string> constant_names;  // fields with constants of tetrahedra
+  std::vector<std::string> constant_names;  // names of fields with constants of tetrahedra
   std::vector<Mesh> meshes;
   std::vector<KeptField> kept;
-  uint32_t code = 0;  // identifies compatible snapshots
+  uint32_t code = 0;  // number that is equal for compatible snapshots
 
  private:
   Scene(std::vector<char> world, const std::string& name);

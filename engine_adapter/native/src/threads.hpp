@@ -1,4 +1,4 @@
-// Runs the tasks of a loop on the calling thread and the world's threads, or on the host's.
+// Runs the tasks of a loop on the calling thread and on threads of the world or of the host.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +23,11 @@ class Threads {
   Threads(const Threads&) = delete;
   Threads& operator=(const Threads&) = delete;
 
-  int32_t most() const { return most_; }  // largest number of threads, including the calling one
+  int32_t most() const { return most_; }  // largest number of threads, with the calling one
   void set_most(int32_t count) { most_ = count; }
   void use_host(ts_run_jobs function, void* user) { host_ = function, user_ = user; }
 
-  // Runs tasks 0 to count - 1, started in this order, and returns when all have ended. Threads are created on demand.
+  // Runs tasks 0 to count - 1, started in this order. Returns after all have ended. Threads are created on demand.
   void run(int32_t count, void* closure, Task task);
 
  private:
@@ -37,15 +37,15 @@ class Threads {
 #if !defined(__wasm__)
   void run_on_workers(int32_t count, void* closure, Task task);
   int32_t helpers_for(int32_t count) noexcept;
-  void serve(int32_t thread, uint64_t done);  // waits for rounds after `done`
+  void serve(int32_t thread, uint64_t done);  // waits for rounds after round `done`
   void take_tasks(int32_t thread);
 
   std::vector<std::thread> workers_;
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
   uint64_t round_ = 0;   // current or last round
-  int32_t helpers_ = 0;  // number of workers that take part in it, the first ones
-  int32_t busy_ = 0;     // number of these that have not finished it
+  int32_t helpers_ = 0;  // number of workers in this round, the first ones
+  int32_t busy_ = 0;     // number of workers that have not finished it
   bool is_over_ = false;
   void* closure_ = nullptr;
   Task task_ = nullptr;

@@ -10,7 +10,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr double kRoundOff = 1e-9;  // [steps], as in engine_adapter/fixed_step.py
+constexpr double kRoundOff = 1e-9;  // [steps], equal to ROUND_OFF in engine_adapter/fixed_step.py
 constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
@@ -38,7 +38,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   }
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
-  frame_alive_.assign(frames, 0);  // without frames there is one unused row
+  frame_alive_.assign(frames, 0);  // one unused row if there are no frames
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
   feels_.assign(feels.begin(), feels.end());
   colliders_ = Colliders(archive);
@@ -56,7 +56,7 @@ void World::bind() {
   collider_room_ = scene_->place("colliders.kind", colliders_.rows.size()).count;
   fields_ = Fields(machine_->root(), *scene_, collider_room_);
   if (scene_->patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
-  // The kernel that reads contacts does not check the number of rows.
+  // The kernel that reads contacts does not check how many rows there are.
   if (events_.touch_rows < size_t(scene_->slot_count) * (collider_room_ + (scene_->has_soft_contact ? kPairRows : 0))) {
     fail(TS_ERROR_FILE, "the world file is invalid: events. Export it again");
   }

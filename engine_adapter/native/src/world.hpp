@@ -1,4 +1,4 @@
-// A running instance of a scene: steps, and the game's calls between them.
+// A running instance of a scene: its steps, and the calls of the game between them.
 #pragma once
 
 #include <map>
@@ -20,14 +20,14 @@ constexpr size_t kMostFrames = 100000;
 
 inline float as_float(double number) { return static_cast<float>(number); }
 
-struct Vertices {  // a list of a body's vertices; an empty list means all
+struct Vertices {  // list of a body's vertices; an empty list means all vertices
   const int32_t* numbers;
   size_t count;
 };
 
-// Hit of a ray, or the closest point of a surface.
+// Hit of a ray, or closest point of a surface.
 struct Hit {
-  int32_t slot = -1;  // of the body; -1 for none
+  int32_t slot = -1;  // slot of the body; -1 for none
   int32_t triangle;
   int32_t vertices[3];
   double distance;
@@ -36,23 +36,23 @@ struct Hit {
   bool is_inside = false;
 };
 
-// Properties that all bodies share.
+// Properties of the world that apply to all bodies.
 struct Surroundings {
   Vector gravity;   // [m/s^2]
-  double friction;  // of the floor
+  double friction;  // friction of the floor
 };
 
 struct Drive {  // settings of a motor
   bool turns, is_fixed, has_point;
-  Vector axis, point;  // the point is 0 if there is none
+  Vector axis, point;  // the point is 0 if none is given
   double speed, limit;
 };
 
-// The part of a body that a hand takes hold of.
+// The part of a body on which a grab acts.
 struct Patch {
   std::vector<int32_t> vertices;
-  std::vector<double> shares;  // of a pull; they add up to 1
-  double strength;             // [N], up to which it is pulled on the patch
+  std::vector<double> shares;  // weights of a pull, with the sum 1
+  double strength;             // [N], largest force on the patch alone
 };
 struct SnapshotHead;
 
@@ -64,7 +64,7 @@ class World {
 
   const Scene& scene() const { return *scene_; }
   Mutex turn;            // held by the thread in a call
-  ThreadId advancing{};  // thread that makes the steps of a frame, and unlocks `turn` between them
+  ThreadId advancing{};  // thread that makes the steps of a frame, and unlocks `turn` between steps
 
   // Steps.
   void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
@@ -75,7 +75,7 @@ class World {
   void step(double dt, int32_t substeps);
   int32_t steps_due(double seconds);   // adds the time of a frame
   void step_in_time();
-  void end_frame();  // drops the time of due steps that were not made
+  void end_frame();  // drops the time of steps that were due but not made
   ts_before_step before_step() const { return before_step_; }
   void* user() const { return user_; }
   void write_clock(ts_clock* clock, int32_t steps_made) const;
@@ -85,7 +85,7 @@ class World {
   ts_body body_in(int32_t slot) const;
   int32_t slot_of(ts_body body) const;  // fails for a removed body
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
-  // The level of detail that fills a slot.
+  // The level of detail of the body in a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
   int32_t status_of(int32_t slot) const { return fields_.body_status(slot); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
@@ -117,7 +117,7 @@ class World {
   void release(ts_grab grab);
   Vector grab_force(ts_grab grab) const;
 
-  // Joints: their handles.
+  // Joints and their handles.
   ts_joint joint_at(int32_t number) const;
   ts_joint join(int32_t slot, Vertices which, int32_t other, const int32_t* onto);
   void release_joint(ts_joint joint);
@@ -136,7 +136,7 @@ class World {
   // All bodies.
   void wake();
   void set_gravity(const Vector& gravity);
-  void set_friction(double friction);  // of the floor
+  void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
   void set_wind(const Vector& velocity, double density, double drag);
@@ -147,7 +147,7 @@ class World {
 
   Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
   Hit closest(const Vector& point, double farthest);
-  // Slots of bodies that touch a box with edges of `size`, or a sphere whose radius is each of `size`.
+  // Slots of bodies that touch a box with edges of `size`, or a sphere whose radius is every number of `size`.
   std::vector<int32_t> overlaps(bool is_box, const Pose& pose, const Vector& size);
 
   // Colliders.
@@ -176,7 +176,7 @@ class World {
   void restore(const char* bytes, size_t size);
 
  private:
-  struct Holder {  // a point of a body: weights of four vertices
+  struct Holder {  // a point of a body, as weights of four vertices
     int32_t vertices[4];
     double weights[4];
   };
@@ -186,14 +186,14 @@ class World {
     float axis[3], point[3], speed, limit;
     std::vector<int32_t> particles;
   };
-  struct Hanging {  // an attachment during a change of level: its vertices at both levels
+  struct Hanging {  // an attachment during a change of level, with its vertices at both levels
     int32_t frame;
     bool feels;
     std::vector<int32_t> before, after;
   };
   class Packed;
 
-  struct Levels {  // levels of detail by slot, and the finest vertices of pins
+  struct Levels {  // levels of detail by slot, and vertices of pins at the finest level
     std::vector<int32_t> levels;
     std::vector<std::vector<int32_t>> held;
     size_t held_count() const;
@@ -216,7 +216,7 @@ class World {
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
   void take_down(double dt, const std::vector<int32_t>& frozen);
-  size_t frame(int32_t number) const;  // row of a frame
+  size_t frame(int32_t number) const;  // row of a frame in the fields
   std::vector<int32_t> attached_vertices(int32_t slot, int32_t frame) const;
   bool is_felt(int32_t slot, const std::vector<int32_t>& vertices) const;
   void detach_vertices(int32_t slot, const std::vector<int32_t>& vertices);
@@ -249,7 +249,7 @@ class World {
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
   double follow_speed(int32_t slot, std::vector<int32_t> held) const;
   size_t joint_of(ts_joint joint) const;  // index of a joint
-  size_t joint_rows() const;              // number of particles of all joints
+  size_t joint_rows() const;              // number of particles in all joints
   void end_joint(size_t number);
   void joints_have_changed();
   Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
@@ -266,11 +266,11 @@ class World {
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);
-  void mark_modified(int32_t slot);  // wakes a body, and discards cached frames; -1 for all
+  void mark_modified(int32_t slot);  // wakes a body and discards cached frames; -1 means all bodies
   void wake_slot(int32_t slot);
   void wake_near(const Box& box);
   Box box_of(int32_t slot) const;
-  std::vector<int32_t> checked(int32_t slot, Vertices which, bool may_be_all) const;  // ascending
+  std::vector<int32_t> checked(int32_t slot, Vertices which, bool may_be_all) const;  // vertices in ascending order
   void give_rows(int32_t slot, const std::vector<int32_t>& vertices);
   void require_unattached(int32_t slot, const std::vector<int32_t>& vertices) const;
   double mass_of(int32_t slot, const std::vector<int32_t>& vertices) const;
@@ -285,27 +285,27 @@ class World {
   std::vector<ColliderMotion> motion_;
   Events events_;
   Surroundings surroundings_;
-  std::vector<double> friction_;  // of each body against other bodies
-  std::vector<float> present_, coming_;  // frames after the last and the next step: rotation by rows
+  std::vector<double> friction_;  // of each body, against other bodies
+  std::vector<float> present_, coming_;  // poses of frames after the last and the next step: rotation by rows
                                          // and position, (f, 12)
   std::vector<unsigned char> frame_alive_;
   std::vector<int32_t> levels_;             // level of detail in each slot, even in empty ones
-  std::vector<std::vector<int32_t>> held_;  // finest vertices of pins at a coarser level
-  std::vector<int32_t> attachments_;        // by particle: attachment of its body that holds it, or 0
-  std::vector<unsigned char> feels_;  // by particle: 1 if its frame reports its load
+  std::vector<std::vector<int32_t>> held_;  // vertices of the finest level for pins at a coarser one
+  std::vector<int32_t> attachments_;        // by particle: attachment that holds it, or 0
+  std::vector<unsigned char> feels_;  // by particle: 1 if its frame reports the load
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
-  int32_t steps_left_ = 0;  // of the current frame
-  double picture_ = 1.0;  // interpolation from the previous step to the last one
+  int32_t steps_left_ = 0;  // steps that remain in the current frame
+  double picture_ = 1.0;  // interpolation factor from the previous step to the last one
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;
-  bool has_work_ = true;   // a pinned particle has a target, or has just reached it
+  bool has_work_ = true;   // a pinned particle has a target, or has just reached one
   bool is_still_ = false;  // all bodies slept after the last step, and nothing has changed since
-  double rows_at_ = -1.0;  // alpha of the cached positions; below 0 if they are outdated
+  double rows_at_ = -1.0;  // alpha of the cached positions; negative if they are outdated
 
   Fields fields_;
   size_t collider_room_ = 0;

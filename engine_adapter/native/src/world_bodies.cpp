@@ -106,7 +106,7 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
   if (levels_[size_t(slot)] != 0) {
     refill(slot, 0);
   } else if (scene_->assets[size_t(asset)].level_count() > 1) {
-    write_kind(slot);  // a snapshot may have restored data of an earlier body
+    write_kind(slot);  // a snapshot may have restored data of another body into the slot
   }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
   machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
@@ -131,7 +131,7 @@ void World::despawn(int32_t slot) {
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
-  fields_.body_drives(slot) &= ~kMovesPins;  // otherwise attached vertices would keep their targets
+  fields_.body_drives(slot) &= ~kMovesPins;  // otherwise attached vertices would still move to their targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 

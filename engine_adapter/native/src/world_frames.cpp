@@ -1,4 +1,4 @@
-// Frames and attachments, the same as taichi_soft/control/frames.py and attachments.py.
+// Frames and attachments, with the same results as taichi_soft/control/frames.py and attachments.py.
 
 #include <algorithm>
 
@@ -56,7 +56,7 @@ Pose World::frame_pose(int32_t number) const {
   return {{row[9], row[10], row[11]}, quaternion_of(turn)};
 }
 
-// Vertices that are attached to a frame, or to any frame for -1.
+// Vertices that are attached to a frame; for -1, to any frame.
 std::vector<int32_t> World::attached_vertices(int32_t slot, int32_t number) const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {

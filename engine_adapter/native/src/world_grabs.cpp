@@ -1,4 +1,4 @@
-// Grabs, the same as taichi_soft/control/grabs.py.
+// Grabs, with the same results as taichi_soft/control/grabs.py.
 
 #include <algorithm>
 #include <cmath>
@@ -82,7 +82,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   return grab_at(int32_t(g));
 }
 
-// Round a point at rest between `count` vertices, three or four.
+// Patch around a point at rest, which is given by weights of `count` vertices, three or four.
 Patch World::patch_around(const Asset& asset, const int32_t* corners, const double* weights, uint32_t count) {
   const uint32_t n = uint32_t(asset.vertex_count()), elements = uint32_t(asset.element_stiffness.count);
   const double* rows = machine_->rows.room<double>(2 * n);

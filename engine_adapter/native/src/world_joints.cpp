@@ -1,4 +1,4 @@
-// Joints, the same as taichi_soft/control/joints.py and embedding.py.
+// Joints, with the same results as taichi_soft/control/joints.py and embedding.py.
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,8 @@ Vector World::vertex_place(int32_t slot, int32_t vertex) const {
   return {fields_.particle_position(p, 0), fields_.particle_position(p, 1), fields_.particle_position(p, 2)};
 }
 
-// Points in the tetrahedra of `count` vertices at `x`, each in the one that it is in or least outside of.
+// Weights of points in tetrahedra of `count` vertices at `x`. Each point uses the tetrahedron that contains it, or the
+// one that it is least outside of.
 std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, const double* x, size_t count,
                                            const Archive::View<int32_t>& tets) {
   const uint32_t k = uint32_t(points.size());
@@ -38,7 +39,7 @@ std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, co
   return holders;
 }
 
-// Positions of vertices of `slot` in the tetrahedra of `other`, in their current shapes.
+// Weights of vertices of `slot` in the tetrahedra of `other`, for the current shapes.
 std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
@@ -60,7 +61,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
     }
     double sum = 0.0;
     for (double& each : weights) {
-      if (std::fabs(each) < kLeastWeight) each = 0.0;  // rounding must not involve other vertices
+      if (std::fabs(each) < kLeastWeight) each = 0.0;  // rounding errors must not involve other vertices
       sum += each;
     }
     for (double& each : weights) each = each / sum;
@@ -68,7 +69,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
   return holders;
 }
 
-// Vertices of `other`, each through the first tetrahedron that contains it, if any.
+// Weights of vertices of `other`, each in the first tetrahedron that contains it, if any.
 std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<int32_t>& partners) const {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   std::vector<Holder> holders;
@@ -86,7 +87,7 @@ std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<in
   return holders;
 }
 
-// Largest speed at which held vertices can follow [m/s].
+// Largest speed with which held vertices can follow [m/s].
 double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
   const Asset& asset = asset_of(slot);
   std::sort(held.begin(), held.end());
@@ -179,7 +180,7 @@ void World::end_joint(size_t j) {
   joints_have_changed();
 }
 
-// Joined bodies are stepped together, even in worlds without a contact search.
+// Joined bodies are stepped together, even in worlds that do not search for contacts.
 void World::joints_have_changed() {
   if (scene_->has_soft_contact) return;
   machine_->launch("list_joined_islands", {Machine::whole(scene_->slot_count)});

@@ -1,4 +1,4 @@
-// Levels of detail, the same as taichi_soft/levels/level_change.py and reattaching.py.
+// Levels of detail, with the same results as taichi_soft/levels/level_change.py and reattaching.py.
 
 #include <algorithm>
 
@@ -75,13 +75,13 @@ void World::read_levels() {
   }
 }
 
-// True if these are valid vertices of the finest level of the body in a slot.
+// True if all numbers are valid vertices of the finest level of the body in a slot.
 bool World::are_held(int32_t slot, const std::vector<int32_t>& vertices) const {
   const size_t n = whole_of(slot).vertex_count();
   return std::all_of(vertices.begin(), vertices.end(), [n](int32_t v) { return v >= 0 && size_t(v) < n; });
 }
 
-// Writes a level of a body's asset into its slot, with the current motion.
+// Writes a level of a body's asset into the body's slot, with the current motion.
 void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status) {
   const Asset& asset = whole_of(slot).level(size_t(level));
   const SlotRows& rows = asset.rows;
@@ -114,7 +114,7 @@ void World::write_kind(int32_t slot) {
   machine_->launch("write_kind", {Machine::whole(slot), array_of(asset_of(slot).rows.kind)});
 }
 
-// Writes a complete body of a level, at rest, into a reused slot.
+// Writes a complete body of a level, at rest, into a slot that is used again.
 void World::refill(int32_t slot, int32_t level) {
   write_slot(slot, level, Motion(whole_of(slot).level(size_t(level)).vertex_count()), kAbsent);
 }
@@ -171,7 +171,7 @@ std::vector<int32_t> World::finest_held(int32_t slot) const {
   return nearest_of_each(asset_of(slot), present, whole_of(slot));
 }
 
-// Vertices of attachments at another level with the held vertices `held`, by attachment.
+// Vertices of each attachment at another level. `held` are the held vertices.
 std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, const std::vector<int32_t>& held,
                                                     int32_t level) const {
   std::map<int32_t, Hanging> found;
@@ -202,7 +202,7 @@ void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector
   for (size_t m = 0; m < kMostMotors; ++m) {
     if (fields_.motors.motor.body(m) == slot + 1) end_motor(m);
   }
-  for (bool is_done = false; !is_done;) {  // a release reduces the held vertices, so others may lose theirs
+  for (bool is_done = false; !is_done;) {  // a release removes held vertices, so other constraints may lose theirs
     std::vector<int32_t> finest = finest_held(slot);
     *held = nearest_at(slot, finest, level);
     *attached = attachments_at_level(slot, *held, level);

@@ -19,7 +19,7 @@ uint32_t bits_of(float number) {
 }  // namespace
 
 uint64_t World::hash() const {
-  // The same as `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
+  // The same bits as `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
   uint64_t code = 1469598103934665603u;
   const auto mix = [&code](uint64_t word) {
     code = (code ^ word) * 1099511628211u;
@@ -42,14 +42,14 @@ uint64_t World::hash() const {
 
 constexpr uint64_t kSnapshotMark = 0x3450414E53534354u;
 
-// Header of a snapshot. After it follow, in this order: levels of detail; fields; frames, with attached vertices and
-// reported loads; generations of handles; colliders; state of events.
+// Header of a snapshot. The following parts are, in this order: levels of detail; fields; frames, with attached
+// vertices and reported loads; generations of handles; colliders; state of events.
 struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
   uint64_t frames, colliders, contacts, joint_rows, motor_rows, held;
-  int64_t kinds;  // recorded kinds of events
+  int64_t kinds;  // kinds of events that are recorded
   double time, last_dt;
   Surroundings surroundings;
 };
@@ -58,7 +58,7 @@ namespace {
 
 template <typename Part>
 void put(char** at, const Part* data, size_t count) {
-  if (count == 0) return;  // memcpy must not get a null pointer
+  if (count == 0) return;  // memcpy must not receive a null pointer
   std::memcpy(*at, data, count * sizeof(Part));
   *at += count * sizeof(Part);
 }
@@ -97,10 +97,10 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<KeptField>& ke
   return 4 * words;
 }
 
-// Size of levels, numbers of held vertices, and these vertices [bytes].
+// Size of the levels, the numbers of held vertices, and these vertices [bytes].
 size_t size_of_levels(const SnapshotHead& head, size_t slots) { return sizeof(int32_t) * (2 * slots + size_t(head.held)); }
 
-// Size of everything after the fields [bytes].
+// Size of everything that follows the fields [bytes].
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
          sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
@@ -110,7 +110,7 @@ size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
 
 }  // namespace
 
-// Levels of a snapshot: those of existing bodies.
+// Levels in a snapshot, which contains those of existing bodies.
 World::Levels World::present_levels() const {
   Levels found;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
@@ -233,7 +233,7 @@ class World::Packed {
     return found;
   }
   int32_t level(int32_t slot) const { return levels_[size_t(slot)]; }
-  // True if the slot `body - 1` has a body.
+  // True if the slot `body - 1` contains a body.
   bool lives(int32_t body) const {
     int32_t status;
     std::memcpy(&status, status_ + 4 * (body - 1), sizeof status);
@@ -251,7 +251,7 @@ bool World::lies_in(int32_t particle, int32_t slot, int32_t level) const {
   return p >= begin && p < begin + whole_of(slot).level(size_t(level)).vertex_count();
 }
 
-// Indices of bodies and particles were checked before.
+// Indices of bodies and particles have already been checked.
 bool World::are_joints_valid(const Packed& packed, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   const Place bodies = s.place("joints.bodies"), rows = s.place("joints.rows");
@@ -340,7 +340,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     if (flags[0] > 1 || flags[1] > 1) return false;
     Collider row;
     take(&at, &row, 1);
-    // Shapes with a grid must be those of the export.
+    // Shapes with a grid must be shapes of the export.
     const bool is_known = row.kind >= 0 && (row.kind <= TS_CAPSULE ||
                                             (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
@@ -357,7 +357,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
   return true;
 }
 
-// The same check for the image in the world file.
+// The same check for the snapshot in the world file.
 void World::require_image() const {
   std::vector<char> bytes(snapshot_size());
   snapshot(bytes.data());
@@ -393,7 +393,7 @@ void World::restore(const char* bytes, size_t size) {
   if (!is_valid(head.surroundings) || !are_rows_valid(bytes + sizeof head, head)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is invalid: it refers to missing objects");
   }
-  // Allocate before changing the world, so that a failed allocation changes nothing.
+  // Allocate before the world is changed, so that a failed allocation changes nothing.
   const size_t frames = size_t(head.frames);
   Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
                            std::vector<Contact>(size_t(head.contacts))};

@@ -1,4 +1,4 @@
-// Gravity and friction, the same as taichi_soft/control/drives.py and frictions.py.
+// Gravity and friction, with the same results as taichi_soft/control/drives.py and frictions.py.
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@ namespace taichi_soft {
 
 namespace {
 
-constexpr uint32_t kFirstSerial = 1;  // serial of an exported collider
+constexpr uint32_t kFirstSerial = 1;  // serial number of an exported collider
 
 bool is_friction(double number) { return number >= 0.0 && number <= 1e6; }
 
@@ -45,7 +45,7 @@ void World::set_friction(double friction) {
 bool World::is_floor(int32_t number) const {
   if (number < 0 || number != scene_->floor_collider || size_t(number) >= colliders_.rows.size()) return false;
   const Collider& row = colliders_.rows[size_t(number)];
-  return row.is_alive && row.serial == kFirstSerial;  // the row may have another collider
+  return row.is_alive && row.serial == kFirstSerial;  // the row may contain another collider
 }
 
 void World::set_collider_friction(int32_t number, double friction) {

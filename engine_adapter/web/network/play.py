@@ -3,8 +3,8 @@
     .venv/bin/python engine_adapter/web/network/play.py           # in real time
     .venv/bin/python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
 
-Each player is a process and sends UDP datagrams to this process, which simulates the network: it delays,
-loses, copies and reorders datagrams.
+Each player is a process that sends UDP datagrams to this process. This process simulates the network: it
+delays, loses, copies and reorders datagrams.
 """
 
 import argparse
@@ -25,23 +25,23 @@ from typing import Any
 
 HERE = Path(__file__).parent
 DT = 1 / 60
-NAMES = ("Python", "node")  # of the players
-DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # of every message; up to this much more; more for a few messages [s]
-LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # fractions of messages
+NAMES = ("Python", "node")  # names of the players
+DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # base, random and stall delay of a message [s]
+LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # fractions of messages that are lost, delayed by STALL, and copied
 LATE_START = (0, 20)  # frame in which each player begins
-PATIENCE = 60.0  # timeout for a silent process [s]
+PATIENCE = 60.0  # time after which a silent process counts as failed [s]
 
 
 class Network:
-    """Messages in flight, with delays from a seed: reproducible with `--fast`."""
+    """Messages in transit. Their delays follow from a seed, so that `--fast` is reproducible."""
 
     def __init__(self, seed: int) -> None:
         self._rng, self._newest = random.Random(seed), [0, 0]
-        self._way: list[tuple[float, int, int, bytes]] = []  # by time
+        self._way: list[tuple[float, int, int, bytes]] = []  # by time of arrival
         self.counts: Counter[str] = Counter()
 
     def send(self, now: float, to: int, data: bytes) -> None:
-        """Send a message to a player at a time [s]."""
+        """Send a message to player `to` at a time [s]."""
         rng = self._rng
         self.counts["sent"] += 1
         if rng.random() < LOST:
@@ -54,7 +54,7 @@ class Network:
             heapq.heappush(self._way, (due, self.counts["sent"], to, data))
 
     def due(self, now: float) -> Iterator[tuple[int, bytes]]:
-        """Yield the messages that arrive until a time [s], with their players."""
+        """Yield the messages that have arrived by a time [s], with the players that receive them."""
         while self._way and self._way[0][0] <= now:
             _, number, to, data = heapq.heappop(self._way)
             self.counts["overtaken"] += number < self._newest[to]
@@ -62,12 +62,12 @@ class Network:
             yield to, data
 
     def next(self, now: float) -> float:
-        """Time until the next message arrives [s]."""
+        """Return the time until the next message arrives [s]."""
         return max(self._way[0][0] - now, 0.0) if self._way else DT
 
 
 class Line:
-    """The socket to a player's process."""
+    """Socket to the process of a player."""
 
     def __init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -76,7 +76,7 @@ class Line:
         self.port = self.socket.getsockname()[1]
 
     def meet(self, process: subprocess.Popen[str], name: str) -> None:
-        """Wait until the player has connected. Raises: ChildProcessError if its process ends first."""
+        """Wait until the player has connected. Raises: ChildProcessError if its process ends before."""
         self.socket.settimeout(0.1)
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
@@ -91,16 +91,16 @@ class Line:
         raise ChildProcessError(f"{name} did not start")
 
     def send(self, data: bytes) -> None:
-        """Send to the player."""
+        """Send a datagram to the player."""
         self.socket.send(data)
 
     def receive(self) -> bytes:
-        """Return what the player has sent."""
+        """Return a datagram from the player."""
         return self.socket.recv(65536)
 
 
 def run_fast(lines: list[Line], network: Network) -> None:
-    """Run both players on one simulated clock until both are done."""
+    """Run both players on one simulated clock until both have finished."""
     state, frame = [b"frame", b"frame"], 0
     while state != [b"done", b"done"]:
         now = frame * DT
@@ -117,7 +117,7 @@ def run_fast(lines: list[Line], network: Network) -> None:
 
 
 def run(lines: list[Line], network: Network) -> None:
-    """Forward messages in real time until both players are done."""
+    """Forward messages in real time until both players have finished."""
     state, heard = [b"frame", b"frame"], time.monotonic()
     with selectors.DefaultSelector() as selector:
         for player, line in enumerate(lines):
@@ -140,7 +140,7 @@ def run(lines: list[Line], network: Network) -> None:
 def session(
     folder: Path, *, ticks: int, seed: int, is_fast: bool, cheat: int | None = None
 ) -> tuple[list[dict[str, Any]], Counter[str]]:
-    """Run both processes. Returns: their reports, and counts of the network."""
+    """Run both processes. Returns: the reports of the players, and the message counts of the network."""
     lines, network = [Line(), Line()], Network(seed)
     commands: list[list[str | Path]] = [
         [sys.executable, HERE / "player.py", *([] if cheat is None else ["--cheat", str(cheat)])],
@@ -172,7 +172,7 @@ def session(
 
 
 def export(folder: Path) -> None:
-    """Export the same world for node."""
+    """Export the world of the players for Node.js."""
     command = ["export", str(HERE / "arena.py"), "--out", str(folder), "--for", "web"]
     done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], stdout=subprocess.DEVNULL)
     if done.returncode != 0:
@@ -183,7 +183,7 @@ def export(folder: Path) -> None:
 
 
 def main() -> None:
-    """Play, print a summary, and exit with an error if the worlds differ."""
+    """Play a game, print a summary, and exit with an error if the worlds differ."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--fast", action="store_true", help="on a simulated clock, as fast as both can")
     parser.add_argument("--ticks", type=int, default=3600, help="of 1/60 s (default 3600)")

@@ -1,4 +1,4 @@
-"""Player of the network sample in Python. `play.py` starts it, and `player.mjs` in node."""
+"""Player of the network sample in Python. `play.py` starts it, and also starts `player.mjs` in Node.js."""
 
 import argparse
 import json
@@ -15,14 +15,16 @@ FORCE, LIFT = 8.0, 0.02  # force per unit of input [N]; height by which each pla
 
 
 def act(inputs: Inputs) -> None:
-    """Apply the inputs of a tick. Each is 100 + x, 100 + y, and whether to raise the stage."""
+    """Apply the inputs of a tick. The bytes of an input are 100 + x, 100 + y, and 1 to raise the stage
+    or 0.
+    """
     for body, (x, y, _) in zip(players, inputs, strict=True):
         body.apply_force((FORCE * (x - 100), FORCE * (y - 100), 0.0))
     stage.move_to((0.0, 0.0, LIFT * (inputs[0][2] + inputs[1][2])))
 
 
 def press(tick: int, player: int) -> bytes:
-    """Return a player's input in a tick: a new direction about every third of a second."""
+    """Return a player's input in a tick. The direction changes about three times per second."""
     turn = tick // (17 + 6 * player)
     return bytes(
         [(37 * turn + 91 * player) % 201, (59 * turn + 13 * player) % 201, int(tick % 50 < 5 + player)]
@@ -30,22 +32,24 @@ def press(tick: int, player: int) -> bytes:
 
 
 class Player:
-    """A session, the socket to the other machine, and timings."""
+    """One player: a session, the socket to the other machine, and timings."""
 
     def __init__(self, line: socket.socket, player: int, ticks: int, cheat: int) -> None:
         self.line, self.player, self.ticks, self.cheat = line, player, ticks, cheat
         self.session = RollbackSession(world, self.act, player=player, input_size=3, step=STEP)
         self.frames = self.remade = 0
-        self.seconds = 0.0  # for repeated ticks
+        self.seconds = 0.0  # time for repeated ticks [s]
 
     def act(self, inputs: Inputs) -> None:
-        """Apply inputs; a cheat changes one bit in one tick."""
+        """Apply inputs. A cheating player changes one bit in one tick."""
         if world.step_count == self.cheat:
             inputs = (bytes([inputs[0][0] ^ 1, *inputs[0][1:]]), inputs[1])
         act(inputs)
 
     def frame(self) -> None:
-        """Make a tick, unless this machine is ahead of the other one, and send a message."""
+        """Make a tick and send a message. If this machine is ahead of the other one, skip a tick from time to
+        time.
+        """
         session = self.session
         start = time.perf_counter()
         made = session.settle()
@@ -59,7 +63,7 @@ class Player:
         self.line.send(b"done" if session.confirmed >= self.ticks == session.tick else b"frame")
 
     def report(self) -> dict[str, Any]:
-        """Return the summary of the game."""
+        """Return a summary of the game for `play.py`."""
         session = self.session
         session.settle()
         return {
@@ -77,7 +81,7 @@ class Player:
 def play(player: Player, is_fast: bool) -> None:
     """Play until `play.py` reports that both players know all inputs.
 
-    Args: is_fast: True if `play.py` also drives the clock.
+    Args: is_fast: True if `play.py` also controls the clock.
     """
     due = time.monotonic()
     while True:
@@ -98,7 +102,7 @@ def play(player: Player, is_fast: bool) -> None:
 
 
 def main() -> None:
-    """Play over the local port from the command line."""
+    """Play over the local port that the command line gives."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--ticks", type=int, required=True)
@@ -110,7 +114,7 @@ def main() -> None:
         line.connect(("127.0.0.1", options.port))
         player = Player(line, 0, options.ticks, options.cheat)
         line.send(b"ready")
-        line.recv(16)  # "start"
+        line.recv(16)  # receives "start"
         play(player, options.fast)
     print(json.dumps(player.report()))
 

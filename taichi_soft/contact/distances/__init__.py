@@ -1,1 +1,1 @@
-"""Signed distances of points from the solids that bodies hit."""
+"""Signed distances of points from solids."""

@@ -1,4 +1,4 @@
-"""A box about the origin, with edges along the axes."""
+"""A box centred on the origin, with edges along the axes."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
@@ -6,7 +6,10 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def box_distance(parameters, x):
-    """Signed distance [m] and normal; inside, those of the nearest face. Parameters: half edges (3) [m]."""
+    """Return signed distance [m] and normal; inside the box, the normal of the nearest face.
+
+    Parameters: half of each edge (3) [m].
+    """
     side = ti.Vector([0.0, 0.0, 0.0])
     for i in ti.static(range(3)):
         side[i] = ti.select(x[i] < 0.0, -1.0, 1.0)

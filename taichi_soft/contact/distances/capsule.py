@@ -6,7 +6,10 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def capsule_distance(parameters, x):
-    """Signed distance [m] and normal; the normal is x on the axis. Parameters: radius, half length [m]."""
+    """Return signed distance [m] and normal; on the capsule's axis, the normal is x.
+
+    Parameters: radius, half of the length [m].
+    """
     z = ti.max(-parameters[1], ti.min(parameters[1], x[2]))
     length, normal = length_and_direction(ti.Vector([x[0], x[1], x[2] - z]), ti.Vector([1.0, 0.0, 0.0]))
     return length - parameters[0], normal

@@ -21,8 +21,8 @@ def _grid_distance(
     offset: ti.i32,
     x: ti.math.vec3,
 ) -> ti.math.vec4:
-    """Normal and distance from a solid with a grid. A separate function, because it is more code than all
-    other solids.
+    """Return normal and distance from a solid with a grid. This is a separate function because its code is
+    longer than that of all other solids together.
     """
     distance, normal = ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
     if kind == ShapeKind.MESH:
@@ -34,17 +34,18 @@ def _grid_distance(
 
 @ti.func
 def signed_distance(samples: ti.template(), kind, parameters, resolution, offset, x):
-    """Distance of a point from the surface of a solid, negative inside, and the outward unit normal there.
+    """Return the distance of a point from the surface of a solid, negative inside, and the outward unit
+    normal there.
 
-    Exact for plane, sphere, box and capsule. For the others it never exceeds the distance, so that a ray can
-    always advance by it: see `height_field_distance` and `mesh_distance`.
+    The distance is exact for plane, sphere, box and capsule. For a height field or a mesh it is a lower
+    bound, so that a ray can always advance by it: see `height_field_distance` and `mesh_distance`.
     Args:
         samples: f32 field with the grids of all solids, one after the other.
         kind: a `ShapeKind`.
-        parameters: vec8, see the function of each kind.
-        resolution: ivec3, nodes of the solid's grid along each axis.
-        offset: row of its first sample in `samples`.
-        x: the point in the solid's own frame, f32 [m].
+        parameters: vec8, described at the distance function of each kind.
+        resolution: number of nodes of the solid's grid along each axis, ivec3.
+        offset: row of the solid's first sample in `samples`.
+        x: point in the frame of the solid, f32 [m].
     Returns: distance [m] and normal, of length 1 for every x.
     """
     distance, normal = plane_distance(parameters, x)

@@ -3,14 +3,15 @@
 from taichi_soft.core.runtime import ti
 
 RESTITUTION_SPEED = 0.5
-"""Impact speed [m/s] below which nothing bounces, so that resting bodies come to rest."""
+"""Impact speed [m/s] below which bodies do not bounce, so that they come to rest."""
 
 
 @ti.func
 def resolve_floor(x, v, h, floor):
-    """Position and velocity after contact of a particle that this substep moved to x with velocity v.
+    """Return position and velocity of a particle after contact. In this substep it moved to x with velocity
+    v.
 
-    The impulse acts before the drift, so it shortens the path as well. Otherwise a particle held by friction
+    The impulse acts before the drift, so it also shortens the path. Otherwise a particle held by friction
     would creep.
     Args:
         x: new position [m].

@@ -1,4 +1,4 @@
-"""Ground over a regular grid, with two triangles per cell, solid down to infinity.
+"""Ground given by heights on a regular grid, with two triangles per cell, solid down to infinity.
 
 Within half a cell of the ground, distances are exact: from the triangles around the nearest node. Farther
 away they are lower bounds, so that a ray can advance by them on ground of any slope.
@@ -9,8 +9,8 @@ from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 NEAREST = 1e-3
-"""Distance from the ground, in cells, below which rounding spoils the direction to it. The ground's own
-normal is used instead."""
+"""Distance from the ground, in cells, below which rounding makes the direction from the ground inaccurate.
+The normal of the ground is used instead."""
 
 
 @ti.func
@@ -20,7 +20,7 @@ def _height(samples: ti.template(), resolution, offset, i, j):
 
 @ti.func
 def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
-    """Height and normal of the ground at (u, v) cells from the first node."""
+    """Return height and normal of the ground at (u, v), in cells from the first node."""
     i = ti.max(0, ti.min(resolution[0] - 2, int(u)))
     j = ti.max(0, ti.min(resolution[1] - 2, int(v)))
     s, t = u - i, v - j
@@ -37,7 +37,7 @@ def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
 
 @ti.func
 def _range_round_node(samples: ti.template(), resolution, offset, i, j):
-    """Lowest and highest node of the four cells around node (i, j)."""
+    """Return the lowest and the highest height of the nodes of the four cells around node (i, j)."""
     low = _height(samples, resolution, offset, i, j)
     high = low
     for k in range(9):
@@ -50,22 +50,23 @@ def _range_round_node(samples: ti.template(), resolution, offset, i, j):
 
 @ti.func
 def _vector_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, p, longest):
-    """Vector from the nearest point of the four cells around node (i, j) to p, if shorter than `longest`.
+    """Return the vector to p from the nearest point of the four cells around node (i, j), if it is shorter
+    than `longest`.
 
-    p is relative to the node.
+    p is relative to the node (i, j).
     """
     vector = ti.Vector([0.0, 0.0, longest])
     base = _height(samples, resolution, offset, i, j)
     own_a, own_b = i - int(p[0] < 0.0), j - int(p[1] < 0.0)
     for k in range(8):
-        # First the cell below p; then the others, if they can contain a nearer point.
+        # Check the cell below p first, then those of the other cells that can contain a nearer point.
         turn_a, turn_b, is_upper = k // 4, k // 2 % 2, k % 2
         a = own_a + turn_a * (2 * (i - own_a) - 1)
         b = own_b + turn_b * (2 * (j - own_b) - 1)
         beside = ti.Vector([turn_a * p[0], turn_b * p[1]])
         is_cell = a >= 0 and b >= 0 and a < resolution[0] - 1 and b < resolution[1] - 1
         if is_cell and beside.norm_sqr() < vector.norm_sqr():
-            c, d = a + 1 - is_upper, b + is_upper  # the corner beside the diagonal
+            c, d = a + 1 - is_upper, b + is_upper  # the corner next to the diagonal
             first = ti.Vector([(a - i) * spacing, (b - j) * spacing, 0.0])
             side = ti.Vector([(c - i) * spacing, (d - j) * spacing, 0.0])
             first[2] = _height(samples, resolution, offset, a, b) - base
@@ -80,11 +81,11 @@ def _vector_from_ground(samples: ti.template(), resolution, offset, i, j, spacin
 
 @ti.func
 def height_field_distance(samples: ti.template(), parameters, resolution, offset, x):
-    """Lower bound of the signed distance [m], and normal.
+    """Return a lower bound of the signed distance [m], and the normal.
 
-    Nothing is solid outside the rectangle. Beside it and above the border, the distance is at least that from
-    the border. Beside it and below the border, it is at least half a cell, so that bodies touch no walls
-    there and adjacent fields join without a seam.
+    Nothing is solid outside the rectangle. Outside it and above the border, the bound is at least the
+    distance from the border. Outside it and below the border, the bound is at least half a cell, so that
+    bodies touch no walls there and adjacent fields join without a seam.
     Parameters: spacing, lowest and highest node [m], cosine of the steepest slope.
     """
     spacing, lowest, highest, cosine = parameters[0], parameters[1], parameters[2], parameters[3]
@@ -120,7 +121,8 @@ def height_field_distance(samples: ti.template(), parameters, resolution, offset
         slanted = length_and_direction(outwards + distance * normal, across)[1]
         if side < 0.0:
             distance, slanted = ti.max(distance, 0.5 * spacing), across
-        # Seen from the rectangle's nearest point, all of it lies at 90 degrees or more from `outwards`.
+        # All of the rectangle lies at 90 degrees or more from `outwards`, seen from the rectangle's nearest
+        # point.
         distance = ti.sqrt(away * away + distance * distance)
         side, normal = 1.0, slanted
     return side * distance, normal

@@ -1,18 +1,19 @@
-"""A solid given by its signed distance on a grid, without its mesh."""
+"""A solid given by its signed distance on a grid. The mesh itself is not needed."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
 
 MARGIN = 2
-"""Smallest distance between the box of the mesh and the border of its grid, in cells."""
+"""Smallest distance between the box of a mesh and the border of its grid, in cells."""
 
 FLATTEST = 1e-3
-"""Gradient of the distance, per cell, below which it has no direction, as at the centre of a solid."""
+"""Gradient of the distance, per cell, below which it has no direction, for example at the centre of a
+solid."""
 
 
 @ti.func
 def _interpolated(samples: ti.template(), resolution, offset, u):
-    """Trilinear value and its gradient per cell at u, in cells from the first node."""
+    """Return the trilinear value at u (in cells from the first node), and its gradient per cell."""
     base = ti.Vector([0, 0, 0])
     for axis in ti.static(range(3)):
         base[axis] = ti.max(0, ti.min(resolution[axis] - 2, int(u[axis])))
@@ -38,12 +39,12 @@ def _interpolated(samples: ti.template(), resolution, offset, u):
 
 @ti.func
 def mesh_distance(samples: ti.template(), parameters, resolution, offset, x):
-    """Signed distance [m] and normal, accurate to a fraction of a cell.
+    """Return signed distance [m] and normal, accurate to a fraction of a cell.
 
-    Interpolated distances are slightly too long near edges and corners. So is the path to the surface that
-    they describe: a step by the distance ends at most a tenth of a cell inside.
-    Outside the grid, the distance combines the path to the grid and the distance from there, which meet at an
-    angle of 90 degrees or more. The solid's box lies `MARGIN` cells inside the grid.
+    Interpolated distances are slightly too long near edges and corners: a step by the distance ends at most a
+    tenth of a cell inside the solid. Outside the grid, the distance combines the path to the grid and the
+    distance from there. The two meet at an angle of 90 degrees or more, because the solid's box lies `MARGIN`
+    cells inside the grid.
     Parameters: first node of the grid (3), cell [m].
     """
     cell = parameters[3]

@@ -5,6 +5,6 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def plane_distance(parameters, x):
-    """Signed distance [m] and normal. Parameters: unit normal (3)."""
+    """Return signed distance [m] and normal. Parameters: unit normal (3)."""
     normal = ti.Vector([parameters[0], parameters[1], parameters[2]])
     return normal.dot(x), normal

@@ -1,10 +1,10 @@
-"""Kinds of solids in kernels."""
+"""Numbers for the kinds of solids in kernels."""
 
 from enum import IntEnum
 
 
 class ShapeKind(IntEnum):
-    """Selects the distance function of a solid."""
+    """Kind of a solid, which selects its distance function."""
 
     PLANE = 0
     SPHERE = 1
@@ -15,4 +15,4 @@ class ShapeKind(IntEnum):
 
 
 CONVEX = frozenset({ShapeKind.PLANE, ShapeKind.SPHERE, ShapeKind.BOX, ShapeKind.CAPSULE})
-"""Kinds whose solids and signed distances are always convex: see `first_touch`."""
+"""Kinds of convex solids, whose signed distances are convex too: see `first_touch`."""

@@ -1,4 +1,4 @@
-"""A ball about the origin."""
+"""A ball centred on the origin."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
@@ -6,6 +6,6 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def sphere_distance(parameters, x):
-    """Signed distance [m] and normal; the normal is z at the centre. Parameters: radius [m]."""
+    """Return signed distance [m] and normal; at the centre, the normal is z. Parameters: radius [m]."""
     length, normal = length_and_direction(x, ti.Vector([0.0, 0.0, 1.0]))
     return length - parameters[0], normal

@@ -1,7 +1,7 @@
 """Find the first point at which a particle's path touches a collider, by sphere tracing (Hart 1996).
 
-A convex solid lies behind the tangent plane at its nearest point. So the path can advance to that plane, and
-is clear of the solid if it ends in front of it.
+A convex solid lies behind the tangent plane at its nearest point. So the particle can advance to that plane,
+and touches nothing if its path ends in front of the plane.
 
 Groups of fields: reads colliders.
 """
@@ -11,29 +11,31 @@ from taichi_soft.contact.distances.shape_kind import CONVEX
 from taichi_soft.core.runtime import ti
 
 TOUCHING = 1e-5
-"""Distance [m] from a surface within which a particle rests on it: a few steps of float32 at 10 m."""
+"""Distance from a surface within which a particle rests on it [m]: a few float32 spacings at 10 m."""
 
 MAX_STEPS = 16
-"""Steps along one path, at most: each is at least this fraction of it, so that a path along the surface ends
-too. At 30 m/s and 240 substeps per second a step is 8 mm."""
+"""Largest number of steps along a path. Each step is at least this fraction of the path, so that a path along
+the surface ends too. At 30 m/s and 240 substeps per second a step is 8 mm."""
 
 NO_TOUCH = 2.0
-"""Fraction of the path returned if it touches nothing."""
+"""Fraction of the path that is returned if the path touches nothing."""
 
 
 @ti.func
 def rests_at(distance):
-    """True if a particle can stay at a distance [m] from a surface and count as resting on it.
+    """True if a particle at this distance [m] from a surface rests on it, and need not move.
 
-    Putting it onto the surface itself in every substep would also move it along the surface, by rounding.
-    Particles held by friction would creep, and feed vibrations.
+    Moving the particle exactly onto the surface in every substep would also move it along the surface,
+    because of rounding. Particles held by friction would then creep and excite vibrations.
     """
     return distance >= 0.0 and distance <= TOUCHING
 
 
 @ti.func
 def distance_from(colliders: ti.template(), c, x):
-    """Lower bound of the distance of a point in a collider's frame from its skin [m], negative inside."""
+    """Return a lower bound of a point's distance from a collider's skin [m], negative inside. The point is in
+    the collider's frame.
+    """
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
     distance, _ = signed_distance(colliders.samples, kind, parameters, resolution, offset, x)
@@ -45,9 +47,9 @@ def first_touch(colliders: ti.template(), c, start, end, slack):
     """Find how a path meets a collider. All lengths and directions are in the collider's frame [m].
 
     Args:
-        slack: distance behind its resting position at which the path can end without touching.
+        slack: distance behind the resting position at which the path can end without a touch.
     Returns:
-        part: fraction of the path, 0 to 1, at which it touches, or `NO_TOUCH`.
+        part: fraction of the path, 0 to 1, at the first touch, or `NO_TOUCH`.
         distance: distance from the surface there, negative if the path starts inside [m].
         beyond: distance of `end` from the tangent plane there, negative [m].
         normal: normal of the surface there.
@@ -81,5 +83,5 @@ def first_touch(colliders: ti.template(), c, start, end, slack):
             if part == 1.0:
                 part, is_open = NO_TOUCH, 0
             else:
-                part = ti.min(part + step, 1.0)  # check the end too: the last step could pass below
+                part = ti.min(part + step, 1.0)  # check the end too: the last step could pass it
     return part, distance, beyond, normal

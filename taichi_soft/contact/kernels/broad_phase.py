@@ -1,8 +1,8 @@
-"""Broad phase: find the vertices of an island that are near triangles of other bodies, or of their own.
+"""Broad phase: find the vertices of an island that are near triangles of other bodies or of the same body.
 
-If the boxes of two bodies overlap, the vertices of one that can be near the other are sorted into a grid, and
-each triangle of the other queries it. Each body has a margin: its candidates stay valid until one of its
-vertices has travelled farther than that.
+If the boxes of two bodies overlap, the vertices of the first that can be near the second are sorted into a
+grid, which each triangle of the second queries. The candidates of a body stay valid until one of its vertices
+has travelled farther than the margin of the body.
 
 Groups of fields: reads hull, islands; writes soft.
 """
@@ -33,16 +33,16 @@ from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
 SEARCH_MARGIN = 1.25
-"""Margin of a search over the path of a body's fastest vertex until the end of the step."""
+"""Search margin over the path of the body's fastest vertex until the end of the step."""
 
 
 SELF_DISTANCE = 1.5
-"""Distance at rest, in mean edges, below which a vertex and a triangle of one body never collide."""
+"""Distance at rest, in mean edges, below which a vertex and a triangle of the same body never collide."""
 
 
 @ti.func
 def _is_self_neighbour(state: ti.template(), p, corners, edge):
-    """True if a vertex and a triangle of one body are near each other at rest."""
+    """True if a vertex and a triangle of the same body are near each other at rest."""
     a = state.rest_position[corners[0]]
     b = state.rest_position[corners[1]]
     c = state.rest_position[corners[2]]
@@ -68,8 +68,8 @@ def _search_triangle(
 ):
     """Add a triangle of `other` to the candidates of the vertices of `body` within `margin` [m] of it.
 
-    The grid spans from `lowest` to `highest`. Particles that a joint between the two bodies holds are
-    skipped, so that contact does not act against the joint.
+    The grid spans from `lowest` to `highest`. Particles in a joint between the two bodies are skipped, so
+    that contact does not act against the joint.
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
@@ -107,7 +107,9 @@ def _search_triangle(
 
 @ti.func
 def _search_pair(state: ti.template(), body, other, margin, thickness):
-    """Find vertices of `body` within `margin` [m] of triangles of `other`. They touch at `thickness` [m]."""
+    """Find vertices of `body` within `margin` [m] of triangles of `other`. The bodies touch at `thickness`
+    [m].
+    """
     outer = state.touching.body_outer[body]
     table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
     count, lowest, highest, cells, cell = fill_grid(state, table, body, other, margin)
@@ -142,7 +144,9 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
 
 @ti.real_func
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
-    """Find the candidates of a body's vertices, after `begin_search` of all bodies of its island."""
+    """Find the candidates of a body's vertices. Call this after `begin_search` for all bodies of the
+    island.
+    """
     lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     thickest = ti.cast(0.0, ti.f32)
     for j in range(state.islands.first[island], state.islands.first[island + 1]):
@@ -165,18 +169,18 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
 
 @ti.func
 def has_contact_pairs(state: ti.template(), island):
-    """1 if a body of an island can touch another, or itself."""
+    """1 if a body of an island can touch another body or itself."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     return int(last - first > 1 or state.soft.body_touches_itself[state.islands.body[first]] == 1)
 
 
 @ti.func
 def is_outdated(state: ti.template(), island, impact_speed, h):
-    """1 if a body of an island can leave its margin in the next substep. Exploding bodies are ignored, so
-    that they cause no searches of others.
+    """1 if a vertex can travel farther than the margin of its body in the next substep.
 
+    Exploding bodies are ignored, so that they cause no searches for others.
     Args:
-        impact_speed: speed that its bodies can gain from impacts [m/s].
+        impact_speed: speed that the island's bodies can gain from impacts [m/s].
         h: substep [s].
     """
     outdated, farthest, nearest_lost = 0, ti.cast(0.0, ti.f32), ti.cast(NO_CONTACT, ti.f32)
@@ -196,11 +200,11 @@ def is_outdated(state: ti.template(), island, impact_speed, h):
 def begin_search(
     state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32
 ):
-    """Clear the candidates of a body if `forgets` is 1, and update the boxes and the margin for
-    `search_body`.
+    """Update the boxes and the margin of a body for `search_body`. If `forgets` is 1, clear its candidates
+    first.
 
     Args:
-        impact_speed: speed that it can gain from impacts [m/s].
+        impact_speed: speed that the body can gain from impacts [m/s].
         h, left: substep, and time until the end of the step [s].
     """
     if forgets == 1:
@@ -216,11 +220,10 @@ def begin_search(
 
 @ti.real_func
 def update_displacement(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
-    """Update the distance that each vertex has travelled since the last search, minus the displacement
+    """Update the distance that each vertex has travelled since the last search, without the displacement
     `shared` by the island [m].
 
-    This is the distance between two positions, not the length of the path, which grows even in a heap at
-    rest.
+    The distance is measured between two positions. The length of the path would grow even in a heap at rest.
     """
     particles = state.body_particles[body]
     farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0] & ROW_BITS
@@ -240,7 +243,7 @@ def update_displacement(state: ti.template(), body: ti.i32, shared: ti.math.vec3
                 state.soft.particle_gone[first + lane] = travelled[lane]
                 lane = row_behind(lane)
         farthest = ti.max(farthest, travelled)
-        first = (first + LANES) & ROW_BITS  # as `row_behind`, block by block
+        first = (first + LANES) & ROW_BITS  # as in `row_behind`, block by block
     state.soft.body_gone[body] = farthest.max()
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):

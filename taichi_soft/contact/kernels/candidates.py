@@ -1,4 +1,4 @@
-"""Candidates: the triangles near each vertex, which stay valid until bodies have moved too far.
+"""Candidates: the triangles near each vertex. The list stays valid until a body has moved too far.
 
 Groups of fields: reads hull; writes soft.
 """
@@ -13,10 +13,10 @@ SHORTEST, LONGEST = 0.1, 0.3
 
 @ti.real_func
 def clear_candidates(state: ti.template(), body: ti.i32):
-    """Clear the candidates of a body's vertices. Store the impulses of its contacts for the next search.
+    """Clear the candidates of a body's vertices, and store the impulses of its contacts for the next search.
 
-    Each search restarts from these impulses. Without them, bodies would sag a little once a step, and a heap
-    would never come to rest.
+    Contacts start from these impulses after the search. Without them, bodies would sag a little in each step,
+    and a heap would never come to rest.
     """
     outer = state.touching.body_outer[body]
     vertex = outer[0]
@@ -37,7 +37,7 @@ def clear_candidates(state: ti.template(), body: ti.i32):
 
 @ti.func
 def _farthest_found(soft: ti.template(), k):
-    """Row of the farthest triangle found for a vertex."""
+    """Return the row of the farthest triangle found for a vertex."""
     farthest = k * FOUND
     row = farthest + 1
     while row < k * FOUND + soft.found_count[k]:
@@ -49,9 +49,9 @@ def _farthest_found(soft: ti.template(), k):
 
 @ti.func
 def insert_candidate(soft: ti.template(), k, triangle, distance):
-    """Insert a triangle into the list of the nearest to a vertex.
+    """Insert a triangle into the list of nearest triangles of a vertex.
 
-    Returns: the distance of the one that did not fit [m].
+    Returns: the distance of the triangle that did not fit [m].
     """
     row, lost = k * FOUND + soft.found_count[k], ti.cast(NO_CONTACT, ti.f32)
     if soft.found_count[k] == FOUND:
@@ -69,7 +69,8 @@ def insert_candidate(soft: ti.template(), k, triangle, distance):
 def record_lost(state: ti.template(), body, distance, thickness):
     """Record that a triangle `distance` [m] from a vertex of a body did not fit into its list.
 
-    Bodies touch at `thickness` [m]. A new search is not needed before the rest of the distance is used up.
+    Bodies touch at `thickness` [m]. The body must be searched again before it has moved by the rest of
+    `distance`.
     """
     allowance = ti.max(distance - thickness, 2.0 * SHORTEST * state.body_surface[body].z)
     state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], allowance)
@@ -77,10 +78,11 @@ def record_lost(state: ti.template(), body, distance, thickness):
 
 @ti.func
 def list_candidates(state: ti.template(), body, thickness):
-    """Convert the triangles found for the vertices of a body to candidates, with the impulses of their
+    """Convert the triangles found for the vertices of a body to candidates, and restore the impulses of their
     contacts.
 
-    If they exceed the body's slots, the vertices with the most drop their farthest.
+    If there are more triangles than slots of the body, the vertices with the most triangles drop their
+    farthest.
     Args:
         thickness: largest thickness at which the body touches another [m].
     """

@@ -14,20 +14,21 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MAX_TOUCHES = 4
-"""Colliders that one particle can touch in turn within a substep; then it stops."""
+"""Largest number of colliders that a particle can touch in succession in a substep. Then the particle
+stops."""
 
 
 INNER_CHECK_PATH = 2.0
 """Path of a body's fastest particle in the rest of the step, in mean edges, above which inner particles are
-checked too. Hard impacts drive them past outer particles that were stopped."""
+checked too. Hard impacts drive inner particles past stopped outer ones."""
 
 UNCHECKED = 1e30
-"""Clearance [m] of inner particles that need no check."""
+"""Clearance of inner particles that are not checked [m]."""
 
 
 @ti.func
 def set_travelled(state: ti.template(), body, travelled):
-    """Store the distance that a body has travelled since near colliders were listed [m]."""
+    """Store the distance that a body has travelled since its near colliders were listed [m]."""
     state.colliders.gone[body] = travelled
 
 
@@ -36,7 +37,7 @@ def react_on_collider(state: ti.template(), row, arm, impulse):
     """Apply the opposite of a particle's impulse to a collider.
 
     Args:
-        row: that of the body and the collider.
+        row: row of the pair of body and collider.
         arm: from the collider's position to the particle [m].
     """
     state.colliders.impulse[row] = state.colliders.impulse[row] - impulse
@@ -45,14 +46,15 @@ def react_on_collider(state: ti.template(), row, arm, impulse):
 
 @ti.func
 def in_frame(colliders: ti.template(), c, x, time):
-    """A point in the frame of a collider `time` [s] after the start of the step."""
+    """Return a point in the frame that a collider has `time` [s] after the start of the step."""
     position = colliders.position[c] + colliders.velocity[c] * time
     return turned_back(spun(colliders.rotation[c], colliders.spin[c] * time), x - position)
 
 
 @ti.func
 def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
-    """Reduce the clearance of particles to that from one collider, minus the distance it can approach [m].
+    """Reduce the clearance of particles to their distance from one collider minus the distance by which it
+    can approach [m].
 
     Args:
         first, end: rows of outer particles if `outer_only` is 1, otherwise particles.
@@ -83,7 +85,7 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
 def _stays_clear(colliders: ti.template(), c, lower, upper, since, left):
     """True if a collider stays clear of a box until the end of the step.
 
-    This also works for planes, whose own boxes are infinite. Distance functions are lower bounds.
+    This also works for planes, which have infinite boxes, because distance functions are lower bounds.
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
     distance = distance_from(colliders, c, in_frame(colliders, c, center, since))
@@ -92,7 +94,8 @@ def _stays_clear(colliders: ti.template(), c, lower, upper, since, left):
 
 @ti.real_func
 def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
-    """List the colliders within `reach` [m] of a body's particles, and each particle's clearance from them.
+    """List the colliders within `reach` [m] of a body's particles, and store each particle's clearance from
+    them.
 
     Args:
         since, left: time since the start of the step, and until its end [s].
@@ -134,12 +137,12 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
     """Store the clearance of each particle from the first `count` near colliders, 1 or more.
 
-    Planes stop all particles: otherwise inner particles of a body that folds could go below the floor.
+    Planes stop all particles. Otherwise inner particles of a folding body could move below the floor.
     """
     colliders, outer, particles = state.colliders, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
         colliders.particle_clearance[p] = UNCHECKED
-    touches_by_points = False  # of its hull, not by particles
+    touches_by_points = False  # the hull's points collide, not the particles
     if ti.static(state.capacity.contact.hull):
         touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
     if is_deep and not touches_by_points:
@@ -147,7 +150,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
             if colliders.kind[colliders.near[row + i]] != ShapeKind.PLANE:
                 _measure_clearance(state, colliders.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
-            if colliders.particle_clearance[p] < 0.0:  # it entered unchecked: do not eject it at once
+            if colliders.particle_clearance[p] < 0.0:  # entered unchecked: do not eject it at once
                 colliders.particle_clearance[p] = UNCHECKED
     for k in range(outer[0], outer[1]):
         colliders.particle_clearance[state.touching.outer_particle[k]] = reach
@@ -161,7 +164,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
 
 @ti.real_func
 def clear_contacts(state: ti.template(), body: ti.i32):
-    """Clear the impulses of the last step and the list of near colliders."""
+    """Clear the impulses of the last step and the list of near colliders of a body."""
     row = body * state.colliders.capacity.colliders
     while row < (body + 1) * state.colliders.capacity.colliders:
         state.colliders.impulse[row] = ti.Vector.zero(ti.f32, 3)
@@ -176,13 +179,13 @@ def clear_contacts(state: ti.template(), body: ti.i32):
 
 @ti.func
 def collide_particle(state: ti.template(), body, p, h, since):
-    """Collide a particle on the path that its velocity has just moved it along.
+    """Collide a particle on the path along which its velocity has just moved it.
 
-    A particle that touches nothing is not written, so the result does not depend on which colliders are
+    A particle that touches nothing is not changed, so the result does not depend on which colliders are
     listed.
     Args:
         h: substep [s].
-        since: time from the start of the fixed step to that of the substep [s].
+        since: time from the start of the fixed step to the start of the substep [s].
     """
     v = state.particle_velocity[p]
     path = h * v
@@ -193,7 +196,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
     while is_open == 1:
         earliest, which = ti.cast(NO_TOUCH, ti.f32), -1
         distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
-        # After a touch, the path lies in the surface up to rounding: that is no second touch.
+        # After a touch, the path lies in the surface up to rounding. This is not a second touch.
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.colliders.near_count[body]):
             c = state.colliders.near[row + k]
@@ -220,7 +223,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
             lift = ti.max(rest - distance, 0.0)
             before = x + path
             x += earliest * path + lift * n
-            # Contact shortens the remaining path as it reduces the velocity.
+            # Contact shortens the remaining path in the same proportion as it reduces the velocity.
             path = (
                 (1.0 - earliest) * path + (rest - beyond - lift) * n + left * h * (change - n * change.dot(n))
             )
@@ -235,7 +238,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
                 add_normal_impulse(
                     state.colliders, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
                 )
-            # The path also shifts without a change of v; that changes the angular momentum.
+            # The path also shifts without a change of v, which changes the angular momentum.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
             state.colliders.impulse[row + c] = state.colliders.impulse[row + c] + impulse
             moment = state.colliders.angular_impulse[row + c] + angular_impulse

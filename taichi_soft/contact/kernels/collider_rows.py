@@ -1,4 +1,4 @@
-"""Write the callers' colliders to their fields, and read impulses.
+"""Write colliders to their fields, and read the impulses on them.
 
 Groups of fields: writes colliders.
 """
@@ -7,7 +7,8 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 20
-"""Position, quaternion, velocity, angular velocity, both corners of the swept box, highest speed."""
+"""Numbers per row of `write_collider_motion`: position, quaternion, velocity, angular velocity, both corners
+of the swept box, highest speed."""
 
 
 @ti.func
@@ -32,7 +33,7 @@ def write_collider_motion(colliders: ti.template(), rows: ti.types.ndarray(dtype
 
 @ti.kernel
 def write_samples(colliders: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write the grid of one solid from row `begin` on."""
+    """Write the grid of one solid, starting at row `begin`."""
     for i in range(samples.shape[0]):
         colliders.samples[begin + i] = samples[i]
 
@@ -58,7 +59,7 @@ def sum_collider_impulses(
 
 @ti.kernel
 def forget_collider(colliders: ti.template(), body_count: ti.i32, c: ti.i32):
-    """Clear the impulses and rebound speeds of a row before another collider uses it."""
+    """Clear the impulses and rebound speeds in row `c` before another collider uses it."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
         row = body * colliders.capacity.colliders + c

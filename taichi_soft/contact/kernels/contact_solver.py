@@ -1,8 +1,9 @@
-"""Contact solver between the bodies of an island: impulses between a vertex and a triangle, pair by pair.
+"""Contact solver for the bodies of an island: apply impulses between a vertex and a triangle, pair by pair.
 
-Each pair loses the part of its approach that would close the gap within the substep, and of its sliding what
-friction takes: projected Gauss-Seidel over velocities, warm-started with the impulses of the last substep.
-Impulses are equal and opposite. Penetration is corrected by positions, without changing velocities.
+An impulse removes the part of the pair's approach that would close the gap within the substep, and friction
+reduces its sliding. The method is projected Gauss-Seidel over velocities, warm-started with the impulses of
+the last substep. Impulses are equal and opposite. Penetration is corrected by positions, without changing
+velocities.
 
 Groups of fields: reads hull, islands; writes soft.
 """
@@ -19,14 +20,14 @@ from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 3
-"""Sweeps over all contacts in a substep. Because of the warm start, eight make heaps no calmer."""
+"""Sweeps over all contacts in a substep. Because of the warm start, eight sweeps do not make heaps calmer."""
 
 POSITION_CORRECTION = 0.2
-"""Fraction of a penetration that one substep corrects."""
+"""Fraction of a penetration that is corrected in each substep."""
 
 CONTACT_SLOP = 0.25
-"""Fraction of the thickness by which pairs can be too close without a correction. Contacts end within it.
-Correcting the remainder of every sweep at once, against the forces that press the pair together, would feed
+"""Fraction of the thickness by which a pair can be too close without a correction. Pairs at rest stay within
+it. Correcting the whole depth would act against the forces that press the pair together, and excite
 vibrations."""
 
 
@@ -34,10 +35,10 @@ vibrations."""
 def precompute_contact(state: ti.template(), slot):
     """Compute the terms of a contact that stay constant during the solver's sweeps.
 
-    Friction acts at the vertex, as if the triangle extended up to it. With b and g the vertex's barycentric
-    coordinates and their gradients, n the triangle's normal and s the height above it, the triangle's
-    velocity there is sum b v - s sum g (n.v), as in a rigid rotation. Distributing the impulse in the same
-    proportions conserves the angular momentum of the two at any distance between them.
+    Friction acts at the vertex, as if the triangle extended to the vertex. With b and g the vertex's
+    barycentric coordinates and their gradients, n the triangle's normal and s the height above it, the
+    triangle's velocity there is sum b v - s sum g (n.v), as in a rigid rotation. Distributing the impulse in
+    the same proportions conserves the angular momentum of the pair at any distance.
     """
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     a, b, c = (
@@ -69,7 +70,7 @@ def precompute_contact(state: ti.template(), slot):
 
 @ti.func
 def _separate(state: ti.template(), p, corners, slot, depth):
-    """Move a pair apart by part of its penetration `depth` [m], without changing velocities."""
+    """Move a pair apart by a fraction of its penetration `depth` [m], without changing velocities."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
     total = inv_mass_of(state, p)
     for i in range(3):
@@ -87,8 +88,8 @@ def _separate(state: ti.template(), p, corners, slot, depth):
 def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
     """Apply a normal impulse and friction to a vertex and a triangle.
 
-    The normal impulse leaves no approach that would close the gap within `h` [s]. The first sweep repeats the
-    impulses of the last substep.
+    The normal impulse removes any approach that would close the gap within `h` [s]. The first sweep repeats
+    the impulses of the last substep.
 
     Returns: 1 if the two are pressed together.
     """
@@ -119,7 +120,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
         corner_v -= (impulse * weights * corner_m).outer_product(normal)
 
     friction_impulse = soft.slot_friction_impulse[slot]
-    # If the normal impulse is back at zero, friction takes back the impulse of an earlier sweep.
+    # If the normal impulse is zero again, revert the friction of earlier sweeps.
     if normal_impulse > 0.0 or ti.abs(friction_impulse).max() > 0.0:
         change = friction_impulse
         if is_first == 0:
@@ -146,7 +147,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
-    """Solve one contact in one sweep. The last sweep also corrects penetration."""
+    """Solve one contact in one sweep. In the last sweep, also correct its penetration."""
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     mine = state.body_surface[state.particle_body[p]]
     theirs = state.body_surface[state.particle_body[corners[0]]]

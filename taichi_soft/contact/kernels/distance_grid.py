@@ -1,17 +1,20 @@
-"""Signed distance of a closed mesh on the nodes of a grid. Unit: cells; node (i, j, k) is at (i, j, k)."""
+"""Signed distance of a closed mesh at the nodes of a grid. The unit is the cell; node (i, j, k) is at
+(i, j, k).
+"""
 
 from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 STEPS = 4096
-"""Lattice steps per cell, to which x and y of the vertices are rounded. In integers, a line along z through a
-node passes every edge on the same side for both its triangles, so that each crossing counts exactly once."""
+"""Lattice steps per cell, to which x and y of the vertices are rounded. With integers, a line along z through
+a node passes an edge on the same side for both triangles of the edge, so that each crossing counts exactly
+once."""
 
 
 @ti.func
 def _side(ax, ay, bx, by, x, y):
-    """Twice the area of a, b and (x, y), and whether (x, y) is left of ab. If the area is 0, a point slightly
-    to the right decides.
+    """Return twice the area of a, b and (x, y), and whether (x, y) is left of ab. If the area is 0, a point
+    slightly to the right decides.
     """
     area = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     is_left = area > 0
@@ -26,12 +29,12 @@ def accumulate_crossings(
     heights: ti.types.ndarray(dtype=ti.f64, ndim=2),
     crossings: ti.types.ndarray(dtype=ti.i32, ndim=3),
 ):
-    """Count for each node how often the surface crosses the segment to the next node up.
+    """Count for each node the crossings of the surface with the segment to the next node up.
 
     Args:
         lattice: x and y of the corners of each triangle in steps, (f, 3, 2).
         heights: z of the corners in cells, (f, 3).
-        crossings: (nx, ny, nz), zeros; receives +1 for leaving the solid on the way up, -1 for entering.
+        crossings: (nx, ny, nz), zeros; receives +1 if the segment leaves the solid, -1 if it enters.
     """
     for f in range(lattice.shape[0]):
         ax, ay, bx, by = lattice[f, 0, 0], lattice[f, 0, 1], lattice[f, 1, 0], lattice[f, 1, 1]
@@ -50,13 +53,13 @@ def accumulate_crossings(
                     a, b, c = ti.cast(area_a, ti.f64), ti.cast(area_b, ti.f64), ti.cast(area_c, ti.f64)
                     z = (a * heights[f, 0] + b * heights[f, 1] + c * heights[f, 2]) / (a + b + c)
                     below = ti.cast(ti.ceil(z), ti.i32) - 1
-                    # The sum of integers does not depend on their order.
+                    # Integer sums do not depend on the order.
                     ti.atomic_add(crossings[i, j, below], ti.select(left_a, 1, -1))
 
 
 @ti.func
 def _box_gap_squared(boxes: ti.template(), node, p):
-    """Squared distance of p from a box of the tree; 0 inside."""
+    """Return the squared distance of p from a box of the tree; 0 inside."""
     squared = 0.0
     for axis in ti.static(range(3)):
         gap = ti.max(boxes[node, axis] - p[axis], p[axis] - boxes[node, 3 + axis], 0.0)
@@ -71,7 +74,9 @@ def _corner(corners: ti.template(), f, k):
 
 @ti.func
 def _nearest_squared(corners: ti.template(), boxes: ti.template(), p, reach_squared):
-    """Squared distance of p from the nearest triangle, or `reach_squared` if none is nearer."""
+    """Return the squared distance of p from the nearest triangle, or `reach_squared` if no triangle is
+    nearer.
+    """
     leaves = boxes.shape[0] // 2
     nearest = reach_squared
     node = 1
@@ -84,7 +89,7 @@ def _nearest_squared(corners: ti.template(), boxes: ti.template(), p, reach_squa
                 f = node - leaves
                 a, b, c = _corner(corners, f, 0), _corner(corners, f, 1), _corner(corners, f, 2)
                 nearest = ti.min(nearest, (p - nearest_on_triangle(p, a, b, c)).norm_sqr())
-            # Continue with the sibling of the nearest left child among this node and its ancestors.
+            # Continue with the sibling of the nearest left child, which can be this node or an ancestor.
             while node % 2 == 1:
                 node = node // 2
             if node > 0:
@@ -103,9 +108,9 @@ def compute_grid_distances(
 
     Args:
         corners: corners of the triangles, (f, 3, 3).
-        boxes: boxes of a binary tree over them, (2 n, 6), see `triangle_tree`.
-        windings: crossings; receives the winding number of the surface around each node.
-        distances: (nx, ny, nz).
+        boxes: boxes of a binary tree over the triangles, (2 n, 6), see `triangle_tree`.
+        windings: crossings of each segment; receives the winding number of the surface around each node.
+        distances: receives the distances, (nx, ny, nz).
     """
     for row in range(distances.shape[0] * distances.shape[1]):
         i, j = row // distances.shape[1], row % distances.shape[1]

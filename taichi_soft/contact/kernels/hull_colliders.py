@@ -1,12 +1,13 @@
-"""Collide hull points with colliders: impulses on the particles that carry them.
+"""Collide hull points with colliders, by impulses on the particles that carry the points.
 
-Many points share carriers: an impulse that stops one point also stops its neighbours, and can throw them up.
-So the contacts of a body are solved together, like those between bodies: projected Gauss-Seidel over
-velocities, warm-started with the impulses of the last substep. Each contact's accumulated impulse is bounded,
-not its increments: it never pulls, and friction stays within Coulomb's cone. So a sweep can take back an
-impulse that another contact made unnecessary, and points at rest stay at rest.
+Many points share carriers: an impulse that stops one point also changes the velocities of its neighbours, and
+can throw them up. So all contacts of a body are solved together, by the same method as contacts between
+bodies: projected Gauss-Seidel over velocities, warm-started with the impulses of the last substep. The
+accumulated impulse of a contact is bounded, not each increment: the sum never pulls, and friction stays
+within Coulomb's cone. So a sweep can revert an impulse that another contact made unnecessary, and points at
+rest stay at rest.
 
-Remaining penetration is corrected by positions, without changing velocities.
+Remaining penetration is corrected by changing positions, not velocities.
 
 Groups of fields: writes colliders, hull.
 """
@@ -27,25 +28,25 @@ from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 3
-"""Sweeps over all contacts of a body in a substep, forwards and backwards in turn."""
+"""Sweeps over all contacts of a body in a substep, alternately forwards and backwards."""
 
 POSITION_CORRECTION = 0.3
-"""Fraction of a depth beyond `TOUCHING` that a substep corrects at each point. Neighbours with the same
-carriers move too."""
+"""Fraction of the depth beyond `TOUCHING` that is corrected at each point in a substep. Neighbours with the
+same carriers move too."""
 
 
 @ti.func
 def clear_warm_start(state: ti.template(), body):
-    """Clear the impulses with which contacts of a hull with colliders start."""
+    """Clear the impulses with which the contacts of a hull with colliders start."""
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
         state.hull.held_by[p] = ti.Vector.zero(ti.i32, 2)
 
 
 @ti.func
 def clear_warm_start_if_free(state: ti.template(), body):
-    """Clear these impulses before a step if nothing touched the body in the last one.
+    """Clear the impulses of the warm start before a step, if nothing touched the body in the last step.
 
-    Call it before the impulses of the last step are cleared.
+    Call this before the impulses of the last step are cleared.
     """
     felt = ti.cast(0.0, ti.f32)
     room = state.colliders.capacity.colliders
@@ -57,11 +58,12 @@ def clear_warm_start_if_free(state: ti.template(), body):
 
 @ti.func
 def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
-    """Store the contact of a point with the near collider at index `k`. Returns: 1 if they meet."""
+    """Store the contact of a point with the near collider at index `k`. Returns: 1 if they can touch."""
     c = state.colliders.near[body * state.colliders.capacity.colliders + k]
     a = in_frame(state.colliders, c, x, since)
     b = in_frame(state.colliders, c, x + h * v, since + h)
-    # Include paths that end just in front of the surface: impulses at neighbours can move the point on.
+    # Include paths that end just in front of the surface, because impulses at neighbours can move the point
+    # farther.
     part, distance, beyond, normal = first_touch(state.colliders, c, a, b, -TOUCHING)
     if part < NO_TOUCH:
         after = since + h
@@ -70,7 +72,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
         centre = state.colliders.position[c] + state.colliders.velocity[c] * after
         surface_velocity = state.colliders.velocity[c] + spin.cross(x + h * v - beyond * n - centre)
         approach = n.dot(surface_velocity - v)
-        # Allow the approach up to the surface. A resting point stays where it is.
+        # Allow an approach up to the surface. A resting point does not move.
         allowed = ti.select(distance <= TOUCHING, 0.0, ti.min((0.5 * TOUCHING - beyond) / h - approach, 0.0))
         if approach > RESTITUTION_SPEED and surface.y > 0.0:
             allowed = surface.y * approach
@@ -93,7 +95,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
 
 @ti.func
 def _list_touches(state: ti.template(), body, h, since, travelled):
-    """List the contacts of a body's points with colliders. Returns: their number."""
+    """List the contacts of a body's points with colliders, and return their number."""
     first = state.touching.body_outer[body][0] * TOUCHES
     count = 0
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
@@ -115,7 +117,7 @@ def _list_touches(state: ti.template(), body, h, since, travelled):
 
 @ti.func
 def _solve_touch(state: ti.template(), row):
-    """Solve one contact in one sweep."""
+    """Solve the contact in `row`, once per sweep."""
     p, n = state.hull.touch_point[row], state.hull.touch_normal[row]
     m, friction = (
         state.hull.touch_inv_mass[row],
@@ -138,7 +140,7 @@ def _solve_touch(state: ti.template(), row):
 
 @ti.func
 def _correct_penetration(state: ti.template(), row, h):
-    """Move a point that will be inside a collider after the drift part of the displacement out.
+    """Move a point out of a collider if it would be inside after the drift.
 
     Returns: the angular momentum that this adds to its body [N m s].
     """
@@ -155,10 +157,10 @@ def _correct_penetration(state: ti.template(), row, h):
 
 @ti.func
 def _store_impulse(state: ti.template(), body, row, turn, time):
-    """Add the impulse to the collider's, and store it for the next substep.
+    """Add the impulse of a contact to its collider, and store it for the next substep.
 
     Args:
-        turn: angular momentum added to the body by moving the point out [N m s].
+        turn: angular momentum that moving the point out added to the body [N m s].
         time: time of the impulse since the start of the step [s].
     """
     p, c, n = state.hull.touch_point[row], state.hull.touch_collider[row], state.hull.touch_normal[row]
@@ -192,7 +194,7 @@ def _store_impulse(state: ti.template(), body, row, turn, time):
 
 @ti.real_func
 def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
-    """Solve the contacts of a body's hull with colliders before it drifts."""
+    """Solve the contacts of a body's hull with colliders. Call this before the drift of the body."""
     first = state.touching.body_outer[body][0] * TOUCHES
     count = _list_touches(state, body, h, since, travelled)
     for row in range(first, first + count):

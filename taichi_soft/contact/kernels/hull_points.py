@@ -1,6 +1,7 @@
-"""Hull points: position, velocity, and impulses distributed to the particles that carry them.
+"""Hull points: compute their positions and velocities from the particles that carry them, and distribute
+impulses to these particles.
 
-In a world without hulls, a particle carries itself.
+In a world without hulls, each particle is a point and carries itself.
 
 Groups of fields: reads hull, joints.
 """
@@ -11,7 +12,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def motion_of(state: ti.template(), p):
-    """Position [m] and velocity [m/s] of a particle, or of a hull point from its carriers."""
+    """Return position [m] and velocity [m/s] of a particle, or of a hull point from its carriers."""
     x, v = state.particle_position[p], state.particle_velocity[p]
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -24,7 +25,7 @@ def motion_of(state: ti.template(), p):
 
 @ti.func
 def inv_mass_at(state: ti.template(), p):
-    """Inverse mass of a particle or hull point [1/kg]; 0 if the body cannot move."""
+    """Return the inverse mass of a particle or hull point [1/kg]; 0 if the body cannot move."""
     inv_mass = ti.cast(0.0, ti.f32)
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -37,7 +38,9 @@ def inv_mass_at(state: ti.template(), p):
 
 @ti.real_func
 def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
-    """Speed that an impulse of 1 N s at one hull point gives another of the same body [m/s]."""
+    """Return the speed that an impulse of 1 N s at one hull point gives to another point of the same body
+    [m/s].
+    """
     mobility = ti.cast(0.0, ti.f32)
     mine, theirs = state.hull.carriers[p], state.hull.carriers[q]
     own_weights, their_weights = state.hull.weights[p], state.hull.weights[q]
@@ -50,7 +53,7 @@ def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
 
 @ti.func
 def apply_point_impulse(state: ti.template(), p, impulse):
-    """Apply an impulse [N s] to the carriers of a hull point. Carriers that cannot move are skipped."""
+    """Apply an impulse [N s] to the carriers of a hull point, except carriers that cannot move."""
     who, weights = state.hull.carriers[p], state.hull.weights[p]
     for k in range(4):
         change = weights[k] * inv_mass_of(state, who[k]) * impulse
@@ -59,8 +62,8 @@ def apply_point_impulse(state: ti.template(), p, impulse):
 
 @ti.func
 def shift_point(state: ti.template(), p, impulse):
-    """Displace the carriers of a hull point by the distance that an impulse [N s] would move them in one
-    second.
+    """Displace the carriers of a hull point by the distance that they would move in 1 s after an impulse
+    [N s].
     """
     who, weights = state.hull.carriers[p], state.hull.weights[p]
     for k in range(4):
@@ -82,7 +85,7 @@ def mark_touched(state: ti.template(), p):
 
 @ti.func
 def is_held(state: ti.template(), p):
-    """1 if a joint holds a particle, or a carrier of a hull point."""
+    """1 if a particle, or a carrier of a hull point, is in a joint."""
     held = 0
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -96,7 +99,7 @@ def is_held(state: ti.template(), p):
 
 @ti.func
 def has_hull(state: ti.template(), body):
-    """True if a body touches others by a hull."""
+    """True if a body has a hull, with which it touches others."""
     points = state.hull.body_points[body]
     return points[0] < points[1]
 
@@ -112,9 +115,9 @@ def place_points(state: ti.template(), body):
 
 @ti.func
 def update_points(state: ti.template(), body, common):
-    """Update positions and speeds of hull points from their carriers.
+    """Update the positions and speeds of a body's hull points from their carriers.
 
-    Returns: the highest speed [m/s], and the highest relative to the `common` velocity.
+    Returns: the highest speed [m/s], and the highest speed relative to the `common` velocity.
     """
     speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     if ti.static(state.capacity.contact.hull):

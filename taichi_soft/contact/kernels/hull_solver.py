@@ -1,7 +1,7 @@
-"""Impulses between hull points and triangles of hull points, as `contact_solver` does for particles.
+"""Apply impulses between hull points and triangles of hull points, as `contact_solver` does for particles.
 
-A particle is a point that carries itself. Corners of one triangle can share carriers: an impulse at one then
-also moves the others, by `HullFields.slot_mobility`.
+A particle is a point that carries itself. Corners of a triangle can share carriers. An impulse at one corner
+then also moves the others, by `HullFields.slot_mobility`.
 
 Groups of fields: writes hull, soft.
 """
@@ -20,7 +20,9 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def precompute_mobility(state: ti.template(), slot, p, corners):
-    """Compute the inverse mass of a contact's point and the mobilities between its triangle's corners."""
+    """Compute the inverse mass of a contact's point, and the mobilities between the corners of its
+    triangle.
+    """
     state.soft.slot_inv_mass[slot][0] = inv_mass_at(state, p)
     for i in ti.static(range(3)):
         for k in ti.static(range(i + 1)):
@@ -31,7 +33,9 @@ def precompute_mobility(state: ti.template(), slot, p, corners):
 
 @ti.func
 def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
-    """Solve one contact, as `contact_solver` does. Returns: 1 if the two are pressed together."""
+    """Solve one contact of hull points, as `contact_solver` does for particles. Returns: 1 if the two are
+    pressed together.
+    """
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
     m, mobility = soft.slot_inv_mass[slot][0], state.hull.slot_mobility[slot]
@@ -86,7 +90,7 @@ def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, fr
 
 @ti.func
 def separate_points(state: ti.template(), p, corners, slot, distance):
-    """Move a pair apart by `distance` [m], without changing velocities."""
+    """Move a point and a triangle apart by `distance` [m], without changing velocities."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
     total = state.soft.slot_inv_mass[slot][0] + weights.dot(state.hull.slot_mobility[slot] @ weights)
     if total > 0.0:

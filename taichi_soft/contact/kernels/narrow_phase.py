@@ -1,4 +1,4 @@
-"""Narrow phase: find which candidates are contacts in this substep, with their gaps and normals.
+"""Narrow phase: find the candidates that are contacts in this substep, with their gaps and normals.
 
 Candidates within range are listed first, `LANES` at a time, and their gaps are computed in SIMD lanes, as in
 `elastic`. Contacts are then selected vertex by vertex.
@@ -15,19 +15,19 @@ from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
 OUTSIDE = 1e-4
-"""Smallest barycentric weight at which the nearest point counts as inside the triangle."""
+"""Smallest barycentric weight for which the nearest point counts as inside the triangle."""
 
 SAME_NORMAL = 0.7
-"""Cosine between the normals of two contacts of a vertex above which they count as one. So a flat surface
-gives one contact however it is triangulated, and a corner two."""
+"""Cosine between the normals of two contacts of a vertex above which they count as one contact. So a flat
+surface gives one contact for any triangulation, and a corner gives two."""
 
 SAME_NORMAL_INSIDE = 0.95
-"""`SAME_NORMAL` for a vertex inside both triangles, which lies in a valley or a dent, or on two bodies. Both
-sides of a valley must hold it. In a dent, several contacts would make it oscillate."""
+"""`SAME_NORMAL` for a vertex inside both triangles, which is in a valley or a dent, or touches two bodies.
+Both sides of a valley must support the vertex. In a dent, several contacts would make it oscillate."""
 
 MIN_ADVANTAGE = 0.01
-"""Fraction of the thickness by which a contact at an edge must be nearer to replace one that carries a
-load."""
+"""Fraction of the thickness by which a contact at an edge must be nearer to replace another one that carries
+a load."""
 
 
 @ti.func
@@ -35,7 +35,7 @@ def _list_near_candidates(state: ti.template(), body, impact_speed, h):
     """List the candidates of a body that can touch within the substep. Returns: their number.
 
     Args:
-        impact_speed: speed that either can gain from impacts [m/s].
+        impact_speed: speed that either body can gain from impacts [m/s].
         h: substep [s].
     """
     first_slot, slots, count = state.touching.body_outer[body][0] * SLOTS, state.soft.slot_count[body], 0
@@ -62,8 +62,8 @@ def _list_near_candidates(state: ti.template(), body, impact_speed, h):
 def _measure_gap(state: ti.template(), slot):
     """Compute the position of a vertex relative to a triangle.
 
-    Returns: direction from the triangle; distance [m], negative behind it; weights of the nearest point; 1 if
-    contact is possible: a vertex behind an edge belongs to another triangle, or is outside.
+    Returns: direction from the triangle; distance [m], negative behind the triangle; weights of the nearest
+    point; 1 if contact is possible. A vertex behind an edge belongs to another triangle, or is outside.
     """
     who = state.soft.slot_vertices[slot]
     x = state.particle_position[who[0]]
@@ -87,9 +87,9 @@ def _measure_gap(state: ti.template(), slot):
 
 @ti.func
 def _contact_range(state: ti.template(), slot, impact_speed, h):
-    """Thickness [m] at which a vertex and a triangle touch, and the distance [m] that they can approach
-    within the substep. If one of their bodies explodes, the distance is -NO_CONTACT, so that they never
-    touch.
+    """Return the thickness [m] at which a vertex and a triangle touch, and the distance [m] by which they can
+    approach within the substep. If one of their bodies explodes, the distance is -NO_CONTACT, so that they
+    never touch.
     """
     who = state.soft.slot_vertices[slot]
     mine, other = state.particle_body[who[0]], state.particle_body[who[1]]
@@ -110,7 +110,7 @@ def _clear_impulses(soft: ti.template(), slot):
 
 @ti.func
 def _merge_contacts(soft: ti.template(), lost, kept):
-    """End one contact and add its impulses to another."""
+    """End contact `lost` and add its impulses to contact `kept`."""
     soft.slot_gap[lost] = NO_CONTACT
     soft.slot_normal_impulse[kept] = soft.slot_normal_impulse[kept] + soft.slot_normal_impulse[lost]
     soft.slot_friction_impulse[kept] = soft.slot_friction_impulse[kept] + soft.slot_friction_impulse[lost]
@@ -119,16 +119,17 @@ def _merge_contacts(soft: ti.template(), lost, kept):
 
 @ti.func
 def _merge_duplicate_contacts(soft: ti.template(), first, at, lead):
-    """Keep the nearest of the contacts that push a vertex in the same direction: this or an earlier one.
+    """Merge this contact and earlier ones that push the vertex in the same direction into the nearest of
+    them.
 
     The nearest contact inherits the impulses of the others, so that a vertex that crosses an edge stays
-    supported. In front of an edge, the distances to both triangles are equal up to rounding. There the
-    triangle that carries the load keeps its contact: the other triangle distributes friction to other
-    corners, and each change would be a jolt that prevents heaps from coming to rest.
+    supported. In front of an edge, the distances to both triangles are equal up to rounding. There, the
+    triangle that carries the load keeps its contact. The other triangle would distribute friction to other
+    corners, and the jolt of each change would prevent heaps from coming to rest.
 
     Args:
-        first, at: rows of `near_slot`: that of the vertex's first contact, and of this one.
-        lead: distance by which another must be nearer at an edge [m].
+        first, at: rows in `near_slot` of the vertex's first contact and of this contact.
+        lead: distance by which another contact must be nearer at an edge [m].
     """
     slot = soft.near_slot[at]
     is_inside = int(soft.slot_weights[slot].min() > OUTSIDE)
@@ -148,13 +149,14 @@ def _merge_duplicate_contacts(soft: ti.template(), first, at, lead):
 
 @ti.func
 def _is_in_front(state: ti.template(), first, at, slot, depth, behind):
-    """1 if a vertex that is `depth` [m] behind a triangle is nearer to the front of another triangle of that
+    """1 if a vertex `depth` [m] behind a triangle is nearer to the front of another triangle of the same
     body.
 
-    Then it is outside: of a part thinner than the search range, the back is found as well.
+    Such a vertex is outside the body. If a part is thinner than the search range, the triangles on its far
+    side are found as well.
     Args:
-        first, at: rows of `near_slot`: that of the vertex's first contact, and of this one.
-        behind: slot of the present contact from behind, or -1.
+        first, at: rows in `near_slot` of the vertex's first contact and of this contact.
+        behind: slot of the vertex's current contact from behind, or -1.
     """
     body, is_outside = state.particle_body[state.soft.slot_vertices[slot][1]], 0
     for row in range(first, at):
@@ -168,8 +170,8 @@ def _is_in_front(state: ti.template(), first, at, slot, depth, behind):
 def _select_contacts(state: ti.template(), body, count, impact_speed, h):
     """Select contacts among the near candidates.
 
-    For each vertex these are the triangles that it is in front of. Of the triangles that it is behind, only
-    the shallowest counts, and only if the vertex is not nearer to the front of the same body.
+    A vertex has contact with all triangles that it is in front of. Among the triangles that it is behind, it
+    has contact only with the shallowest, and only if it is not nearer to the front of the same body.
 
     Args:
         count: number of near candidates.
@@ -179,8 +181,8 @@ def _select_contacts(state: ti.template(), body, count, impact_speed, h):
     vertex, first_row, shallowest, behind = -1, first_slot, ti.cast(-1e30, ti.f32), -1
     for block in range((count + LANES - 1) // LANES):
         first = (first_slot + block * LANES) & ROW_BITS
-        normals = ti.Matrix.zero(ti.f32, LANES, 4)  # and the distance
-        feet = ti.Matrix.zero(ti.f32, LANES, 4)  # weights of the nearest point, and whether it can touch
+        normals = ti.Matrix.zero(ti.f32, LANES, 4)  # normals, and distances
+        feet = ti.Matrix.zero(ti.f32, LANES, 4)  # weights of the nearest point, and if contact is possible
         for lane in range(LANES):
             normal, distance, weights, can_touch = _measure_gap(state, state.soft.near_slot[first + lane])
             for i in ti.static(range(3)):
@@ -225,13 +227,13 @@ def _select_contacts(state: ti.template(), body, count, impact_speed, h):
 
 @ti.real_func
 def find_contacts(state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: ti.f32):
-    """List the contacts of a body's vertices; `impact_speed` and `h` as in `_list_near_candidates`."""
+    """List the contacts of a body's vertices. `impact_speed` and `h` are those of `_list_near_candidates`."""
     first_slot, before = state.touching.body_outer[body][0] * SLOTS, state.soft.contact_count[body]
     near = _list_near_candidates(state, body, impact_speed, h)
     for k in range(first_slot, first_slot + before):
         state.soft.slot_gap[state.soft.contact_slot[k]] = NO_CONTACT
     _select_contacts(state, body, near, impact_speed, h)
-    # Clear the impulses of ended contacts: they would warm-start a later contact in the same slot.
+    # Clear the impulses of ended contacts. Otherwise a later contact in the same slot would start with them.
     for k in range(first_slot, first_slot + before):
         slot = state.soft.contact_slot[k]
         if state.soft.slot_gap[slot] >= NO_CONTACT:
@@ -244,6 +246,6 @@ def find_contacts(state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: t
             state.soft.contact_slot[first_slot + count] = slot
             count += 1
         else:
-            _clear_impulses(state.soft, slot)  # may have been merged into it before it was dropped
+            _clear_impulses(state.soft, slot)  # contacts may have been merged into it before
         near_row = row_behind(near_row)
     state.soft.contact_count[body] = count

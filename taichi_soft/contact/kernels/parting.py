@@ -1,9 +1,9 @@
 """Move apart bodies that were placed inside each other, before they touch.
 
-Contact keeps a vertex on its side of a surface, so bodies placed inside each other would stay there for good.
-Each step therefore first checks which bodies the newly placed ones overlap. Overlapping bodies do not touch.
-The end of the step moves them apart as rigid bodies, at a limited speed. Their velocities change only by the
-relative velocity of approach. As soon as they are clear of each other, they can touch again.
+Contact keeps a vertex on its side of a surface, so bodies placed inside each other would stay there. Each
+step therefore first finds the bodies that overlap newly placed ones. Contact ignores overlapping pairs. At
+the end of the step, they are moved apart as rigid bodies, at a limited speed. Velocities change only to stop
+the approach. As soon as the bodies no longer overlap, contact acts on them again.
 
 Groups of fields: reads colliders, hull, islands; writes soft.
 """
@@ -22,28 +22,29 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 PARTING_RATE = 2.0
-"""Relative speed at which two bodies move apart, over the largest side of the smaller one [1/s]."""
+"""Relative speed with which two bodies are moved apart, over the largest side of the smaller body [1/s]."""
 
 OUTSET = 0.5
-"""Clearance, in thicknesses, at which overlapping bodies can touch again. Contact then has hardly any
+"""Clearance, in thicknesses, from which contact acts on two bodies again. Contact then has hardly any
 penetration to correct."""
 
 INWARD_SHIFT = 0.05
 """Fraction by which the corners of a triangle are moved towards its centre for the overlap test."""
 
 MIN_CENTER_DISTANCE = 1e-3
-"""Distance of two centres, over the largest side, below which the slots choose the direction."""
+"""Distance of two centres, over the largest side, below which the slots of the bodies determine the
+direction."""
 
 
 @ti.func
 def _is_joined_or_filtered(state: ti.template(), a, b):
-    """1 if two bodies can overlap by design."""
+    """1 if two bodies are allowed to overlap, because they are joined or their groups exclude contact."""
     return int(not may_touch(state, a, b)) | are_joined(state, a, b)
 
 
 @ti.func
 def _mobility(state: ti.template(), body):
-    """Inverse mass of a body that can move as a whole [1/kg]; 0 if it is pinned or cannot move."""
+    """Return the inverse mass of a body [1/kg]; 0 if it is pinned or cannot move."""
     particles = state.body_particles[body]
     mass, is_free, p = ti.cast(0.0, ti.f32), int(state.body_status[body] == ACTIVE), particles[0]
     while p < particles[1]:
@@ -55,10 +56,10 @@ def _mobility(state: ti.template(), body):
 
 @ti.func
 def _side_of_edge(p, q, a, b):
-    """Side of an edge from a to b on which the origin of a plane lies: 1 or -1.
+    """Return the side of an edge from a to b on which the origin of the plane lies: 1 or -1.
 
-    Both triangles of an edge compute the same product, ordered by the numbers `p` and `q` of its particles,
-    with opposite signs. So a ray passes through exactly one of the two, whatever the rounding.
+    Both triangles of an edge compute the same product with opposite signs, in the order of the numbers `p`
+    and `q` of its particles. So a ray passes through exactly one of the two triangles for any rounding.
     """
     is_turned = p > q
     first, second = ti.select(is_turned, b, a), ti.select(is_turned, a, b)
@@ -68,8 +69,8 @@ def _side_of_edge(p, q, a, b):
 
 @ti.real_func
 def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
-    """1 if the surface of a body encloses a point: a ray from it leaves the surface more often than it
-    enters.
+    """1 if a point is inside the surface of a body: a ray from the point leaves the surface more often than
+    it enters.
     """
     right, up = ti.Vector([0.8164966, -0.5773503, 0.0]), ti.Vector([0.4082483, 0.5773503, -0.7071068])
     triangles, leaves = state.touching.body_triangles[body], 0
@@ -79,7 +80,7 @@ def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
         a = state.particle_position[corners[0]] - x
         b = state.particle_position[corners[1]] - x
         c = state.particle_position[corners[2]] - x
-        # Projections along the ray.
+        # Projections along the direction of the ray.
         u = ti.Vector([right.dot(a), up.dot(a)])
         v = ti.Vector([right.dot(b), up.dot(b)])
         w = ti.Vector([right.dot(c), up.dot(c)])
@@ -96,7 +97,7 @@ def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
 def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f32) -> ti.i32:
     """1 if a point `depth` [m] below the surface of a body (above if negative) is inside another.
 
-    Sheets and ropes have no inside: their particles are tested.
+    For sheets and ropes, which have no inside, the particles are tested.
     """
     found = 0
     blocks, triangles = state.body_blocks[body], state.touching.body_triangles[body]
@@ -131,7 +132,7 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
 
 @ti.func
 def _overlap(state: ti.template(), a, b):
-    """1 if two bodies overlap by more than `INSET`, or at all while they are being moved apart."""
+    """1 if two bodies overlap by more than `INSET`, or are moved apart and not yet clear by `OUTSET`."""
     depth = INSET * ti.min(state.body_surface[a].z, state.body_surface[b].z)
     if state.body_overlap[a] == OVERLAPPING or state.body_overlap[b] == OVERLAPPING:
         depth = -OUTSET * 0.5 * (state.body_surface[a].y + state.body_surface[b].y)
@@ -151,7 +152,7 @@ def _add_partner(soft: ti.template(), body, other):
 
 @ti.real_func
 def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
-    """Find the bodies that overlap a body that was just placed or is being moved apart."""
+    """Find the bodies that overlap a body that was just placed, or that is being moved apart from others."""
     mobility = _mobility(state, body)
     lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     for i in range(state.islands.first[island], state.islands.first[island + 1]):
@@ -167,7 +168,7 @@ def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
 
 @ti.real_func
 def find_overlaps(state: ti.template(), island: ti.i32):
-    """Find the overlapping bodies of an island, before its step."""
+    """Find the overlapping bodies of an island. Call this before its step."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     placed, row = 0, first
     while row < last:
@@ -191,7 +192,9 @@ def find_overlaps(state: ti.template(), island: ti.i32):
 
 @ti.func
 def are_parting(state: ti.template(), body, other):
-    """1 if two bodies overlap and cannot touch yet. A body with too many partners touches no other body."""
+    """1 if two bodies overlap and contact ignores them. A body with too many partners touches no other
+    body.
+    """
     count = state.soft.partner_count[body]
     found = int(ti.max(count, state.soft.partner_count[other]) > MAX_PARTNERS)
     for k in range(ti.min(count, MAX_PARTNERS)):
@@ -229,15 +232,16 @@ def _measure(state: ti.template(), body):
 
 @ti.func
 def _point_of_slot(body):
-    """Point of a unit square, different for each slot: Roberts' sequence R2."""
+    """Return a point of the unit square that is different for each slot, from Roberts' sequence R2."""
     u, v = 0.7548777 * body, 0.5698403 * body
     return ti.Vector([u - ti.floor(u), v - ti.floor(v), 0.0])
 
 
 @ti.func
 def _parting_direction(soft: ti.template(), a, b):
-    """Direction from the centre of one body to that of the other. If the centres coincide, a horizontal
-    direction chosen by the slots.
+    """Return the direction from the centre of one body to the centre of the other.
+
+    If the centres coincide, the direction is horizontal and depends on the slots.
     """
     away = soft.center[a] - soft.center[b]
     if away.norm() < MIN_CENTER_DISTANCE * ti.min(soft.size[a], soft.size[b]):
@@ -247,13 +251,15 @@ def _parting_direction(soft: ti.template(), a, b):
 
 @ti.func
 def _part_pair(soft: ti.template(), a, b, gravity, dt):
-    """Add the displacements and velocity changes of a pair to those of its bodies. Momentum is conserved."""
+    """Add the displacements and velocity changes that move a pair apart to those of its bodies. Momentum is
+    conserved.
+    """
     n = _parting_direction(soft, a, b)
     mine, total = soft.mobility[a], soft.mobility[a] + soft.mobility[b]
     share = mine / total
     wanted = PARTING_RATE * ti.min(soft.size[a], soft.size[b]) * dt
     missing = ti.max(wanted - (soft.displacement[a] - soft.displacement[b]).dot(n), 0.0)
-    # Only the upper body rises against gravity: the lower one may lie on something.
+    # Move only the upper body against gravity, because the lower one may lie on something.
     up = -gravity / ti.max(gravity.norm(), 1e-30)
     rise = missing * n.dot(up)
     upper_share = share
@@ -272,7 +278,7 @@ def _part_pair(soft: ti.template(), a, b, gravity, dt):
 def _shift_beside_colliders(
     state: ti.template(), body: ti.i32, shift: ti.math.vec3, dt: ti.f32
 ) -> ti.math.vec3:
-    """Reduce a displacement [m] so that it moves no particle of a body deeper into a collider."""
+    """Reduce the displacement of a body [m] so that none of its particles moves deeper into a collider."""
     s = shift
     for c in range(state.colliders.count[None]):
         mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
@@ -289,7 +295,7 @@ def _shift_beside_colliders(
 
 @ti.func
 def _distance(state: ti.template(), c, x, time):
-    """Distance of a point from a collider's skin [m], and the normal in the collider's frame."""
+    """Return the distance of a point from a collider's skin [m], and the normal in the collider's frame."""
     distance, normal = signed_distance(
         state.colliders.samples,
         state.colliders.kind[c],
@@ -338,5 +344,5 @@ def part_bodies(state: ti.template(), island: ti.i32, dt: ti.f32):
 
 @ti.kernel
 def mark_placed(state: ti.template(), body: ti.i32):
-    """Make the next step check which bodies a body overlaps."""
+    """Make the next step check which bodies overlap `body`."""
     state.body_overlap[body] = JUST_PLACED

@@ -1,9 +1,9 @@
 """Restitution of a whole body: limit the speed at which its centre of mass leaves a collider.
 
-An elastic body stores the energy of an impact and returns it, independently of the contact law of the
-vertices. So Newton's law of restitution is applied to the centre of mass: a body that approaches a collider
-with speed v leaves it with e v. Any excess is removed by the same change of velocity for all particles, but
-never by more than contact has added: a collider does not pull.
+An elastic body stores the energy of an impact and returns it, independently of the contact law for vertices.
+So Newton's law of restitution is applied to the centre of mass: a body that approaches a collider with speed
+v leaves it with speed e v. The excess is removed by the same change of velocity for all particles. The change
+is limited to the velocity that contact has added, because a collider does not pull.
 
 Groups of fields: writes colliders.
 """
@@ -14,12 +14,14 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MIN_REBOUND = 0.1
-"""Speed [m/s] that the centre of mass always keeps, so that a flattened body rises again."""
+"""Speed that the centre of mass always keeps [m/s], so that a flattened body rises again."""
 
 
 @ti.func
 def begin_rebounds(state: ti.template(), body):
-    """Reset the rebound speeds of contacts that ended, before the impulses of the last step are cleared."""
+    """Reset the rebound speeds of contacts that ended. Call this before the impulses of the last step are
+    cleared.
+    """
     row = body * state.colliders.capacity.colliders
     while row < (body + 1) * state.colliders.capacity.colliders:
         lasts = ti.abs(state.colliders.impulse[row]).max() > 0.0
@@ -31,7 +33,7 @@ def begin_rebounds(state: ti.template(), body):
 
 @ti.func
 def restore_rebounds(state: ti.template(), body):
-    """Restore the rebound speeds before a step is retried."""
+    """Restore the rebound speeds of a body before its step is retried."""
     row = body * state.colliders.capacity.colliders
     while row < (body + 1) * state.colliders.capacity.colliders:
         state.colliders.rebound[row] = state.colliders.prev_rebound[row]
@@ -44,7 +46,7 @@ def add_normal_impulse(colliders: ti.template(), row, normal_impulse, normal, be
 
     Args:
         normal_impulse: impulse along the normal [N s].
-        before, surface: velocities along the normal, of the particle before the impulse and of the surface
+        before, surface: velocities of the particle before the impulse, and of the surface, along the normal
             [m/s].
     """
     colliders.normal_impulse[row] = colliders.normal_impulse[row] + normal_impulse * normal
@@ -54,7 +56,7 @@ def add_normal_impulse(colliders: ti.template(), row, normal_impulse, normal, be
 
 @ti.func
 def _momentum_along(state: ti.template(), first, end, n):
-    """Mass [kg] of the free particles, and their momentum along `n` [kg m/s]."""
+    """Return the mass of the free particles [kg], and their momentum along `n` [kg m/s]."""
     masses, momenta = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
     for block in range((end - first + LANES - 1) // LANES):
         row = (first + block * LANES) & ROW_BITS
@@ -68,7 +70,7 @@ def _momentum_along(state: ti.template(), first, end, n):
 
 @ti.func
 def limit_rebounds(state: ti.template(), body, time):
-    """Remove the velocity of the centre of mass beyond the restitution, after the collisions of a substep.
+    """Limit the velocity of the centre of mass to the restitution, after the collisions of a substep.
 
     Args:
         time: time since the start of the fixed step [s].
@@ -87,7 +89,7 @@ def limit_rebounds(state: ti.template(), body, time):
             approach = normal_impulse / mass - speed
             leave = state.colliders.rebound[row]
             if leave == 0.0:
-                # If a rotating body strikes, its centre can move away without having approached.
+                # The centre of a rotating body can move away although it never approached.
                 leave = ti.max(MIN_REBOUND, rates.z / rates.x - approach)
             if approach > RESTITUTION_SPEED:
                 leave = ti.max(leave, state.colliders.surface[c].y * approach)

@@ -1,7 +1,8 @@
-"""Record which bodies touched in a step, and their impulses, summed per pair while contacts are recorded.
+"""Record the pairs of bodies that touched in a step, with the sum of their impulses, if contacts are
+recorded.
 
-Each island has its own part of the table of pairs, so that threads share nothing. Pairs are found in it by
-hashing. Reading a row clears it; other rows stay empty.
+Each island has its own part of the table of pairs, so that threads share no rows. Pairs are found by hashing.
+Reading a row clears it, so the table is empty before the next step.
 
 Groups of fields: reads colliders, hull, islands; writes soft.
 """
@@ -13,19 +14,21 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 OF_COLLIDER, OF_BODY = 0, 1
-"""Kind of the second member of a pair."""
+"""Kinds of the second member of a pair."""
 
 
 @ti.func
 def _find_pair(soft: ti.template(), first, count, a, b):
-    """Row of two bodies in the part of the table from `first` on, or -1 if that is full."""
+    """Return the row of two bodies in the part of the table that starts at `first`, or -1 if the part is
+    full.
+    """
     start = (a * 40503 + b) & 0x7FFFFFFF
     row, tried = -1, 0
     while row < 0 and tried < count:
         here = first + (start + tried) % count
         tried += 1
         pair = soft.pair_bodies[here]
-        if pair.y == 0:  # no pair has body 0 as its second
+        if pair.y == 0:  # no pair has body 0 as its second member
             soft.pair_bodies[here] = ti.Vector([a, b])
             row = here
         elif pair.x == a and pair.y == b:
@@ -59,7 +62,7 @@ def add_touches(state: ti.template(), island):
 
 @ti.func
 def clear_touches(state: ti.template(), island):
-    """Clear the rows of an island before its step is retried."""
+    """Clear the rows of an island, because its step is retried."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     row = first * PAIR_ROWS
     while row < last * PAIR_ROWS:
@@ -86,10 +89,11 @@ def read_touches(
     """Read the status of all bodies, and the pairs that touched in the last step, in a fixed order.
 
     Args:
-        status: (bodies + 2,): the statuses from the last call, zeros in the first. Receives the current
-            statuses, then 1 if the table was too small for all pairs, then the number of rows written.
-        who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
-        impulses: (rows, 3): impulse of the first on the second [N s].
+        status: statuses from the last call, or zeros, (bodies + 2,). Receives the current statuses, then 1 if
+            the table was too small for all pairs, then the number of rows written.
+        who: receives a body, `OF_COLLIDER` or `OF_BODY`, and the collider or second body of each pair,
+            (rows, 3).
+        impulses: receives the impulse of the first on the second, (rows, 3) [N s].
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -99,7 +103,7 @@ def read_touches(
             before, now = status[body], state.body_status[body]
             status[body] = now
             if ti.static(state.capacity.contact.colliders > 0):
-                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # those of others are outdated
+                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # rows of other bodies are outdated
                     for c in range(state.colliders.count[None]):
                         impulse = state.colliders.impulse[body * state.colliders.capacity.colliders + c]
                         if ti.abs(impulse).max() > 0.0 and is_finite(impulse):

@@ -1,4 +1,4 @@
-"""A grid of the vertices of one body that can be near another.
+"""Sort the vertices of one body that can be near another body into a grid.
 
 Groups of fields: reads hull; writes soft.
 """
@@ -7,18 +7,19 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CELL = 1.5
-"""Edge of a grid cell over the mean edge of the triangles that query it. Values from 1 to 2 are equally fast
-in a heap."""
+"""Edge of a grid cell, over the mean edge of the triangles that query the grid. Values from 1 to 2 are
+equally fast in a heap."""
 
 
 MAX_QUERY_EDGES = 64.0
-"""Largest extent of one triangle's query along an axis, in mean edges. Triangles that an exploding body
-stretches over kilometres are skipped: otherwise the step that freezes it would take hours."""
+"""Largest extent of a triangle's query along an axis, in mean edges. Larger triangles belong to exploding
+bodies, stretched over kilometres, and are skipped. Otherwise the step that freezes the body would take hours.
+"""
 
 
 @ti.func
 def cell_of(x, lowest, cells, cell):
-    """Cell that contains a point, or the nearest one."""
+    """Return the cell that contains a point, or the nearest cell."""
     return ti.min(ti.max(ti.cast((x - lowest) / cell, ti.i32), 0), cells - 1)
 
 
@@ -29,7 +30,7 @@ def _row_of(at, cells):
 
 @ti.func
 def boxes_overlap(lower, upper, other_lower, other_upper):
-    """True if two boxes, each given by two corners, have a point in common."""
+    """True if two boxes, each given by two corners, touch or overlap."""
     return ti.max(other_lower - upper, lower - other_upper).max() <= 0.0
 
 
@@ -67,10 +68,10 @@ def update_boxes(state: ti.template(), body):
 
 @ti.func
 def _choose_cells(size, count, smallest):
-    """Cells along each axis of a grid, at most four per point, and their edge [m].
+    """Return the number of cells along each axis of a grid, at most four per point, and their edge [m].
 
     Args:
-        size: size of the grid, vec3 [m], not negative: the loop would not end.
+        size: size of the grid, vec3 [m]. It must not be negative, or the loop would not end.
         count: number of points, 1 or more.
         smallest: smallest edge of a cell [m].
     """
@@ -88,9 +89,9 @@ def _choose_cells(size, count, smallest):
 
 @ti.func
 def fill_grid(state: ti.template(), table, body, other, margin):
-    """Sort the vertices of a body within `margin` [m] of another's box into a grid.
+    """Sort the vertices of `body` within `margin` [m] of the box of `other` into a grid.
 
-    Returns: their number; the box around them; cells along each axis, and their edge [m].
+    Returns: number of these vertices; box around them; number of cells along each axis, and their edge [m].
     """
     lower, upper = state.body_bounds_lower[other] - margin, state.body_bounds_upper[other] + margin
     lowest, highest = upper, lower
@@ -116,7 +117,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
                 k = state.soft.item[i]
                 x = state.particle_position[state.touching.outer_particle[k]]
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
-                # The first pass counts up, the second down again to the first row.
+                # The first pass counts up. The second pass counts down to the first row.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
                 if pass_number == 1:

@@ -1,4 +1,4 @@
-"""Solids that bodies collide with: parameters, data for kernels, and surfaces to draw."""
+"""Solids that bodies collide with: their parameters, data for kernels, and surfaces to draw."""
 
 from taichi_soft.contact.shapes.box import BoxShape
 from taichi_soft.contact.shapes.capsule import CapsuleShape

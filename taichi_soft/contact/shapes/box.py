@@ -1,4 +1,4 @@
-"""A box."""
+"""The shape of a box."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from taichi_soft.meshing.arrays import read_only
 @serialised("size")
 @dataclass(frozen=True, eq=False)
 class BoxShape(Shape):
-    """A box about the origin, with edges along the axes.
+    """A box centred on the origin, with edges along the axes.
 
     Args:
-        size: lengths of its edges along x, y, z, (3,) [m].
+        size: lengths of the edges along x, y and z, (3,) [m].
     Raises: OptionError.
     """
 
@@ -39,20 +39,20 @@ class BoxShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]."""
+        """Lower and upper corner of the box, (2, 3) [m]."""
         return about_origin(np.asarray(self.size) / 2)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points below the nearest face, (n,) [m], negative outside.
+        """Return the depth of points below the nearest face, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = (np.asarray(self.size) / 2 - np.abs(points)).min(axis=1)
         return depths
 
     def surface(self) -> Triangles:
-        """Return two triangles per face."""
-        import trimesh  # half a second that a game need not wait for
+        """Return the triangles of the box, two per face."""
+        import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.box(np.asarray(self.size)))

@@ -1,4 +1,4 @@
-"""A capsule: a cylinder with round caps."""
+"""The shape of a capsule: a cylinder with round caps."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius", "length")
 @dataclass(frozen=True, eq=False)
 class CapsuleShape(Shape):
-    """All points within `radius` of a segment of the z axis, centred on the origin.
+    """A capsule: all points within `radius` of a segment of the z axis, centred on the origin.
 
     Args:
-        radius: radius of cylinder and caps [m].
+        radius: radius of the cylinder and the caps [m].
         length: distance between the centres of the caps [m], 0 or more. The capsule is `length + 2 * radius`
             long.
     Raises: OptionError.
@@ -37,14 +37,14 @@ class CapsuleShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]."""
         return about_origin([self.radius, self.radius, self.length / 2 + self.radius])
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, (n,) [m], negative outside.
+        """Return the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         half = self.length / 2
         beside = points - np.clip(points, (0.0, 0.0, -half), (0.0, 0.0, half))
@@ -52,7 +52,7 @@ class CapsuleShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return triangles whose vertices lie on the capsule."""
-        import trimesh  # half a second that a game need not wait for
+        """Return triangles that approximate the capsule. Their vertices lie on it."""
+        import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.capsule(self.length, self.radius, count=(32, 32)))

@@ -15,26 +15,26 @@ from taichi_soft.meshing.advice import scene_hint, with_install_hint
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices
 
 FLATTEST = 1e-9
-"""Volume over the cube of the longest side, below which the enclosed volume is rounding only."""
+"""Volume over the cube of the longest side, below which the volume is only rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedMesh:
-    """Triangles that separate inside from outside."""
+    """A closed surface of triangles, which separates inside from outside."""
 
     vertices: FloatArray  # (n, 3) [m], all different
     triangles: IntArray  # (f, 3), counterclockwise seen from outside
 
     @property
     def bounds(self) -> FloatArray:
-        """Lower and upper corner, (2, 3) [m]."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
 
 def closed_mesh(source: Any) -> ClosedMesh:
     """Return the surface of a trimesh.Trimesh or TetMesh, or of a pair (vertices, triangles).
 
-    Vertices at the same position are merged. Triangles that this reduces to a line are removed.
+    Vertices at the same position are merged. Triangles that become lines are removed.
     Raises: MeshError for anything else, and if the surface is open, faces inward or encloses no volume.
     """
     vertices, triangles = _arrays(source)
@@ -65,7 +65,9 @@ def _arrays(source: Any) -> tuple[Any, Any]:
 
 
 def _require_closed(triangles: IntArray, numbers: NDArray[Any]) -> None:
-    """Check that each edge is used equally often in both directions: then the surface has no border."""
+    """Raise a MeshError unless each edge is used equally often in both directions, so that the surface has no
+    border.
+    """
     ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     pairs, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
     uses = np.bincount(edge.reshape(-1), minlength=len(pairs))

@@ -1,4 +1,4 @@
-"""The signed distance of a closed mesh on a grid around it."""
+"""Compute the signed distance of a closed mesh on a grid around it."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ DEFAULT_CELL_COUNT = 64
 """Default number of cells along the longest side of the mesh."""
 
 MAX_NODES = 2_000_000
-"""Nodes of a grid, at most: 8 MB, and a few seconds to fill."""
+"""Largest number of nodes of a grid: 8 MB, and a few seconds to compute."""
 
 MAX_LOST = 0.1
-"""Fraction of the surface behind which the grid may show no solid. Any grid loses the outer cells of sharp
-edges."""
+"""Largest fraction of the surface behind which the grid can lack solid. Any grid loses the outer cells of
+sharp edges."""
 
 DEPTHS = (0.5, 1.0)
-"""Depths below the surface, in cells, at which the grid is checked for solid."""
+"""Depths below the surface, in cells, at which the grid must be solid."""
 
 SHALLOWEST = 0.05
-"""Depth, in cells, below which a sample does not count as solid."""
+"""Smallest depth, in cells, at which a sample counts as solid."""
 
 # Barycentric coordinates of ten points spread evenly over a triangle.
 SHARES: NDArray[np.float64] = (
@@ -46,11 +46,11 @@ class Grid:
 
     origin: NDArray[np.float64]  # first node (3,) [m]
     cell: float  # [m]
-    resolution: tuple[int, int, int]  # nodes
+    resolution: tuple[int, int, int]  # number of nodes along each axis
 
 
 def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
-    """Return the grid for a mesh. If `cell` is None, choose the default cell.
+    """Return the grid for a mesh, with the default cell if `cell` is None.
 
     Raises: OptionError for a bad cell, MeshError for too many nodes.
     """
@@ -71,13 +71,14 @@ def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
 
 
 def _node_counts(size: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    # Rounded, so that a side of a whole number of cells gets no cell more.
+    # Rounded, so that rounding errors add no cell to a side of a whole number of cells.
     counts: NDArray[np.float64] = np.ceil(np.round(size / cell, 6)) + 1 + 2 * MARGIN
     return counts
 
 
 def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
-    """Compute the distances of the nodes, negative inside, (nx, ny, nz) [m]. Starts Taichi if necessary.
+    """Compute the signed distance of each node, negative inside, (nx, ny, nz) [m]. Starts Taichi if
+    necessary.
 
     A node is inside if the surface winds around it once or more.
     Raises: MeshError for a part that is inside out, or for walls too thin for the grid.
@@ -108,7 +109,7 @@ def _place(windings: NDArray[np.int32], grid: Grid) -> list[float]:
 
 
 def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float32], grid: Grid) -> None:
-    """Raises: MeshError if the grid shows no solid behind too much of the surface."""
+    """Raise a MeshError if the grid lacks solid behind too much of the surface."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
     corners, normals, areas = corners[areas > 0], normals[areas > 0], areas[areas > 0]
@@ -129,7 +130,7 @@ def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float
 
 
 def _interpolated(distances: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Interpolate trilinearly at places (n, 3) within the grid, in cells."""
+    """Return trilinear interpolations of `distances` at `places` (n, 3) within the grid, in cells."""
     base = np.floor(places).astype(np.int64)
     value = np.zeros(len(places))
     for corner in product((0, 1), repeat=3):

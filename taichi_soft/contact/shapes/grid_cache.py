@@ -16,13 +16,13 @@ from taichi_soft.contact.shapes.closed_mesh import ClosedMesh
 from taichi_soft.contact.shapes.distance_grid import Grid
 
 VERSION = b"taichi-soft distance grid 1"
-"""Changes with the format of the file and with the meaning of its numbers."""
+"""Format version. Change it if the format of the file or the meaning of its numbers changes."""
 
 DIGEST = hashlib.sha256().digest_size
 
 
 def cache_folder() -> Path:
-    """Return $TAICHI_SOFT_CACHE, or the folder `taichi-soft` among this user's caches."""
+    """Return $TAICHI_SOFT_CACHE, or the folder `taichi-soft` in the user's cache folder."""
     chosen = os.environ.get("TAICHI_SOFT_CACHE")
     if chosen:
         return Path(chosen)
@@ -36,7 +36,7 @@ def cache_folder() -> Path:
 
 
 def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
-    """Hash of everything that affects the numbers."""
+    """Return a hash of everything that affects the distances."""
     digest = hashlib.sha256(VERSION)
     for array in (mesh.vertices.astype("<f8"), mesh.triangles.astype("<i4"), np.array([grid.cell], "<f8")):
         digest.update(len(array).to_bytes(8, "little") + array.tobytes())
@@ -44,7 +44,7 @@ def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
 
 
 def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
-    """Return distances (nx, ny, nz) [m], or None if the file is missing or damaged."""
+    """Return the stored distances, (nx, ny, nz) [m], or None if the file is missing or damaged."""
     try:
         content = _path(key).read_bytes()
     except OSError:
@@ -56,12 +56,12 @@ def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
 
 
 def write_grid(key: str, distances: NDArray[np.float32]) -> None:
-    """Store distances. If that fails, they are silently computed again next time."""
+    """Store distances. If that fails, do nothing: the next start computes them again."""
     payload = distances.astype("<f4").tobytes()
     path = _path(key)
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Replace the file in one operation, so that no other process reads half of it.
+        # Replace the file in one operation, so that no other process reads an incomplete file.
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:

@@ -1,4 +1,4 @@
-"""Ground given by heights on a grid."""
+"""The shape of ground that is given by heights on a grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import read_only
 
 MAX_NODES = 20_000_000
-"""Nodes of a grid, at most: 80 MB. A square of 4,097 x 4,097 nodes fits."""
+"""Largest number of nodes of a grid: 80 MB. A square of 4,097 x 4,097 nodes fits."""
 
 
 @serialised("heights", "spacing")
@@ -23,12 +23,12 @@ MAX_NODES = 20_000_000
 class HeightFieldShape(Shape):
     """Ground over a rectangle centred on the origin, solid from the surface down to infinity.
 
-    The diagonal from node (i, j) to node (i + 1, j + 1) splits each cell into two triangles. The rectangle
-    has no walls: beside it nothing is solid.
+    The diagonal from node (i, j) to node (i + 1, j + 1) splits each cell into two triangles. Nothing is solid
+    outside the rectangle.
     Args:
         heights: heights of the nodes (i, j), with i along x, (nx, ny) [m].
         spacing: distance between neighbouring nodes along both axes [m].
-    Raises: OptionError for fewer than two nodes along an axis, too many of them, or heights that are not
+    Raises: OptionError for fewer than two nodes along an axis, too many nodes, or heights that are not
     finite.
     """
 
@@ -58,34 +58,34 @@ class HeightFieldShape(Shape):
     def _values(self) -> tuple[float, ...]:
         heights = np.asarray(self.heights, dtype=np.float64)
         along, across = (np.abs(np.diff(heights, axis=axis)).max() / self.spacing for axis in (0, 1))
-        # No triangle is steeper than the steepest edges along x and y together.
+        # No triangle is steeper than the steepest edges along x and along y combined.
         cosine = 1.0 / np.sqrt(1.0 + along**2 + across**2)
         return (self.spacing, heights.min(), heights.max(), cosine)
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Nodes along x and y, and 1."""
+        """Number of nodes along x and y, and 1."""
         nx, ny = np.shape(self.heights)
         return (nx, ny, 1)
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """The heights, row by row."""
+        """Heights of the nodes, row by row."""
         return np.asarray(self.heights).reshape(-1)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]; infinite downwards."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]; infinite downwards."""
         half = (np.array(np.shape(self.heights)) - 1) * self.spacing / 2
         top = float(np.max(self.heights))
         corners: NDArray[np.float64] = read_only(np.array([[*-half, -np.inf], [*half, top]]))
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Lower bound of the depth of points inside, (n,) [m], negative outside.
+        """Return a lower bound of the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         heights = np.asarray(self.heights, dtype=np.float64)
         last = np.array(heights.shape) - 1
@@ -102,7 +102,7 @@ class HeightFieldShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return the ground: two triangles per cell, facing up."""
+        """Return the triangles of the ground: two per cell, facing up."""
         nx, ny, _ = self.resolution
         i, j = np.indices((nx, ny))
         low = self.bounds[0]

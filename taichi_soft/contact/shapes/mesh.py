@@ -1,4 +1,4 @@
-"""A solid inside a closed triangle mesh."""
+"""The shape of the solid inside a closed triangle mesh."""
 
 from __future__ import annotations
 
@@ -27,13 +27,15 @@ def _rebuild(vertices: FloatArray, triangles: IntArray, cell: float) -> MeshShap
 class MeshShape(Shape):
     """The solid inside a closed mesh, stored as its signed distance on a grid.
 
-    Distances are accurate to a fraction of a cell, and edges are rounded by as much. Parts thinner than two
-    cells can be lost: a mesh that would lose a tenth of its surface is refused.
+    Distances are accurate to a fraction of a cell, and edges are rounded by the same amount. Parts thinner
+    than two cells can be lost. A mesh that would lose more than a tenth of its surface is refused.
     Args:
         mesh: a trimesh.Trimesh, a TetMesh (its surface at rest) or (vertices (n, 3) [m], triangles (m, 3)),
             counterclockwise seen from outside. Parts can overlap.
-        cell: spacing of the grid [m], which can have up to 2,000,000 nodes; None: a 64th of the longest side.
-        cache: store the grid on disk for the next start, in $TAICHI_SOFT_CACHE or the user's cache folder.
+        cell: spacing of the grid [m]. The grid can have up to 2,000,000 nodes. None uses a 64th of the
+            longest side.
+        cache: True stores the grid on disk for the next start, in $TAICHI_SOFT_CACHE or the user's cache
+            folder.
     Raises: MeshError for a mesh that is open, inside out, flat, not finite or too thin for the cell, with a
     suggested fix; OptionError for a cell out of range.
 
@@ -54,7 +56,7 @@ class MeshShape(Shape):
         closed = closed_mesh(mesh)
         grid = grid_around(closed, cell)
         distances = _cached_distances(closed, grid) if cache else distance_grid(closed, grid)
-        # Through __dict__, because the class is frozen.
+        # use __dict__, because the class is frozen
         self.__dict__.update(
             vertices=read_only(closed.vertices),
             triangles=read_only(closed.triangles),
@@ -73,7 +75,7 @@ class MeshShape(Shape):
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Nodes of the grid along each axis."""
+        """Number of nodes of the grid along each axis."""
         return self._grid.resolution
 
     @property
@@ -83,15 +85,15 @@ class MeshShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of the mesh, (2, 3) [m]."""
+        """Lower and upper corner of the mesh's bounding box, (2, 3) [m]."""
         corners: NDArray[np.float64] = read_only(ClosedMesh(self.vertices, self.triangles).bounds)
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, from the grid, (n,) [m], negative outside.
+        """Return the depth of points below the surface, from the grid, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         resolution = np.array(self.resolution)
         distances = self._samples.reshape(self.resolution)
@@ -106,7 +108,7 @@ class MeshShape(Shape):
         return np.where(outside, -np.inf, depths)
 
     def surface(self) -> Triangles:
-        """Return the mesh itself, which the grid follows to a fraction of a cell."""
+        """Return the original mesh, which the grid approximates to a fraction of a cell."""
         return self.vertices, self.triangles
 
 

@@ -1,4 +1,4 @@
-"""An infinite plane."""
+"""The shape of an infinite plane."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ class PlaneShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Infinite in all directions, (2, 3)."""
+        """Bounds that are infinite in all directions, (2, 3)."""
         return about_origin((np.inf, np.inf, np.inf))
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, (n,) [m], negative outside.
+        """Return the depth of points below the plane, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = -points @ np.asarray(self.normal)
         return depths
 
     def surface(self, size: float = 20.0) -> Triangles:
-        """Return a square about the origin.
+        """Return a square around the origin.
 
         Args:
             size: edge of the square [m]; 20 m by default.

@@ -1,4 +1,4 @@
-"""The base class of all shapes."""
+"""Base class of all shapes."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Vertices (n, 3) [m] and triangles (m, 3), counterclockwise seen from outside."""
 
 SHORTEST, LONGEST = 1e-6, 1e6
-"""Lengths of a shape [m] that float32 resolves."""
+"""Range of lengths of a shape that float32 resolves [m]."""
 
 
 SEAM = 1e-4
-"""Skin [m] on shapes with flat faces and edges. At a flush joint of two of them, a body on one then lies
-deeper in the other than rounding errors, and cannot slip into the joint."""
+"""Skin on shapes with flat faces and edges [m]. A body on one of two flush shapes is then deeper in the other
+shape than rounding errors, and cannot slip into the joint."""
 
 
 class Shape(ABC):
-    """An immutable solid in its own frame. Abstract: use `SphereShape` and the other shapes."""
+    """An immutable solid in its own frame. This class is abstract: use `SphereShape` or another shape."""
 
     kind: ClassVar[ShapeKind]
     seam: ClassVar[float] = 0.0
-    """Skin [m] in addition to the collider's thickness."""
+    """Skin in addition to the thickness of the collider [m]."""
 
     @abstractmethod
     def _values(self) -> tuple[float, ...]:
-        """Return the parameters of the kind's distance function, at most 8 numbers."""
+        """Return the parameters of the shape's distance function, at most 8 numbers."""
 
     @cached_property
     def parameters(self) -> NDArray[np.float32]:
@@ -47,25 +47,28 @@ class Shape(ABC):
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Nodes of the grid along each axis; zeros without a grid."""
+        """Number of nodes of the grid along each axis; zeros without a grid."""
         return (0, 0, 0)
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """Values on the nodes of the grid, last axis fastest, float32 (k,)."""
+        """Values at the nodes of the grid, last axis fastest, float32 (k,)."""
         return _NO_SAMPLES
 
     @property
     @abstractmethod
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner in its own frame, (2, 3) [m]; infinite for an unbounded solid."""
+        """Lower and upper corner of the bounding box in the shape's frame, (2, 3) [m]; infinite for an
+        unbounded solid.
+        """
 
     @abstractmethod
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points below the surface, (n,) [m], negative outside; approximate for some shapes.
+        """Return the depth of points below the surface, (n,) [m], negative outside; approximate for some
+        shapes.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
 
     @abstractmethod
@@ -77,12 +80,12 @@ _NO_SAMPLES: NDArray[Any] = read_only(np.zeros(0, dtype=np.float32))
 
 
 def as_length(value: Any, name: str, low: float = SHORTEST) -> float:
-    """Return `value` as a length of a shape [m]. Raises: OptionError."""
+    """Check that `value` is a length of a shape [m], and return it. Raises: OptionError."""
     return as_number(value, name, low, LONGEST, f"a length from {low:g} to {LONGEST:g} m")
 
 
 def about_origin(half: Any) -> NDArray[np.float64]:
-    """Bounds of a solid that extends by `half` (3,) to both sides of the origin."""
+    """Return the bounds of a solid that extends by `half` (3,) to both sides of the origin, (2, 3) [m]."""
     corner = np.array(half, dtype=np.float64)
     bounds: NDArray[np.float64] = read_only(np.array([-corner, corner]))
     return bounds

@@ -1,4 +1,4 @@
-"""A sphere."""
+"""The shape of a sphere."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius")
 @dataclass(frozen=True, eq=False)
 class SphereShape(Shape):
-    """A sphere about the origin.
+    """A sphere centred on the origin.
 
     Args:
-        radius: [m], above 0.
+        radius: radius of the sphere [m], above 0.
     Raises: OptionError for a radius out of range.
     """
 
@@ -33,20 +33,20 @@ class SphereShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner, (2, 3) [m]."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]."""
         return about_origin([self.radius] * 3)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depth of points inside, (n,) [m], negative outside.
+        """Return the depth of points below the surface, (n,) [m], negative outside.
 
         Args:
-            points: in the frame of the shape, (n, 3) [m].
+            points: points in the frame of the shape, (n, 3) [m].
         """
         depths: NDArray[np.float64] = self.radius - np.linalg.norm(points, axis=1)
         return depths
 
     def surface(self) -> Triangles:
-        """Return 1,280 triangles whose vertices lie on the sphere."""
+        """Return 1,280 triangles that approximate the sphere. Their vertices lie on it."""
         import trimesh  # imported here, because it takes half a second
 
         return triangles_of(trimesh.creation.icosphere(subdivisions=3, radius=self.radius))

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from taichi_soft.meshing import spatial_order
 
 FAR_AWAY = 1e15
-"""Coordinate [m] of empty leaves, far from everything; its square fits float32."""
+"""Coordinate [m] of empty leaves, far from everything. Its square fits float32."""
 
 
 def triangle_tree(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the triangles (f, 3, 3) in the order of the leaves, and the boxes.
 
     Boxes are lower and upper corners, (2 n, 6), with n a power of two. Box 1 is the root, the children of i
-    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 hold one triangle each or none.
+    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 contain one triangle or none.
     """
     ordered = corners[spatial_order(corners.mean(axis=1))]
     count = 1 << (len(ordered) - 1).bit_length()

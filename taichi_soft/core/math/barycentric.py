@@ -1,4 +1,4 @@
-"""Barycentric coordinates in NumPy without LAPACK, whose rounding depends on the processor."""
+"""Barycentric coordinates with NumPy but without LAPACK, whose rounding depends on the processor."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ def edge_inverses(corners: Floats) -> Floats:
 
 
 def barycentric(points: Floats, corners: Floats) -> Floats:
-    """Barycentric coordinates (..., 4) of points (..., 3) [m], each in its tetrahedron."""
+    """Return the barycentric coordinates (..., 4) of points (..., 3) [m], each in its own tetrahedron."""
     return shares_by(edge_inverses(corners), points - corners[..., 0, :])
 
 
 def shares_by(inverses: Floats, arms: Floats) -> Floats:
-    """The same from a result of `edge_inverses`, for vectors (..., 3) [m] from the first corners."""
+    """Return barycentric coordinates from a result of `edge_inverses`, for vectors (..., 3) [m] from the
+    first corners.
+    """
     x, y, z = arms[..., 0, None], arms[..., 1, None], arms[..., 2, None]
     rest = inverses[..., 0] * x + inverses[..., 1] * y + inverses[..., 2] * z
     return np.concatenate([1.0 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)

@@ -1,7 +1,7 @@
-"""Eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
+"""Compute eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
-Jacobi stays accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in float32
-(Golub and Van Loan, Matrix Computations, section 8.5).
+The Jacobi method is accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in
+float32 (Golub and Van Loan, Matrix Computations, section 8.5).
 """
 
 from taichi_soft.core.runtime import ti
@@ -15,7 +15,7 @@ NOTHING = 1e-17
 
 @ti.func
 def symmetric_eigen(columns):
-    """Eigenvalues, largest first, and the matching unit eigenvectors (a right-handed set).
+    """Return the eigenvalues in descending order, and the unit eigenvectors, which form a right-handed set.
 
     Args:
         columns: symmetric 3x3 matrix as columns.
@@ -68,7 +68,7 @@ def symmetric_eigen(columns):
 
 @ti.func
 def from_axes(values, axes):
-    """The symmetric matrix with these eigenvalues (vec3) and unit eigenvectors, as columns."""
+    """Return the symmetric matrix with these eigenvalues (vec3) and unit eigenvectors, as columns."""
     a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
     return (
         a * axes[0].x + b * axes[1].x + c * axes[2].x,

@@ -1,4 +1,4 @@
-"""Elementary functions from arithmetic alone, bit-identical on every processor and system.
+"""Elementary functions that use only arithmetic, bit-identical on every processor and system.
 
 The functions of C libraries, such as `expf`, differ in their last bits between systems. Here arguments are
 reduced to a range near 0, where Taylor series are short. Results are within 4 ulps.
@@ -16,8 +16,8 @@ class _Kind:
     """Constants of a floating-point format."""
 
     real: Any
-    whole: Any  # integer type of the same size
-    fraction: int  # bits of the fraction
+    whole: Any  # integer type of the same width
+    fraction: int  # number of bits of the fraction
     bias: int  # bias of the exponent
     root_half: int  # bits of the square root of 1/2
     largest: float  # largest x for which e^x and e^-x are normal numbers
@@ -47,9 +47,10 @@ _DOUBLE = _Kind(
 )
 _LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
 _HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
-"""pi / 2 in two parts; the product of the first with any integer below 2^20 is exact in 64 bits."""
+"""pi / 2 in two parts. In 64 bits, the product of the first part with any integer below 2^20 is exact."""
 
-# Coefficients after the first terms: 1 + x of exp, 2 s of log, 1 and x of cosine and sine, x of arctangent.
+# Coefficients after the first terms. The first terms are 1 + x of exp, 2 s of log, 1 and x of cosine and
+# sine, x of arctangent.
 _EXP = [1.0 / math.factorial(k) for k in range(2, 14)]
 _LOG = [2.0 / (2 * k + 1) for k in range(1, 12)]
 _COS = [(-1.0) ** k / math.factorial(2 * k) for k in range(1, 10)]
@@ -64,7 +65,9 @@ def _is_double(x: Any) -> bool:
 
 @ti.func
 def _series(coefficients: ti.template(), count: ti.template(), x, kind: ti.template()):
-    """Sum of the first terms coefficients[k] x^k. Bare constants would have 32 bits, so wrap them."""
+    """Return the sum of the first terms coefficients[k] x^k. Coefficients are cast, because constants have 32
+    bits.
+    """
     total = kind.real(coefficients[count - 1])
     for k in ti.static(range(count - 2, -1, -1)):
         total = total * x + kind.real(coefficients[k])
@@ -84,9 +87,9 @@ def _exp(x, kind: ti.template()):
 
 @ti.func
 def _log(x, kind: ti.template()):
-    # Without the cast, Taichi 1.7 converts the bits of a parameter like a number, and crashes.
+    # Without the cast, Taichi 1.7 converts the bits of a parameter as if they were a number, and crashes.
     bits = ti.bit_cast(ti.cast(x, kind.real), kind.whole)
-    # The fraction is in [sqrt(1/2), sqrt(2)), so that it is near 1.
+    # The fraction is in [sqrt(1/2), sqrt(2)), close to 1.
     exponent = (bits - kind.whole(kind.root_half)) >> kind.whole(kind.fraction)
     m = ti.bit_cast(bits - (exponent << kind.whole(kind.fraction)), kind.real)
     s = (m - kind.real(1.0)) / (m + kind.real(1.0))
@@ -126,41 +129,41 @@ def _atan2(y, x, kind: ti.template()):
 
 @ti.func
 def exp(x):
-    """e^x, clamped to e^87 (64 bits: e^708), and 0 below -87 (-708)."""
+    """Return e^x, at most e^87 (64 bits: e^708), and 0 for x below -87 (-708)."""
     return _exp(x, _DOUBLE) if ti.static(_is_double(x)) else _exp(x, _SINGLE)
 
 
 @ti.func
 def log(x):
-    """Natural logarithm of a normal positive number."""
+    """Return the natural logarithm of a normal positive number."""
     return _log(x, _DOUBLE) if ti.static(_is_double(x)) else _log(x, _SINGLE)
 
 
 @ti.func
 def exp_each(v):
-    """`exp` of each component of a vec3."""
+    """Return `exp` of each component of a vec3."""
     return ti.Vector([exp(v[0]), exp(v[1]), exp(v[2])])
 
 
 @ti.func
 def log_each(v):
-    """`log` of each component of a vec3."""
+    """Return `log` of each component of a vec3."""
     return ti.Vector([log(v[0]), log(v[1]), log(v[2])])
 
 
 @ti.func
 def cos_sin(x):
-    """Cosine and sine of an angle [rad] below 10^6."""
+    """Return cosine and sine of an angle below 10^6 [rad]."""
     return _cos_sin(x, _DOUBLE) if ti.static(_is_double(x)) else _cos_sin(x, _SINGLE)
 
 
 @ti.func
 def atan2(y, x):
-    """Angle [rad] from the x axis to (x, y), from -pi to pi; 0 for (0, 0)."""
+    """Return the angle from the x axis to (x, y), from -pi to pi [rad]; 0 for (0, 0)."""
     return _atan2(y, x, _DOUBLE) if ti.static(_is_double(x)) else _atan2(y, x, _SINGLE)
 
 
 @ti.func
 def acos(x):
-    """Angle [rad] whose cosine is a number from -1 to 1."""
+    """Return the angle [rad] whose cosine is x, a number from -1 to 1."""
     return atan2(ti.sqrt((1.0 - x) * (1.0 + x)), x)

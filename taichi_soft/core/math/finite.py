@@ -1,4 +1,4 @@
-"""Test for finite numbers by their bits, because fast-math compilers may assume that NaN never happens."""
+"""Test numbers for finiteness by their bits, because fast-math compilers may assume that NaN never occurs."""
 
 from taichi_soft.core.runtime import ti
 
@@ -17,7 +17,7 @@ def is_finite(v):
 
 @ti.func
 def is_within(v, limit):
-    """1 if the absolute value of every component of a vec3 is below `limit`, which is false for NaN."""
+    """1 if the absolute value of every component of a vec3 is below `limit`; 0 for NaN."""
     good = 1
     for i in ti.static(range(3)):
         good = good & int(ti.abs(v[i]) < limit)

@@ -1,21 +1,21 @@
-"""Rotation R of the polar decomposition F = U R of a 3x3 matrix."""
+"""Compute the rotation R of the polar decomposition F = U R of a 3x3 matrix."""
 
 from taichi_soft.core.math.tensors import cofactor, determinant, plus
 from taichi_soft.core.runtime import ti
 
 ROUNDS = 6
-"""Number of iterations: five reach float32, six float64, even for flat matrices (aspect ratio 10^8)."""
+"""Number of iterations. Five reach float32 and six reach float64, even for flat matrices (aspect ratio
+10^8)."""
 
 
 @ti.func
 def orthogonal_factor(F):
-    """Nearest orthogonal matrix to F, as columns: a rotation, or a reflection if F mirrors.
+    """Return the orthogonal matrix nearest to F, as columns: a rotation, or a reflection if F mirrors.
 
-    Newton's iteration for the polar decomposition with scaling by norms (Higham 1986), with cofactors
-    instead of
-    inverses: F and cof F have the same singular vectors, and their sum equalises the singular values. So flat
-    matrices are no special case, and the code is branch-free for vectorisation. For a matrix of rank 1 the
-    result is finite but arbitrary.
+    Newton's iteration for the polar decomposition with scaling by norms (Higham 1986), but with cofactors
+    instead of inverses. F and cof F have the same singular vectors, and adding them brings the singular
+    values closer together. So flat matrices are no special case, and the code is branch-free for
+    vectorisation. For a matrix of rank 1 the result is finite but arbitrary.
     """
     a, b, c = F[0], F[1], F[2]
     side = ti.select(determinant(F) < 0.0, -1.0, 1.0)

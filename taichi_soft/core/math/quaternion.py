@@ -22,7 +22,7 @@ def turned_back(q, v):
 
 @ti.func
 def spun(q, rotation):
-    """Compose `q` with a following rotation by a rotation vector [rad]."""
+    """Return the rotation `q` followed by a rotation vector [rad]."""
     angle2 = rotation.dot(rotation)
     result = q
     if angle2 > 0.0:

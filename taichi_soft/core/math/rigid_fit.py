@@ -1,24 +1,25 @@
 """Best-fitting rigid motion between two sets of vertices, in 64-bit floats.
 
-For vertices on one line round-off would decide the rotation, so a small weight prefers the smallest one.
+For vertices on a line, rounding would decide the rotation about the line. A small weight on the rotation
+avoids this.
 """
 
 from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
 
 REGULARISATION = 1e-10
-"""Weight of the smallest rotation. It decides only rotations that the vertices leave undetermined."""
+"""Weight of the smallest rotation. It affects only rotations that the vertices do not determine."""
 
 SWEEPS = 30
-"""Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
+"""Number of Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
 
 RESIDUE = 1e-12
-"""Fraction of the largest number below which a number counts as round-off."""
+"""Fraction of the largest number below which a number counts as rounding."""
 
 
 @ti.func
 def kept(v):
-    """Round a vec3 to 32-bit floats without residue, the form that a world stores."""
+    """Round a vec3 to 32-bit floats without residue, as numbers are stored in a world."""
     size = ti.abs(v).max()
     for k in ti.static(range(3)):
         v[k] = ti.select(ti.abs(v[k]) > RESIDUE * size, ti.cast(ti.cast(v[k], ti.f32), ti.f64), 0.0)
@@ -27,9 +28,9 @@ def kept(v):
 
 @ti.func
 def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.template()):
-    """Rotation (3, 3) and translation [m] that map rows of `rest` closest to rows of `now`, from `column` on.
+    """Return the rotation (3, 3) and translation [m] that map rows of `rest` closest to rows of `now`.
 
-    Args: weights: of the rows, with the sum 1.
+    Args: column: first column of the vectors. weights: weights of the rows, with the sum 1.
     """
     rest_center, center = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
     for i in range(weights.shape[0]):
@@ -48,7 +49,7 @@ def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.
 
 @ti.func
 def _nearest_rotation(m):
-    """Rotation R with the largest trace of R^T m, by Horn 1987. The identity for zeros."""
+    """Return the rotation R with the largest trace of R^T m (Horn 1987); the identity for zeros."""
     a = ti.Matrix(
         [
             [m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
@@ -60,7 +61,7 @@ def _nearest_rotation(m):
     vectors = ti.Matrix.identity(ti.f64, 4)
     for _ in range(SWEEPS):
         for p, q in ti.static(((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))):
-            if a[p, q] != 0.0:  # rotate axes p and q so that this entry becomes zero up to round-off
+            if a[p, q] != 0.0:  # rotate axes p and q so that this entry becomes zero up to rounding
                 slope = (a[q, q] - a[p, p]) / (2.0 * a[p, q])
                 t = ti.select(slope < 0.0, -1.0, 1.0) / (ti.abs(slope) + ti.sqrt(slope * slope + 1.0))
                 c = 1.0 / ti.sqrt(t * t + 1.0)

@@ -1,7 +1,7 @@
 """Rotations as unit quaternions (x, y, z, w), in float64.
 
-Each sum has an explicit order, so that other languages are bit-identical. Dot products of linear algebra
-libraries, and sine and arctangent of C libraries, round differently.
+Each sum has an explicit order, so that other languages can compute the same bits. Linear algebra libraries
+round dot products differently, and C libraries sine and arctangent.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
-    """Rows of the rotation matrix of a unit quaternion, for numbers or arrays."""
+    """Return the rows of the rotation matrix of a unit quaternion, for numbers or arrays."""
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -25,7 +25,7 @@ def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
 
 
 def length_of(vector: Floats) -> float:
-    """Length of three or four numbers."""
+    """Return the length of a vector of three or four numbers."""
     total = 0.0
     for each in vector.tolist():
         total += each * each
@@ -39,8 +39,8 @@ def turned(points: Floats, rows: Floats) -> Floats:
 
 
 def quaternion_of(matrix: Floats) -> Floats:
-    """Convert a rotation matrix (3, 3) to a quaternion with w of 0 or more."""
-    # The rows of 4 q q^T are multiples of q: the longest is the most exact.
+    """Convert a rotation matrix (3, 3) to a quaternion with non-negative w."""
+    # The rows of 4 q q^T are multiples of q. The longest row is the most accurate.
     m = matrix
     trace = m[0, 0] + m[1, 1] + m[2, 2]
     skew = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
@@ -59,7 +59,7 @@ def matrix_of(quaternion: Floats) -> Floats:
 
 
 def multiplied(second: Floats, first: Floats) -> Floats:
-    """Product of quaternions: the rotation `first`, then `second`."""
+    """Return the product of two quaternions: the rotation `first`, followed by `second`."""
     (a, b, c, w), (d, e, f, u) = second.tolist(), first.tolist()
     return np.array(
         [
@@ -72,7 +72,7 @@ def multiplied(second: Floats, first: Floats) -> Floats:
 
 
 def rotation_vector(start: Floats, end: Floats) -> Floats:
-    """Shortest rotation from one quaternion to another: axis times angle, (3,) [rad]."""
+    """Return the shortest rotation from one quaternion to another, as axis times angle, (3,) [rad]."""
     turn = multiplied(end, np.r_[-start[:3], start[3]])
     if turn[3] < 0:
         turn = -turn
@@ -83,7 +83,7 @@ def rotation_vector(start: Floats, end: Floats) -> Floats:
 
 
 def turned_by(quaternion: Floats, vector: Floats) -> Floats:
-    """Compose a quaternion with a following rotation vector [rad], normalised."""
+    """Return a quaternion followed by a rotation vector [rad], normalised."""
     angle = length_of(vector)
     cosine, sine = _cos_sin(0.5 * angle)
     axis = vector * (0.5 if angle == 0.0 else sine / angle)
@@ -92,7 +92,7 @@ def turned_by(quaternion: Floats, vector: Floats) -> Floats:
 
 
 def _cos_sin(angle: float) -> tuple[float, float]:
-    """Cosine and sine by the Taylor series of an eighth of the angle [rad], doubled three times."""
+    """Return cosine and sine by the Taylor series of an eighth of the angle [rad], doubled three times."""
     part = (angle - math.tau * math.floor(angle / math.tau + 0.5)) / 8.0
     square = part * part
     behind = versine = 0.0  # sine = part (1 - behind), cosine = 1 - versine
@@ -106,7 +106,9 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angle(sine: float, cosine: float) -> float:
-    """Angle [rad] by Gregory's series of the tangent of its quarter. The cosine must be 0 or more."""
+    """Return an angle [rad] by Gregory's series of the tangent of its quarter. The cosine must be 0 or
+    more.
+    """
     tangent = sine / (1.0 + cosine)
     tangent = tangent / (1.0 + math.sqrt(1.0 + tangent * tangent))
     square, behind = tangent * tangent, 0.0

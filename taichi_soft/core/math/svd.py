@@ -1,4 +1,4 @@
-"""Signed singular value decomposition of a 3x3 matrix, and its nearest rotation."""
+"""Signed singular value decomposition of a 3x3 matrix, and the rotation nearest to it."""
 
 from taichi_soft.core.math.eigen import symmetric_eigen
 from taichi_soft.core.math.tensors import inner_square, times
@@ -9,9 +9,9 @@ from taichi_soft.core.runtime import ti
 def signed_svd(F):
     """Decompose F = U diag(s) V^T with rotations U and V, s0 >= s1 >= |s2|, and s2 negative if F mirrors.
 
-    U is built from the images of V's columns, so it stays a rotation for a flat or zero F.
+    U is built from the images of V's columns, so it is a rotation even for a flat or zero F.
     Args:
-        F: as columns.
+        F: matrix as columns.
     Returns: U as columns, s as vec3, V as columns.
     """
     _, V = symmetric_eigen(inner_square(F))
@@ -22,7 +22,7 @@ def signed_svd(F):
     b = b - u0 * u0.dot(b)
     s1 = ti.sqrt(b.dot(b))
     u1 = b / ti.max(s1, 1e-30)
-    if s1 <= 1e-6 * s0:  # the direction of b is undefined: take any perpendicular to u0
+    if s1 <= 1e-6 * s0:  # b has no direction: use any vector perpendicular to u0
         u1 = u0.cross(V[1])
         if u1.dot(u1) < 0.1:
             u1 = u0.cross(V[2])
@@ -33,10 +33,10 @@ def signed_svd(F):
 
 @ti.func
 def nearest_rotation(F):
-    """Nearest rotation to F, U V^T of F = U S V^T, as rows.
+    """Return the rotation nearest to F: U V^T for F = U S V^T, as rows.
 
     Args:
-        F: as columns.
+        F: matrix as columns.
     """
     U, _, V = signed_svd(F)
     return (

@@ -1,4 +1,4 @@
-"""3x3 matrices as a tuple of their three columns.
+"""3x3 matrices as tuples of their three columns.
 
 Taichi 1.7 expands `ti.Matrix` products into scalars early, but vector operations late. Writing the algebra
 column by column halves the compile time of every law at the same speed.
@@ -9,25 +9,25 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def widened(v):
-    """Extend a vec3 by a zero, because four numbers are loaded and stored as one vector."""
+    """Append a zero to a vec3, because four numbers are loaded and stored as one vector."""
     return ti.Vector([v.x, v.y, v.z, v.x * 0.0])
 
 
 @ti.func
 def times(columns, v):
-    """Matrix times vector."""
+    """Return matrix times vector."""
     return columns[0] * v.x + columns[1] * v.y + columns[2] * v.z
 
 
 @ti.func
 def product(left, right):
-    """Matrix times matrix, both as columns."""
+    """Return matrix times matrix, both as columns."""
     return times(left, right[0]), times(left, right[1]), times(left, right[2])
 
 
 @ti.func
 def outer_square(columns):
-    """M M^T, as columns (symmetric)."""
+    """Return M M^T, as columns (symmetric)."""
     a, b, c = columns[0], columns[1], columns[2]
     return (
         a * a.x + b * b.x + c * c.x,
@@ -38,7 +38,7 @@ def outer_square(columns):
 
 @ti.func
 def inner_square(columns):
-    """M^T M, as columns (symmetric)."""
+    """Return M^T M, as columns (symmetric)."""
     a, b, c = columns[0], columns[1], columns[2]
     ab, bc, ca = a.dot(b), b.dot(c), c.dot(a)
     return ti.Vector([a.dot(a), ab, ca]), ti.Vector([ab, b.dot(b), bc]), ti.Vector([ca, bc, c.dot(c)])
@@ -46,13 +46,13 @@ def inner_square(columns):
 
 @ti.func
 def plus(left, s, right, t):
-    """s M + t N, as columns."""
+    """Return s M + t N, as columns."""
     return left[0] * s + right[0] * t, left[1] * s + right[1] * t, left[2] * s + right[2] * t
 
 
 @ti.func
 def scaled_plus_identity(columns, factor, diagonal):
-    """factor M + diagonal I, as columns."""
+    """Return factor M + diagonal I, as columns."""
     return (
         columns[0] * factor + ti.Vector([diagonal, 0.0, 0.0]),
         columns[1] * factor + ti.Vector([0.0, diagonal, 0.0]),
@@ -62,14 +62,14 @@ def scaled_plus_identity(columns, factor, diagonal):
 
 @ti.func
 def transposed(columns):
-    """M^T, as columns."""
+    """Return M^T, as columns."""
     a, b, c = columns[0], columns[1], columns[2]
     return ti.Vector([a.x, b.x, c.x]), ti.Vector([a.y, b.y, c.y]), ti.Vector([a.z, b.z, c.z])
 
 
 @ti.func
 def symmetric_part(columns):
-    """1/2 (M + M^T), as columns."""
+    """Return 1/2 (M + M^T), as columns."""
     a, b, c = columns[0], columns[1], columns[2]
     xy, xz, yz = 0.5 * (b.x + a.y), 0.5 * (c.x + a.z), 0.5 * (c.y + b.z)
     return ti.Vector([a.x, xy, xz]), ti.Vector([xy, b.y, yz]), ti.Vector([xz, yz, c.z])
@@ -77,23 +77,25 @@ def symmetric_part(columns):
 
 @ti.func
 def trace(columns):
-    """Sum of the diagonal."""
+    """Return the sum of the diagonal."""
     return columns[0].x + columns[1].y + columns[2].z
 
 
 @ti.func
 def determinant(columns):
-    """Triple product of the columns."""
+    """Return the triple product of the columns."""
     return columns[0].dot(columns[1].cross(columns[2]))
 
 
 @ti.func
 def cofactor(columns):
-    """det(M) M^-T, as columns; computed without division, so it is valid for singular matrices."""
+    """Return det(M) M^-T, as columns. It is computed without division, so it is valid for singular
+    matrices.
+    """
     return columns[1].cross(columns[2]), columns[2].cross(columns[0]), columns[0].cross(columns[1])
 
 
 @ti.func
 def outer(a, b):
-    """a b^T, as columns."""
+    """Return a b^T, as columns."""
     return a * b.x, a * b.y, a * b.z

@@ -5,15 +5,15 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def shape(x0, x1, x2, x3):
-    """Edges from the first vertex, as columns [m] (thesis eq. 6.1 and 6.2)."""
+    """Return the edges from the first vertex, as columns [m] (thesis eq. 6.1 and 6.2)."""
     return x1 - x0, x2 - x0, x3 - x0
 
 
 @ti.func
 def area_vectors(B):
-    """Twice the outward area vectors of the faces opposite to vertices 0 to 3 [m^2].
+    """Return twice the outward area vectors of the faces opposite to vertices 0 to 3 [m^2].
 
-    Thesis eq. 6.8. They point inward for an inverted tetrahedron; their sum is zero (eq. 6.9).
+    See thesis eq. 6.8. For an inverted tetrahedron the vectors point inward. Their sum is zero (eq. 6.9).
     """
     n1 = B[2].cross(B[1])
     n2 = B[0].cross(B[2])

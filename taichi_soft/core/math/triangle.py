@@ -4,15 +4,16 @@ from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Smallest divisor: smaller ones are zero lengths in float32, and their numerators are zero too."""
+"""Smallest divisor. Smaller divisors are zero lengths in float32, and their numerators are zero too."""
 
 
 @ti.func
 def closest_point_on_triangle(x, a, b, c):
-    """Barycentric coordinates of the triangle's closest point to x, vec3.
+    """Return the barycentric coordinates of the triangle's closest point to x, vec3.
 
-    It is the closest of the projection onto the plane, if that is inside, and the closest points of the three
-    edges. All are points of the triangle for any rounding, so degenerate triangles are no special case.
+    The candidates are the projection onto the plane, if it is inside, and the closest points of the three
+    edges. All candidates are points of the triangle for any rounding, so degenerate triangles are no special
+    case.
     Args:
         x, a, b, c: vec3 [m].
     Returns: weights of a, b and c, each from 0 to 1, with sum 1.
@@ -40,11 +41,11 @@ def closest_point_on_triangle(x, a, b, c):
 
 @ti.func
 def pierce_triangle(a, b, c):
-    """Intersect the z axis with a triangle: for rays, in axes with the origin at the ray's start and z along
-    it.
+    """Intersect the z axis with a triangle.
 
-    The axis has the thickness of float32's resolution at the triangle's distance, so no ray passes between
-    two triangles. A triangle seen edge-on is not hit, but its neighbours are.
+    For a ray, use axes with the origin at the ray's start and z along the ray. The axis is as thick as
+    float32's resolution at the triangle's distance, so that no ray passes between two triangles. A triangle
+    seen edge-on is not hit, but its neighbours are.
     Args:
         a, b, c: vec3 [m].
     Returns: -1 if the axis enters through the front (from which a, b, c run counterclockwise), 1 if it leaves
@@ -63,7 +64,7 @@ def pierce_triangle(a, b, c):
 
 @ti.func
 def solid_angle(a, b, c):
-    """Solid angle of a triangle from the origin [sr], negative seen from its front.
+    """Return the solid angle of a triangle seen from the origin [sr], negative if its front is visible.
 
     The sum over a closed surface that faces outward is 4 pi inside and 0 outside (Van Oosterom and Strackee
     1983).
@@ -77,8 +78,8 @@ def solid_angle(a, b, c):
 def triangle_touches_box(a, b, c, half):
     """True if a triangle touches the box from -half to half, including its faces.
 
-    Uses separating axes: the normals of the box and of the triangle, and the cross products of their edges
-    (Akenine-Moeller 2001). A degenerate triangle uses the axes of a segment or a point.
+    The test uses separating axes: the normals of the box and of the triangle, and the cross products of their
+    edges (Akenine-Moeller 2001). For a degenerate triangle, these are the axes of a segment or a point.
     """
     normal = (b - a).cross(c - a)
     heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal up to rounding

@@ -1,12 +1,13 @@
 """Call Taichi from any thread.
 
-Taichi cannot compile in two threads at once, and one thread can use what another is still compiling. Its
-binary asserts that it is started and allocates fields in the same thread. Here each kernel call and each
-access to a number of a field excludes other threads. A thread of our own starts Taichi and allocates fields,
+Taichi cannot compile in two threads at once, and one thread can use a kernel that another is still compiling.
+Its binary asserts that it is started and allocates fields in the same thread. Here each kernel call and each
+access to a number of a field excludes other threads. A dedicated thread starts Taichi and allocates fields,
 because a caller's thread may end soon.
 
-Needless once Taichi can be used from several threads: https://github.com/taichi-dev/taichi/issues/2022 is
-open, and https://github.com/taichi-dev/taichi/issues/4542 has the assertion; main branch has both faults.
+This file is unnecessary once Taichi can be used from several threads:
+https://github.com/taichi-dev/taichi/issues/2022 is open, and https://github.com/taichi-dev/taichi/issues/4542
+has the assertion. The main branch has both faults.
 """
 
 import functools
@@ -24,13 +25,13 @@ from taichi_soft.core.threads import in_turn
 
 Result = TypeVar("Result")
 
-_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of our own thread
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # jobs for the dedicated thread
 _is_served = threading.Lock()
-_home = 0  # identity of that thread
+_home = 0  # identity of the dedicated thread
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
-    """Let only one thread at a time call kernels and access numbers of fields.
+    """Make threads wait, so that only one at a time calls kernels and accesses numbers of fields.
 
     Args:
         lay_out_now: calls Taichi's own function that lays out fields, with its argument.
@@ -52,14 +53,14 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
 
 
 def must_go_home() -> bool:
-    """True if fields have to be laid out and this is not our own thread."""
+    """True if fields must be laid out and this is not the dedicated thread."""
     root = ti.lang.impl._root_fb
     return not (root.finalized or root.empty) and threading.get_ident() != _home
 
 
 def at_home(function: Callable[[], Result]) -> Result:
-    """Call a function in our own thread. On Ctrl-C, wait for its end: stopping it halfway would break all
-    worlds.
+    """Call a function in the dedicated thread. On Ctrl-C, wait for its end, because an interrupted layout
+    would break all worlds.
     """
     found: Future[Result] = Future()
 
@@ -83,13 +84,15 @@ def at_home(function: Callable[[], Result]) -> Result:
 
 def _serve() -> None:
     global _home
-    if _is_served.acquire(blocking=False):  # or another thread, if Ctrl-C interrupted its start
+    if _is_served.acquire(blocking=False):  # or another thread serves, if Ctrl-C interrupted its start
         _home = threading.get_ident()
         while True:
             _jobs.get()()
 
 
 def leave_home() -> None:
-    """Forget the thread in a process that was forked before Taichi started: threads are not copied."""
+    """Forget the dedicated thread in a process that was forked before Taichi started, because threads are not
+    copied.
+    """
     global _is_served
     _is_served = threading.Lock()

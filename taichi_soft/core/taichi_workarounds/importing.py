@@ -1,6 +1,6 @@
 """Import Taichi without its header, its request to a server for a newer version, and a warning.
 
-Needless once `import taichi` prints nothing and sends no request: main branch does both.
+This file is unnecessary once `import taichi` prints nothing and sends no request. The main branch does both.
 """
 
 import os
@@ -10,7 +10,7 @@ os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore", SyntaxWarning)  # about a docstring of Taichi's, from Python 3.12 on
+    warnings.simplefilter("ignore", SyntaxWarning)  # caused by a docstring of Taichi, from Python 3.12 on
     import taichi as ti
 
 __all__ = ["ti"]

@@ -1,10 +1,10 @@
-"""Check indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and print nothing for each hash.
+"""Check indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and print no overflows.
 
-Taichi's bounds check skips the body of a `ti.real_func`. With `debug` it also prints a line for each integer
-that overflows, which hashes do on purpose.
+Taichi's bounds check skips the body of a `ti.real_func`. With `debug`, Taichi also prints a line for each
+integer overflow, which hashes cause on purpose.
 
-Needless once Taichi runs `check_out_of_bound` on real functions, and once
-https://github.com/taichi-dev/taichi/issues/8725 is closed (an option for the report of overflows); main
+This file is unnecessary once Taichi runs `check_out_of_bound` on real functions, and once
+https://github.com/taichi-dev/taichi/issues/8725 is closed (an option for the report of overflows). The main
 branch has neither.
 """
 
@@ -14,8 +14,8 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def check_real_functions() -> None:
-    """Assert each index in a real function before it is used. A wrong index becomes 0, so that the process
-    survives to report it.
+    """Assert each index in a real function before it is used. A wrong index then becomes 0, so that the
+    process can still report it.
     """
     impl = ti.lang.impl
     plain = impl.subscript
@@ -35,15 +35,15 @@ def check_real_functions() -> None:
 
 
 def let_whole_numbers_overflow() -> None:
-    """Compile without the report of overflows."""
+    """Compile without reporting integer overflows."""
     program = ti._lib.core.Program
     plain = program.compile_kernel
 
     def compiled(self: Any, config: Any, *arguments: Any) -> Any:
-        config.debug = False  # the bounds check has its own option; the rest depends on this one
+        config.debug = False  # the bounds check has its own option; all other checks depend on this one
         try:
             return plain(self, config, *arguments)
         finally:
-            config.debug = True  # the launch reads it, and raises the error
+            config.debug = True  # needed at the launch, which raises the error
 
     program.compile_kernel = compiled

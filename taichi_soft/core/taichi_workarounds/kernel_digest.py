@@ -1,6 +1,6 @@
-"""Digests of kernels, of everything that their code depends on.
+"""Digests of kernels, which cover everything that the code of a kernel depends on.
 
-Part of `known_kernels`, and needless with it.
+This file is part of `known_kernels`, and unnecessary once that is.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class UnknownPartError(Exception):
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Digest of the package's own files, the interpreter and NumPy, which decide how a kernel's source is
-    read.
+    """Return a digest of the package's own files, the interpreter and NumPy, which determine how a kernel's
+    source is processed.
     """
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -35,12 +35,12 @@ def digest_of_sources() -> str:
 
 
 def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) -> str:
-    """Digest of a kernel and of its compile-time arguments.
+    """Return a digest of a kernel and its compile-time arguments.
 
     Args:
-        function: the Python function. options: Taichi's options that change code. arguments: a pair for each.
-            The second is True for a template argument, and the first is then its value; otherwise the first
-            is the feature by which Taichi distinguishes such arguments.
+        function: the Python function. options: Taichi's options that change code. arguments: a pair for each
+            argument. For a template argument the pair is its value and True; otherwise the feature by which
+            Taichi distinguishes such arguments and False.
     Raises: UnknownPartError.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
@@ -53,7 +53,7 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
 
 
 def _feature(value: Any) -> str:
-    """Type and dimensions of an array, by which Taichi distinguishes arrays."""
+    """Return the type and dimensions of an array, by which Taichi distinguishes arrays."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_feature, value))})"
     text = value.to_string() if hasattr(value, "to_string") else str(value)
@@ -63,7 +63,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Add to `parts` everything in a template argument that can change code."""
+    """Append everything in a template argument that can change code to `parts`."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))
@@ -74,12 +74,12 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
     if id(value) in seen:
         parts.append(f"again {seen[id(value)][0]}")
         return
-    seen[id(value)] = len(seen), value  # keeps it alive: another object could get its identity
+    seen[id(value)] = len(seen), value  # keep the object alive, so that no other object gets its identity
     if hasattr(value, "snode") and hasattr(value, "vars"):
         parts.append(_field_text(value))
-    elif hasattr(value, "field_dict"):  # a field of structures
+    elif hasattr(value, "field_dict"):  # a field of structs
         _describe(value.field_dict, parts, seen)
-    elif hasattr(value, "to_string"):  # a type of Taichi's
+    elif hasattr(value, "to_string"):  # a Taichi type
         parts.append(value.to_string())
     elif isinstance(value, np.ndarray) and value.dtype != object:
         parts.append(f"array {value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}")
@@ -106,7 +106,7 @@ _field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 def _field_text(field: Any) -> str:
-    """Type, size and address of a field. They do not change after it is laid out."""
+    """Return type, size and address of a field. They do not change after the field is laid out."""
     if field not in _field_texts:
         places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
         size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
@@ -118,8 +118,8 @@ _places: dict[tuple[int, int], str] = {}
 
 
 def _place_of(node: Any) -> str:
-    """Address of a number of a field: its own, and those of the nodes around it. It depends on the sizes of
-    other fields too.
+    """Return the address of a number of a field: the field's own, and those of the nodes that contain it. It
+    also depends on the sizes of other fields.
     """
     tree, first = node.get_snode_tree_id(), node.id
     if (tree, first) not in _places:

@@ -1,10 +1,10 @@
-"""Keys of Taichi's disk cache that are equal on every machine, and different in every version of the package.
+"""Make the keys of Taichi's disk cache equal on all machines, and different in each version of the package.
 
-Taichi compiles the number of threads that can run a parallel loop into it: that of the machine. The number is
-part of the key too. Another machine would not find the kernel, or would run it on too few threads.
+Taichi compiles the machine's number of threads into each parallel loop, and adds it to the key. Another
+machine would not find the kernel, or would run it on too few threads.
 
-Needless once Taichi reads the number of threads when a loop starts, and takes a part of the key from its
-caller. Main branch does neither; we know of no thread about it.
+This file is unnecessary once Taichi reads the number of threads when a loop starts, and accepts a part of the
+key from its caller. The main branch does neither. We know of no thread about it.
 """
 
 import threading
@@ -16,21 +16,21 @@ from typing import Any
 from taichi_soft.core.taichi_workarounds.importing import ti
 
 _MOST_THREADS = 1 << 20
-"""Threads that a kernel can use: more than any machine has."""
+"""Number of threads that a kernel can use: more than any machine has."""
 
 
 def let_any_number_of_threads_run() -> None:
-    """Compile `_MOST_THREADS` into each loop. Taichi uses the threads that it has started."""
+    """Compile `_MOST_THREADS` into each loop. Taichi then uses all threads that it has started."""
     builder, given = ti._lib.core.ASTBuilder, threading.local()
     parallelize = builder.parallelize
 
-    def give(self: Any, threads: int) -> None:  # 1 if the next loop is serial
+    def give(self: Any, threads: int) -> None:  # `threads` is 1 if the next loop is serial
         given.within = ti.lang.impl.get_runtime().compiling_callable
         parallelize(self, threads)
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # Finding the end of a loop can compile a real function with further loops.
+            # Finding the end of a loop can compile a real function that contains loops.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:
@@ -46,7 +46,7 @@ def let_any_number_of_threads_run() -> None:
 
 
 def keep_kernels_apart(version: str) -> None:
-    """Use another key in each version of the package. Call it once Taichi runs.
+    """Use different keys in each version of the package. Call this after Taichi has started.
 
     The number of threads in the key is replaced by a number made from the version, larger than any machine's.
     """
@@ -56,7 +56,7 @@ def keep_kernels_apart(version: str) -> None:
 
 
 def code_options() -> str:
-    """List all options of the running Taichi that change code."""
+    """Return a list of all options of the running Taichi that change code, as text."""
     config = ti.lang.impl.current_cfg()
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
@@ -65,7 +65,7 @@ def code_options() -> str:
 
 @contextmanager
 def not_kept() -> Iterator[None]:
-    """Keep kernels compiled inside this context out of Taichi's cache."""
+    """Context in which compiled kernels are not stored in Taichi's cache."""
     config = ti.lang.impl.current_cfg()
     usual, config.offline_cache = config.offline_cache, False
     try:

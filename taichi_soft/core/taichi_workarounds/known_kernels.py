@@ -1,18 +1,17 @@
-"""Find kernels of an earlier process without processing their source.
+"""Find the kernels that an earlier process compiled, without processing their source.
 
 Taichi stores compiled kernels on disk under a hash of its intermediate code. To compute that hash, it
 processes the source of each kernel at every start, which takes most of a start with a full cache.
 
-Here a known kernel is created with a short body instead. That body contains a digest of everything that the
-kernel's source depends on. When the process that compiled the kernel ends, the kernel's code is stored in the
-file of the short body. There Taichi finds it by the hash of the short body, which is quick to compute.
+Here a known kernel is created with a short body instead. The short body contains a digest of everything that
+the kernel's code depends on. When the process that compiled the kernel ends, the kernel's code is stored in
+the file of the short body. Taichi finds that file by the hash of the short body, which is quick to compute.
 
-The short body sets a flag. If Taichi does not find the file, it compiles the short body itself, and the flag
-shows this after the launch. Nothing else has happened then: the kernel is created from its source and
-launched.
+If Taichi does not find the file, it compiles the short body itself. The short body only sets a flag. If the
+flag is set after the launch, the kernel is created from its source and launched.
 
-Needless once Taichi looks for a kernel before it processes its source, as its fork Quadrants does
-(https://github.com/Genesis-Embodied-AI/quadrants/pull/131). Main branch does not; it was planned in
+This file is unnecessary once Taichi looks for a kernel before it processes its source, as its fork Quadrants
+does (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). The main branch does not. It was planned in
 https://github.com/taichi-dev/taichi/issues/4401.
 """
 
@@ -37,24 +36,24 @@ kernels = ti.lang.kernel_impl
 Make = Callable[..., None]
 
 INDEX = "taichi_soft.json"
-"""File next to Taichi's own, with the digests of known kernels."""
+"""Name of the file with the digests of known kernels, next to Taichi's own files."""
 
 FLAG = "__flag"
-"""Name, in the short body, of the field that it sets."""
+"""Name of the field that the short body sets, in the short body."""
 
 HEADER = 1 << 17
-"""Bytes at the front of Taichi's file of a kernel that contain the names of its functions."""
+"""Number of bytes at the front of Taichi's file of a kernel that contain the names of its functions."""
 
 
 class KnownKernels:
-    """Known kernels in one of Taichi's folders."""
+    """Known kernels in one of the folders in which Taichi stores kernels."""
 
     def __init__(self, folder: Path, options: str) -> None:
         """Read the index of a folder.
 
         Args:
             folder: folder in which Taichi stores kernels.
-            options: as for `digest_of`.
+            options: see `digest_of`.
         """
         self.folder, self.options = folder, options
         self._known = self._read()
@@ -72,7 +71,7 @@ class KnownKernels:
         """Store the code of kernels in the files of their short bodies, after Taichi has written all files.
 
         Args:
-            names: by digest, names of the kernels that were created from their source.
+            names: names of the kernels that were created from their source, by digest.
         """
         files = self._files_of({*names.values(), *map(_short_name_of, names)})
         kept = []
@@ -85,7 +84,7 @@ class KnownKernels:
             _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
 
     def _files_of(self, names: set[str]) -> dict[str, Path]:
-        """Find the files of these kernels, by name."""
+        """Find the file of each kernel, by name."""
         found = {}
         for path in self.folder.glob("*.tic"):
             with path.open("rb") as file:
@@ -96,26 +95,26 @@ class KnownKernels:
 
 
 class FirstLaunches:
-    """First launches of all kernels of a process: each kernel is either known or created from its source."""
+    """First launches of all kernels of a process. Each kernel is either known or created from its source."""
 
     def __init__(self) -> None:
         self._known: KnownKernels | None = None
         self._flag: Any = None
-        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its arrays, digest
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its array arguments, digest
 
     def make_flag(self) -> None:
-        """Create the flag that short bodies set. Called when Taichi starts."""
+        """Create the flag that short bodies set. Call this when Taichi starts."""
         self._flag = ti.field(ti.i32, ())
 
     def open(self, known: KnownKernels) -> None:
-        """Start to look for kernels among the known ones."""
+        """Start to look for kernels in `known`."""
         self._known = known
 
     @contextmanager
     def making_anew(self, functions: set[Any]) -> Iterator[None]:
-        """Create kernels from their source inside this context, even if they are known or exist already."""
+        """Context in which kernels are created from their source, even if they are known or exist already."""
         known, self._known = self._known, None
-        made = [vars(function)["_primal"] for function in functions]  # Taichi's own object behind each
+        made = [vars(function)["_primal"] for function in functions]  # the Taichi object behind each function
         before = [(kernel, kernel.compiled_kernels) for kernel in made]
         for kernel in made:
             kernel.compiled_kernels = {}
@@ -127,7 +126,7 @@ class FirstLaunches:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:
-        """Replace the function with which Taichi creates a kernel."""
+        """Replace Taichi's function that creates a kernel."""
         plain = kernels.Kernel.materialize
 
         def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
@@ -137,24 +136,26 @@ class FirstLaunches:
         kernels.Kernel.materialize = materialize
 
     def close(self) -> None:
-        """Make Taichi store a file with a short body for each kernel that was created from its source."""
+        """Make Taichi store a file with the short body of each kernel that was created from its source."""
         for kernel, features, digest in self._made:
             program = ti.lang.impl.get_runtime().prog
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # reading it is a kernel too, which the next process looks for
+            _ = self._flag[None]  # reading the flag is a kernel too, which the next process needs
 
     def keep(self) -> None:
-        """Store the code of these kernels in the files of the short bodies, after Taichi has ended."""
+        """Store the code of these kernels in the files of their short bodies. Call this after Taichi has
+        ended.
+        """
         if self._known is not None:
             self._known.keep({digest: _name_of(kernel, digest) for kernel, _, digest in self._made})
 
     def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
-        """Create a kernel, and check the flag after its first launch."""
+        """Create a kernel. After its first launch, check the flag."""
         name = kernel.func.__name__
         start = BURST.begin(name)
-        kernel.runtime.materialize()  # lays out fields: digests contain their addresses
+        kernel.runtime.materialize()  # lays out fields, because digests contain their addresses
         digest = self._digest_of(kernel, args, features)
         is_short = self._known is not None and digest in self._known
         if digest is None:
@@ -167,10 +168,10 @@ class FirstLaunches:
 
         def launch_first(compiled: Any, *given: Any) -> Any:
             nonlocal is_found
-            del kernel.launch_kernel  # from now on that of the class
+            del kernel.launch_kernel  # from now on, the method of the class is used
             try:
                 found = kernel.launch_kernel(compiled, *given)
-                if is_short and digest is not None and self._flag[None] != 0:  # nothing else has happened
+                if is_short and digest is not None and self._flag[None] != 0:  # only the short body ran
                     self._flag[None], is_found = 0, False
                     self._make(kernel, key, args, features, digest)
                     found = kernel.launch_kernel(kernel.compiled_kernels[key], *given)
@@ -181,7 +182,7 @@ class FirstLaunches:
         kernel.launch_kernel = launch_first
 
     def _digest_of(self, kernel: Any, args: Any, features: Any) -> str | None:
-        """Return the digest of a kernel; None if it has none."""
+        """Return the digest of a kernel, or None if it has no digest."""
         is_ours = kernel.func.__module__.startswith("taichi_soft.")
         if self._known is None or not is_ours or kernel.autodiff_mode != kernels.AutodiffMode.NONE:
             return None
@@ -193,7 +194,7 @@ class FirstLaunches:
             return None
 
     def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
-        """Create a kernel from its source, under a name by which its file can be found."""
+        """Create a kernel from its source, with a name by which its file can be found."""
         slots = kernel.template_slot_locations
         tree, context = ti.lang.kernel_impl._get_tree_and_ctx(
             kernel, args=args, excluded_parameters=slots, arg_features=features
@@ -202,7 +203,7 @@ class FirstLaunches:
         self._made.append((kernel, features, digest))
 
     def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
-        """Create a kernel with the same arguments and the short body."""
+        """Create a kernel with the short body and the same arguments."""
         names = [argument.name for argument in kernel.arguments]
         returned = " -> None" if kernel.return_type else ""
         head = f"def {kernel.func.__name__}({', '.join(names)}){returned}:"
@@ -223,7 +224,9 @@ class FirstLaunches:
 
 
 def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
-    """Create Taichi's own kernel from the tree of a function, as Taichi's `Kernel.materialize` does."""
+    """Create Taichi's own kernel from the syntax tree of a function, as Taichi's `Kernel.materialize`
+    does.
+    """
     runtime = kernel.runtime
 
     def taichi_ast_generator(made: Any) -> None:  # Taichi looks for this name
@@ -241,23 +244,25 @@ def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
 
 
 def _short_body(digest: str) -> list[str]:
-    """Return statements that set the flag, one per part of the digest. Each takes time at every start."""
+    """Return statements that set the flag, one per part of the digest. Each statement takes time at every
+    start.
+    """
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return [f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1)]
 
 
 def _name_of(kernel: Any, digest: str) -> str:
-    """Name, in Taichi's file, of a kernel that is created from its source."""
+    """Return the name, in Taichi's file, of a kernel that is created from its source."""
     return f"{kernel.func.__name__}_{digest}"
 
 
 def _short_name_of(digest: str) -> str:
-    """Name, in Taichi's file, of a kernel with the short body."""
+    """Return the name, in Taichi's file, of a kernel with the short body."""
     return f"known_{digest}"
 
 
 def _write(path: Path, contents: bytes) -> None:
-    """Write a file in one operation, because other processes can read it meanwhile."""
+    """Write a file in one operation, because other processes can read it at the same time."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.write_bytes(contents)
     part.replace(path)

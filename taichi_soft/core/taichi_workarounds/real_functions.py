@@ -1,18 +1,18 @@
-"""Branches and loops in real functions.
+"""Make branches and loops work in real functions.
 
-A `ti.real_func` is compiled once and separately; a `ti.func` is copied to every call. But if a real function
-calls a `ti.func`, Taichi puts the branches and loops of the latter into the kernel. Their statements then run
-whatever the condition is, or Taichi crashes.
+A `ti.real_func` is compiled once and separately; a `ti.func` is copied into every caller. But if a real
+function calls a `ti.func`, Taichi puts the branches and loops of the `ti.func` into the kernel. Their
+statements then run unconditionally, or Taichi crashes.
 
-Needless once https://github.com/taichi-dev/taichi/issues/8514 is closed; it is open, and main branch has the
-fault.
+This file is unnecessary once https://github.com/taichi-dev/taichi/issues/8514 is closed. The issue is open,
+and the main branch has the fault.
 """
 
 from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def keep_branches_in_real_functions() -> None:
-    """Add the statements of a `ti.func` to the kernel or real function that is being compiled."""
+    """Make Taichi add the statements of a `ti.func` to the kernel or real function that it is compiling."""
     ti.lang.kernel_impl.Kernel.ast_builder = lambda _: (
         ti.lang.impl.get_runtime().compiling_callable.ast_builder()
     )

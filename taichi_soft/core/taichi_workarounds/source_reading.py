@@ -1,12 +1,12 @@
 """Read the source of kernels and functions once.
 
-Taichi reads the lines around each function when it is defined, which takes more than half of the time of our
-import. It reads the whole source again for every call of a `ti.func`, and wraps the lines around every
-expression for a message.
+Taichi reads the lines around each function when the function is defined, which takes more than half of the
+time to import this package. It reads the whole source again for every call of a `ti.func`, and formats the
+lines around every expression for a possible message.
 
-Needless once Taichi's `_inside_class` reads no source and its `get_pos_info` caches its results. Main branch
-does neither; https://github.com/taichi-dev/taichi/issues/7711 asked for the import. Quadrants, a fork of
-Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
+This file is unnecessary once Taichi's `_inside_class` reads no source and its `get_pos_info` caches its
+results. The main branch does neither; https://github.com/taichi-dev/taichi/issues/7711 asked for the import.
+Quadrants, a fork of Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def read_sources_once() -> None:
-    """Read each source when it is first compiled. Messages show only the first line of an expression."""
+    """Make Taichi read a source only when it is first compiled. Messages show only the first line of an
+    expression.
+    """
     kernels = ti.lang.kernel_impl
     ti.lang.kernel_impl._inside_class = _is_in_class
     kernels.getsourcefile = _remember(kernels.getsourcefile)
@@ -38,14 +40,14 @@ def _is_in_class(level_of_class_stackframe: int) -> bool:
     """True if a decorated function is defined in the body of a class.
 
     Args:
-        level_of_class_stackframe: number of frames between this one and that of the class statement, which
-            Taichi reads. The body of the class is the frame before.
+        level_of_class_stackframe: number of frames from this one to the frame of the class statement, which
+            Taichi reads. The frame before it is the body of the class.
     """
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `look_up` with a cache: it is called once per object, as long as the object exists."""
+    """Return `look_up` with a cache. It is called once per object, while the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:
@@ -57,7 +59,9 @@ def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _place_of(context: Any, node: Any) -> str:
-    """Describe the position of a node in a source: file, line, function, the line and a mark below it."""
+    """Describe the position of a node in a source: file, line number, function, the line, and a mark below
+    it.
+    """
     number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
     start = context.indent + node.col_offset
     end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)

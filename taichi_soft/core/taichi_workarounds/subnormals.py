@@ -1,11 +1,12 @@
-"""Subnormal numbers as in IEEE 754, in the thread that calls a kernel and in Taichi's workers.
+"""Compute subnormal numbers as in IEEE 754, in the thread that calls a kernel and in Taichi's workers.
 
-Taichi makes the processor flush numbers below 1e-38 to zero, in the thread that starts it and in its workers.
-WebAssembly cannot do that, and other libraries change the setting for their own threads. So a kernel would
-compute different bits in different places.
+Taichi makes the processor flush numbers below 1e-38 to zero, in the thread that starts Taichi and in its
+workers. WebAssembly cannot do that, and other libraries change the setting of their own threads. So a kernel
+would compute different bits in different threads and on different platforms.
 
-Needless once Taichi has an option for it: https://github.com/taichi-dev/taichi/pull/2143 made it fixed, and
-so it is in main branch. `with_usual_floats` around a kernel remains necessary because of other libraries.
+This file is unnecessary once Taichi has an option for the setting.
+https://github.com/taichi-dev/taichi/pull/2143 made it fixed, as it still is in the main branch.
+`with_usual_floats` around a kernel remains necessary because of other libraries.
 """
 
 import ctypes
@@ -23,11 +24,11 @@ from taichi_soft.core.taichi_workarounds.kernel_keys import not_kept
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 Environment = ctypes.c_char * 64
-"""Room for C's `fenv_t`: 32 bytes at most where Taichi runs."""
+"""Buffer for C's `fenv_t`, which has at most 32 bytes on all platforms of Taichi."""
 
 
 def _unchanged(_: Any) -> None:
-    """Replacement for C's functions if the system's library has none."""
+    """Replacement for C functions that the system's library lacks."""
 
 
 try:
@@ -38,7 +39,9 @@ except (AttributeError, OSError):
 
 
 def _usual_environment() -> Any:
-    """Return C's `FE_DFL_ENV`; if it is unknown, the environment of the thread that imports the package."""
+    """Return C's `FE_DFL_ENV`, or the environment of the thread that imports the package if `FE_DFL_ENV` is
+    unknown.
+    """
     here, usual = Environment(), Environment()
     _read(here)
     if sys.platform == "linux":
@@ -52,7 +55,9 @@ _usual = _usual_environment()
 
 
 def with_usual_floats(function: Function) -> Function:
-    """Run a function with IEEE 754 floats, and restore the settings of its thread afterwards."""
+    """Decorate a function to run with IEEE 754 floats. Afterwards, the settings of its thread are
+    restored.
+    """
 
     @wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
@@ -68,10 +73,10 @@ def with_usual_floats(function: Function) -> Function:
 
 
 def give_workers_usual_floats(count: int) -> None:
-    """Undo Taichi's setting in all `count` workers.
+    """Revert Taichi's setting in all `count` workers.
 
-    A loop has as many parts as there are workers. Each part calls C's `fesetenv` and waits for the others, so
-    that no worker runs two.
+    A loop has as many parts as there are workers. Each part calls C's `fesetenv` and waits for the other
+    parts, so that no worker runs two parts.
     """
     address = ctypes.cast(_write, ctypes.c_void_p).value if _write is not _unchanged else None
     if address is None:
@@ -88,12 +93,12 @@ def give_workers_usual_floats(count: int) -> None:
             while ti.atomic_max(arrived[0], -1) < count:
                 pass
 
-    with not_kept():  # with the function's address
+    with not_kept():  # the kernel contains the address of the function
         set_everywhere(ctypes.addressof(_usual), np.zeros(1, np.int32))
 
 
 def _calling(function: int) -> Callable[[Any], None]:
-    """Return a function for kernels that calls the C function at an address with one argument."""
+    """Return a function for kernels that calls the C function at address `function` with one argument."""
 
     def call(argument: Any) -> None:
         runtime = ti.lang.impl.get_runtime()

@@ -1,5 +1,5 @@
-"""Integrators. A new one is one file, one line here and its name in `core.types`, if it evaluates forces once
-in a substep."""
+"""Integrators. To add one that evaluates forces once per substep, write one file, and add one line here and
+its name in `core.types`."""
 
 from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
 from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER

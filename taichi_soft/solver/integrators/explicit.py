@@ -1,4 +1,4 @@
-"""Functions shared by the explicit integrators, which use the forces of the old positions."""
+"""Functions of all explicit integrators, which use the forces at the old positions."""
 
 from taichi_soft.control.kernels.drives import add_reactions
 from taichi_soft.control.kernels.grabs import pull_grabs
@@ -8,19 +8,21 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 
 @ti.func
 def whole_substep(lag, h, s):
-    """Time for which forces act in a substep: all of it [s]."""
+    """Return the time for which forces act in a substep: the whole substep [s]."""
     return h
 
 
 @ti.func
 def before_each(h, s, substeps):
-    """Time for which external forces act before a substep: all of it; 0 after the last substep [s]."""
+    """Return the time for which external forces act before a substep: the whole substep, or 0 after the last
+    one [s].
+    """
     return ti.select(s < substeps, h, 0.0)
 
 
 @ti.func
 def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
-    """Add internal forces, reactions of pins, and grabs."""
+    """Add internal forces, reactions of pins, and forces of grabs."""
     accumulate_forces(state, program, body)
     add_reactions(state, body, felt)
     pull_grabs(state, body, h, felt)
@@ -28,5 +30,5 @@ def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def any_shape(state: ti.template(), body, h, is_last):
-    """Accept every shape: `kick_by_forces` checks changes of velocity instead."""
+    """Return 1: accept every shape. `kick_by_forces` checks changes of velocity instead."""
     return 1

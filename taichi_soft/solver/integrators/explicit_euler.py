@@ -9,7 +9,7 @@ from taichi_soft.solver.kernels.kick import kick_by_forces
 
 @ti.func
 def advance(x, v, a, h, kick):
-    """Position and velocity one substep later, both from the old values."""
+    """Return position and velocity after one substep, both computed from the old values."""
     return x + h * v, v + h * a
 
 

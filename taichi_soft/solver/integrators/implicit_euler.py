@@ -1,8 +1,8 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26), with the forces of the new positions.
 
-One linear solve per substep and body (`solver.kernels.implicit_solve`) finds them. Its equations include
-grabs, pins and the colliders under the body. Forces are linearised, so a substep that changes a shape too
-much is retried in halves.
+One linear solve per substep and body (`solver.kernels.implicit_solve`) finds these forces. The equations
+include grabs, pins and the colliders under the body. Forces are linearised, so a substep that changes a shape
+too much is retried in halves.
 """
 
 from taichi_soft.core.runtime import ti
@@ -15,25 +15,27 @@ from taichi_soft.solver.kernels.implicit_solve import MAX_PIECES, keeps_shape, s
 
 @ti.func
 def felt_time(lag, h, s):
-    """Forces of the old positions do not act [s]."""
+    """Return 0: forces at the old positions do not act [s]."""
     return 0.0 * h
 
 
 @ti.func
 def hold(state: ti.template(), program: ti.template(), body, h, felt):
-    """Do nothing: all forces are in the equations."""
+    """Do nothing, because the equations contain all forces."""
 
 
 @ti.func
 def predict(state: ti.template(), program: ti.template(), body, job, felt):
-    """Solve for the new velocities."""
+    """Solve for the new velocities of a body."""
     speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
     return speed, beside, beside, 1
 
 
 @ti.func
 def check(state: ti.template(), body, h, is_last):
-    """Check the shape. In the last attempt, slow down a body whose shape changed too much."""
+    """Return 1 if the body kept its shape. In the last attempt, slow a body down whose shape changed too
+    much.
+    """
     if is_last == 1:
         slow_down(state, body, h)
     return int(keeps_shape(state, body))
@@ -47,8 +49,8 @@ IMPLICIT_EULER = IntegratorModel(
     predict=predict,
     check=check,
     has_stable_step=False,
-    has_hulls=False,  # it constrains vertices only
+    has_hulls=False,  # the solve constrains vertices only
     drifts_at_once=False,
     halvings=MAX_PIECES.bit_length() - 1,
-    work=50,  # products with the matrix per solve
+    work=50,  # products with the matrix in a solve
 )

@@ -1,4 +1,4 @@
-"""The interface of an integrator."""
+"""Interface of an integrator."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,43 +8,46 @@ from taichi_soft.core.types import Integrator
 
 @dataclass(frozen=True, repr=False)
 class IntegratorModel:
-    """Five Taichi functions that convert forces to motion, and the properties that a world must know.
+    """Five Taichi functions that convert forces to motion, and properties of the integrator.
 
-    No other code asks which integrator runs.
+    No other code distinguishes integrators.
     """
 
     name: Integrator
     felt_time: Any
-    """(lag, h, s) -> time for which forces of the old positions act on velocities in substep `s` of `h` [s].
+    """(lag, h, s) -> time for which the forces at the old positions act on velocities in substep `s` of `h`
+    [s].
 
     `lag` is the time by which velocities are behind positions [s]."""
     drive_time: Any
-    """(h, s, substeps) -> time for which external forces act before substep `s`, or after the last one if `s`
-    is `substeps` [s]."""
+    """(h, s, substeps) -> time for which external forces act before substep `s` [s]. If `s` equals
+    `substeps`, the time after the last substep."""
     hold: Any
-    """(state, program, body, h, felt): add the forces of the old positions, and those of pins and grabs."""
+    """(state, program, body, h, felt): add the forces at the old positions, and the forces of pins and
+    grabs."""
     predict: Any
-    """(state, program, body, job, felt) -> new velocities. Returns the highest speed [m/s]; the highest and
-    the mean relative to the job's velocity; 1 if forces changed no velocity by too much."""
+    """(state, program, body, job, felt): compute new velocities. Returns the highest speed [m/s]; the highest
+    and the mean speed relative to the job's velocity; 1 if forces changed no velocity too much."""
     check: Any
-    """(state, body, h, is_last) -> 1 if a body kept its shape in a substep."""
+    """(state, body, h, is_last) -> 1 if the body kept its shape in a substep."""
     advance: Any = None
-    """(x, v, a, h, kick) -> position and velocity of one particle, for the schedule `flat`; or None."""
-    lag: float = 0.0  # time by which velocities are behind positions, over the substep
-    is_lag_told: bool = False  # readers get velocities at the time of the positions
-    has_stable_step: bool = True  # longer substeps explode
+    """(x, v, a, h, kick) -> position and velocity of one particle, for the schedule `flat`; None if not
+    supported."""
+    lag: float = 0.0  # time by which velocities are behind positions, in substeps
+    is_lag_told: bool = False  # True if readers get velocities at the time of the positions
+    has_stable_step: bool = True  # True if longer substeps explode
     has_hulls: bool = True
-    drifts_at_once: bool = True  # the kick can move a single body at once
-    halvings: int = 0  # of failed substeps; 0: the world's `retries`
-    work: int = 1  # approximate cost of a substep over one of leapfrog
-    only_flat: bool = False  # it moves particles in a way that `drift.py` does not
-    warning: str = ""  # shown to its users
+    drifts_at_once: bool = True  # True if the kick can also move a body that touches no other
+    halvings: int = 0  # number of times a failed substep is halved; 0 for the world's `retries`
+    work: int = 1  # approximate cost of a substep, over that of leapfrog
+    only_flat: bool = False  # True if `drift.py` does not support how it moves particles
+    warning: str = ""  # warning for users of the integrator
 
     @property
     def takes_solves(self) -> bool:
-        """True if new velocities come from linear solves, one per substep and body."""
+        """True if new velocities are solutions of linear systems, one per substep and body."""
         return self.advance is None
 
     def __repr__(self) -> str:
-        """Return the name: addresses of functions would differ from run to run."""
+        """Return the name, because addresses of functions would differ between runs."""
         return f"IntegratorModel({self.name.value!r})"

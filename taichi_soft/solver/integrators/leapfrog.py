@@ -1,8 +1,8 @@
 """Leapfrog (thesis section 3.5.2, eq. 3.17 with v_3/2 = v_1/2 + h M^-1 f(x_1)).
 
 Velocities are half a substep behind positions. A kick lasts from the time of the old velocity to the middle
-of the coming substep: h in a steady run; h / 2 from a fresh start, when velocity and position belong to the
-same time; and (h_old + h) / 2 when the substep changes.
+of the next substep: h normally; h / 2 at the start, when velocity and position belong to the same time;
+(h_old + h) / 2 when the substep changes.
 """
 
 from taichi_soft.core.runtime import ti
@@ -21,13 +21,13 @@ def advance(x, v, a, h, kick):
 
 @ti.func
 def felt_time(lag, h, s):
-    """The first kick of a step includes the lag of the velocities [s]."""
+    """Return the time of a kick [s]. The first kick of a step includes the lag of the velocities."""
     return 0.5 * (lag + h) if s == 0 else h
 
 
 @ti.func
 def drive_time(h, s, substeps):
-    """External forces act for half a substep before the first substep and after the last one [s]."""
+    """Return half a substep before the first substep and after the last one, otherwise a whole one [s]."""
     return 0.5 * h if s == 0 or s == substeps else h
 
 

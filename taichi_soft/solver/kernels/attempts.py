@@ -1,10 +1,11 @@
-"""Attempts at a step: save and restore bodies, and decide whether an attempt was fine enough.
+"""Attempts at a step: save and restore bodies, and decide whether the substeps of an attempt were short
+enough.
 
 The number of substeps is chosen for small deformation, and raised for shapes that are found to be stiffer. An
-impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces change a
-velocity by more than `MAX_VELOCITY_CHANGE` at once, or if its result is not finite. The island is then
-restored and retries the step with twice as many substeps, and so on. The last attempt damps vibrations
-strongly; momentum and angular momentum are conserved.
+impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces in one
+substep change a velocity by more than `MAX_VELOCITY_CHANGE`, or if the result is not finite. The island is
+then restored, and the step is retried with twice as many substeps. The last attempt damps vibrations
+strongly, but conserves momentum and angular momentum.
 
 Groups of fields: reads hull; writes islands.
 """
@@ -26,9 +27,9 @@ from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 @ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
-    """Number of halvings of the substep, and the number of the last attempt.
+    """Return how often the substep can be halved, and the number of the last attempt.
 
-    If they differ, the last attempt has the same substeps as the one before, and strong damping.
+    If the two differ, the last attempt has the same substeps as the attempt before it, and strong damping.
     """
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
@@ -39,8 +40,8 @@ def attempts_of(state: ti.template(), program: ti.template()):
 
 @ti.func
 def refined_substeps(state: ti.template(), program: ti.template(), island, substeps, dt):
-    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or more if the shapes of the island's
-    bodies require it.
+    """Return the number of substeps for the first attempt at a step of `dt` [s]: `substeps`, or more if the
+    shapes of the island's bodies require more.
     """
     least = ti.cast(substeps, ti.f32)
     if ti.static(program.integrator.has_stable_step):
@@ -51,7 +52,7 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
                 body = state.islands.body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
-                    # Limited: a forged snapshot can contain any number.
+                    # Limited, because a forged snapshot can contain any number.
                     refinement = ti.min(state.body_refinement[body], MAX_REFINEMENT)
                     least = ti.max(least, ti.min(at_rest * refinement, MAX_REFINEMENT * substeps))
                 row = row_behind(row)
@@ -60,14 +61,16 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
 
 @ti.real_func
 def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
-    """Save the state of a body before the step, for interpolation and retries. Clear its last contacts."""
+    """Save the state of a body before the step, for interpolation and retries, and clear its last
+    contacts.
+    """
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             save_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
-                if state.body_status[body] == FROZEN:  # its pins have no targets, which would reset it
+                if state.body_status[body] == FROZEN:  # its pins have no targets, so they would reset it
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
         _begin_contacts(state, program, body)
@@ -97,7 +100,7 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _restore_body(state: ti.template(), program: ti.template(), body):
-    """Restore the state of a body before the step."""
+    """Restore the state that a body had before the step."""
     state.body_jolted[body] = 1
     particles = state.body_particles[body]
     p = particles[0]
@@ -114,12 +117,12 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
     if ti.static(state.capacity.contact.hull):
         clear_warm_start(state, body)
     if ti.static(program.has_soft_contact):
-        clear_candidates(state, body)  # the island searches again before it continues
+        clear_candidates(state, body)  # the island searches for contacts again before it continues
 
 
 @ti.real_func
 def restore_island(state: ti.template(), program: ti.template(), island: ti.i32):
-    """Restore the state of an island before the step."""
+    """Restore the state that an island had before the step."""
     first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):
         _restore_body(state, program, state.islands.body[row])
@@ -129,7 +132,7 @@ def restore_island(state: ti.template(), program: ti.template(), island: ti.i32)
 
 @ti.func
 def set_strong_damping(state: ti.template(), island, is_braked):
-    """Damp the vibrations of all bodies of an island strongly (1), or no longer (0)."""
+    """Turn strong damping of vibrations on (1) or off (0) for all bodies of an island."""
     first, end = state.islands.first[island], state.islands.first[island + 1]
     row = first
     while row < end:

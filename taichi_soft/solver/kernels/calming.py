@@ -1,12 +1,12 @@
-"""Bring bodies to rest: damp fast vibrations, and keep slow ones and rigid motion.
+"""Bring bodies to rest: damp fast vibrations, but not slow ones and rigid motion.
 
-Material damping acts on every vibration at the rate of the slowest, so fast vibrations of a floppy body would
-last for half a minute. Here the ends of each edge lose part of their relative velocity along it, one edge
-after the other. This damps a vibration more, the more neighbours move against each other, and conserves
-momentum and angular momentum.
+Material damping acts on every vibration at the rate of the slowest one, so fast vibrations of a floppy body
+would last for half a minute. Here the ends of each edge lose part of their relative velocity along the edge,
+one edge after the other. This damps a vibration more if neighbours move against each other more, and
+conserves momentum and angular momentum.
 
-A body whose overall speed is below `sleep_speed` also loses its slow vibrations, in `vibration`: one swinging
-limb would keep it awake.
+If the overall speed of a body is below `sleep_speed`, `vibration` also damps its slow vibrations. Otherwise
+one swinging limb would keep the body awake.
 
 Groups of fields: writes islands.
 """
@@ -17,15 +17,15 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
 
 CALMING = 0.5
-"""Fraction of the relative velocity along an edge that its ends lose in each step."""
+"""Fraction of the relative velocity along an edge that its ends lose per step."""
 
 SLOW_FACTOR = 10.0
-"""Root mean square speed, weighted by mass, over `sleep_speed`, below which a body is slow."""
+"""Root mean square speed, weighted by mass, over `sleep_speed`, below which a body counts as slow."""
 
 
 @ti.func
 def update_rest_state(state: ti.template(), body):
-    """Write to `rest_state` whether a damped body is moving, slow or resting, if bodies can fall asleep."""
+    """If bodies can fall asleep, set the `rest_state` of a damped body to moving, slow or resting."""
     rest_state, sleep_speed = MOVING, state.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
@@ -46,9 +46,9 @@ def update_rest_state(state: ti.template(), body):
 def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
     """Damp the fast vibrations of a slow body in substep `s` of `substeps`.
 
-    `kick` and `h` are those of `fade_vibration`. Each edge is damped once per step, and the edges of a
-    particle at different times: otherwise a vibration with the period of the step would always be damped at
-    its turning point.
+    `kick` and `h`: see `fade_vibration`. Each edge is damped once per step, the edges of a particle in
+    different substeps. Otherwise a vibration with the period of the step would always be damped at its
+    turning point.
     """
     if state.islands.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)
@@ -68,7 +68,7 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        # Skip touched particles: damping them between contact impulses would make a weight on them creep.
+        # Skip touched particles. Damping them between contact impulses would make a weight on them creep.
         if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)

@@ -1,6 +1,7 @@
 """Conjugate gradients with a block-Jacobi preconditioner, for the particles of one body, in one thread.
 
-After Baraff and Witkin 1998, section 5: constraints are filtered out of every residual and direction.
+Following Baraff and Witkin 1998, section 5, constrained components are removed from every residual and
+direction.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -8,12 +9,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 SLIDES, STICKS = 0.0, 1.0
-"""How the floor or a collider constrains a particle: along the normal only, or in all directions."""
+"""Constraint of a particle by the floor or a collider: along the normal only, or in all directions."""
 
 
 @ti.func
 def constrained(state: ti.template(), p, v):
-    """Remove from `v` the components that a pin, the floor or a collider constrains at particle `p`."""
+    """Return `v` without the components that a pin, the floor or a collider constrains at particle `p`."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
     if state.particle_contact[p] > 0:
         hold = state.particle_hold[p]
@@ -23,13 +24,15 @@ def constrained(state: ti.template(), p, v):
 
 @ti.func
 def _dot(a, b):
-    """Dot product in float64: sums over a body in float32 would be less precise than the tolerance."""
+    """Return the dot product in float64, because float32 sums over a body would be less precise than the
+    tolerance.
+    """
     return ti.cast(a.dot(b), ti.f64)
 
 
 @ti.func
 def invert_blocks(state: ti.template(), body):
-    """Compute the preconditioner: the inverse of every diagonal block."""
+    """Compute the preconditioner, which is the inverse of every diagonal block."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
@@ -38,16 +41,16 @@ def invert_blocks(state: ti.template(), body):
 
 @ti.func
 def _squared_norm(state: ti.template(), p, impulse):
-    """Square of an impulse on a particle in the norm of the preconditioner."""
+    """Return the square of an impulse on a particle in the norm of the preconditioner."""
     return _dot(impulse, state.particle_block_inverse[p] @ impulse)
 
 
 @ti.func
 def squared_load(state: ti.template(), body, h):
-    """Square of the impulse in a substep of `h` [s] to which the tolerance is relative.
+    """Return the square of the impulse in a substep of `h` [s] to which the tolerance is relative.
 
     The impulse is the larger of the weight and the right-hand side. Both include the part that floor and
-    colliders support: without it, the right-hand side of a body at rest would be rounding errors only.
+    colliders support. Without that part, the right-hand side of a body at rest would be only rounding errors.
     """
     weight, total = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     gravity = gravity_on(state, body)
@@ -61,11 +64,11 @@ def squared_load(state: ti.template(), body, h):
 
 @ti.func
 def _correct_common_velocity(state: ti.template(), body):
-    """Add to `solution` the change of velocity that all particles share, and update `residual`.
+    """Add a common change of velocity of all particles to `solution`, and update `residual`.
 
-    Each call corrects one direction. Before the iterations, this suffices for a body in free fall, which
-    takes conjugate gradients many iterations. After them, it removes the momentum left in the residual, which
-    would make bodies slide faster or creep on slopes.
+    Each call corrects one direction. Before the iterations, this solves the system of a body in free fall,
+    for which conjugate gradients need many iterations. After the iterations, this removes the momentum in the
+    residual, which would make bodies slide faster or creep on slopes.
     """
     particles = state.body_particles[body]
     total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
@@ -88,10 +91,10 @@ def _correct_common_velocity(state: ti.template(), body):
 
 @ti.func
 def solve_system(state: ti.template(), body, load):
-    """Solve system times solution = right-hand side, to the tolerance in `solver`.
+    """Solve the equation system times `solution` = right-hand side, to the tolerance in `solver`.
 
-    `solution` is the initial guess, and `residual` its residual, which is overwritten. Residuals are measured
-    in the norm of the preconditioner.
+    Before the call, `solution` must contain the initial guess, and `residual` its residual. Both are
+    overwritten. Residuals are measured in the norm of the preconditioner.
 
     Args:
         load: result of `squared_load`, to which the tolerance is relative.
@@ -130,6 +133,6 @@ def solve_system(state: ti.template(), body, load):
                 state.direction[p] = state.image[p] + turn * state.direction[p]
             count += 1
         else:
-            count = most_iterations  # no direction left but rounding errors
+            count = most_iterations  # end: the remaining direction is only rounding errors
     _correct_common_velocity(state, body)
     return ti.sqrt(ti.cast(left / ti.max(load, 1e-300), state.real))

@@ -1,4 +1,4 @@
-"""Drift among colliders: positions from velocities, and collisions on the path.
+"""Drift among colliders: move particles by their velocities, and collide them on their paths.
 
 Groups of fields: reads colliders.
 """
@@ -26,7 +26,8 @@ def list_near_colliders(state: ti.template(), body, speed, since, left):
 def can_drift_at_once(state: ti.template(), body, path):
     """1 if a single body can move its next `path` [m] first and collide afterwards.
 
-    The colliders near it must be known. Hull points near a collider change velocities before the move.
+    The colliders near the body must be known. A hull near a collider prevents this, because it changes
+    velocities before the move.
     """
     is_known = int(state.colliders.gone[body] + path <= state.colliders.reach[body])
     if ti.static(state.capacity.contact.hull):
@@ -56,10 +57,11 @@ def _move_block(state: ti.template(), first, count, h):
 
 @ti.func
 def _collide_body(state: ti.template(), body, h, since, travelled):
-    """Collide the particles of a body on the path that they have just moved.
+    """Collide the particles of a body on the path along which they have just moved.
 
     Args:
-        travelled: distance travelled since near colliders were listed, including this path [m].
+        travelled: distance that the body has travelled since near colliders were listed, including this path
+            [m].
     """
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
@@ -81,10 +83,11 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
 
 @ti.real_func
 def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
-    """Collide a body that has moved by its velocities, and update its rest timer.
+    """Collide a body that its velocities have moved, and update its rest timer.
 
     Args:
-        travelled: distance travelled since near colliders were listed, including this path [m].
+        travelled: distance that the body has travelled since near colliders were listed, including this path
+            [m].
     """
     set_travelled(state, body, travelled)
     if state.colliders.near_count[body] > 0:
@@ -99,7 +102,7 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
 
 @ti.real_func
 def drift_body(state: ti.template(), body: ti.i32, job: Job):
-    """Move one body by its velocities, and collide it on the way."""
+    """Move one body by its velocities, and collide it on its path."""
     travelled = state.colliders.gone[body] + job.fastest * job.h
     is_new = int(not (state.colliders.reach[body] >= travelled))
     if is_new == 1:
@@ -119,7 +122,7 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
 
 @ti.func
 def has_drifted(state: ti.template(), body, speed, h, since):
-    """Collide a single body that the kick has moved. Undo the move if the colliders near it are unknown.
+    """Collide a single body that the kick has moved. If the colliders near it are unknown, undo the move.
 
     Returns: 1 if the body has moved.
     """

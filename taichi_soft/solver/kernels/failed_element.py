@@ -1,4 +1,4 @@
-"""Find why a body was frozen: repeat its last step, element by element."""
+"""Find the cause of a frozen body by repeating its last step, element by element."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
@@ -21,7 +21,7 @@ def find_failed_element(
     is_braked: ti.i32,
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Repeat the last step of a frozen body up to the substep in which it fails, and undo it.
+    """Repeat the last step of a frozen body up to the substep in which it fails, then restore the body.
 
     Args:
         found: receives the tetrahedron (block times `LANES` plus lane) or edge that failed first, and the

@@ -1,13 +1,13 @@
-"""Schedule `flat`: all tetrahedra, then all particles, of all bodies in parallel, substep by substep.
+"""Schedule `flat`: in each substep, process all tetrahedra of all bodies in parallel, then all particles.
 
-For bodies too large for one thread. Forces are stored per corner and per edge, and each particle gathers its
-own in a fixed order, so the result does not depend on the number of threads.
+This schedule is for bodies too large for one thread. Forces are stored per corner and per edge. Each particle
+adds its forces in a fixed order, so the result does not depend on the number of threads.
 
 On a CPU, all substeps run inside one kernel call: one task per thread, synchronised by a spinning barrier.
-Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at once because
-Taichi's pool has exactly that many threads. The disadvantage: if another program occupies a core, every
-barrier can wait for the operating system, so only very large bodies use this schedule by default. A GPU has
-no such barrier: each substep is a separate launch.
+Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at the same time,
+because Taichi's pool has exactly as many threads. But if another program occupies a core, every barrier can
+wait for the operating system, so only very large bodies use this schedule by default. A GPU has no such
+barrier; there, each substep is a separate launch.
 """
 
 from taichi_soft.bodies.kernels.particles import (
@@ -29,7 +29,7 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clea
 from taichi_soft.solver.kernels.kick import MAX_VELOCITY_CHANGE
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
-_FAILING, _DONE = 5, 6  # above any body's status: retry the step, or step done
+_FAILING, _DONE = 5, 6  # larger than any body status: retry the step; step complete
 
 
 @ti.func
@@ -70,9 +70,9 @@ def _edge_phase(state: ti.template(), program: ti.template(), e):
 
 @ti.func
 def gathered_force(state: ti.template(), p):
-    """Internal force on one particle [N]: the forces of its corners, then of its edges."""
+    """Return the internal force on one particle [N]: the forces of its corners, then of its edges."""
     total = ti.Vector.zero(state.real, 4)
-    corners = state.particle_corners[p]  # empty if the body's law acts on edges
+    corners = state.particle_corners[p]  # no rows if the body's law acts on edges
     for k in range(corners[0], corners[1]):
         total += state.corner_force[state.corner_slot[k]]
     force = total.xyz
@@ -93,9 +93,10 @@ def _felt_time(state: ti.template(), program: ti.template(), body, h, s):
 
 @ti.func
 def _moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
-    """Advance one particle by one substep under its internal force [N]. A pinned one keeps its velocity.
+    """Return the motion of one particle after a substep under its internal force [N]. A pinned particle keeps
+    its velocity.
 
-    Returns: its new position [m] and velocity [m/s], and its acceleration [m/s^2].
+    Returns: new position [m] and velocity [m/s], and acceleration [m/s^2].
     """
     inv_mass = state.particle_inv_mass[p]
     is_free = inv_mass > 0.0
@@ -129,7 +130,7 @@ def _is_damped_now(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def _gather_phase(state: ti.template(), p, h, s, substeps):
-    """Write the forces of bodies that are damped in this substep to where damping reads them."""
+    """For bodies that are damped in this substep, write the forces to the field that damping reads."""
     if _is_damped_now(state, state.particle_body[p], h, s, substeps):
         state.particle_force[p] = widened(gathered_force(state, p))
 
@@ -151,7 +152,7 @@ def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, subste
 
 @ti.func
 def substep_alone(state: ti.template(), program: ti.template(), body, h, s, substeps):
-    """Run one substep of one body in one thread, to find the cause of a failure."""
+    """Run one substep of one body in one thread, to find the cause of its failure."""
     accumulate_forces(state, program, body)
     kick = _felt_time(state, program, body, h, s)
     damp_vibration(state, program, body, kick, h, s, substeps)
@@ -165,7 +166,7 @@ def substep_alone(state: ti.template(), program: ti.template(), body, h, s, subs
 
 @ti.func
 def _begin_phase(state: ti.template(), p, is_again):
-    """Save the state of a particle in the first attempt."""
+    """Save the state of a particle, in the first attempt only."""
     if is_again == 0:
         _save_phase(state, p)
 
@@ -194,8 +195,8 @@ def _flow_phase(state: ti.template(), block, dt):
 
 @ti.func
 def _end_attempt(state: ti.template(), body, h, is_braked, is_last):
-    """End an attempt of a body: it retries the step, or is frozen after the last attempt. Returns: 1 if it
-    failed.
+    """End an attempt of a body. A failed body retries the step, or is frozen after the last attempt. Returns:
+    1 if it failed.
     """
     failed = 0
     state.body_jolted[body] = 0
@@ -211,7 +212,7 @@ def _end_attempt(state: ti.template(), body, h, is_braked, is_last):
 
 @ti.func
 def _end_step(state: ti.template(), body_count):
-    """After the last attempt, make the bodies that are done ready for the next step."""
+    """After the last attempt, prepare the completed bodies for the next step."""
     for body in range(body_count):
         state.body_is_braked[body] = 0
         if state.body_status[body] == _DONE:
@@ -220,10 +221,10 @@ def _end_step(state: ti.template(), body_count):
 
 @ti.func
 def _wait_for_workers(state: ti.template(), worker_count: ti.template()):
-    """Wait until all workers have called this as often as this one."""
+    """Wait until all workers have called this function as often as this worker."""
     arrived = ti.atomic_add(state.barrier[0], 1) + 1
     target = (arrived + worker_count - 1) // worker_count * worker_count
-    # A maximum with -1 changes nothing, but cannot be optimised into a plain load.
+    # A maximum with -1 changes nothing, but the compiler cannot turn it into a plain load.
     while ti.atomic_max(state.barrier[0], -1) < target:
         pass
 
@@ -243,9 +244,10 @@ def step_flat_cpu(
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """Run substeps `first` to `last` - 1 of `substeps` in one of several attempts at a fixed step.
+    """Run substeps `first` to `last` - 1 of `substeps` in one attempt at a fixed step.
 
-    It acts on all bodies that are not done, with `program.worker_count` threads. Returns: how many failed.
+    The kernel acts on all bodies that have not completed the step, with `program.worker_count` threads.
+    Returns: the number of failed bodies.
     """
     failed = 0
     state.barrier[0] = 0
@@ -350,7 +352,7 @@ def end_flat(
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """End an attempt at a step: restore failed bodies. Returns: how many failed."""
+    """End an attempt at a step, and restore failed bodies. Returns: their number."""
     failed = 0
     for p in range(particle_count):
         _check_phase(state, p, int(attempt == attempts - 1))
@@ -367,7 +369,7 @@ def end_flat(
 
 @ti.kernel
 def finish_flat(state: ti.template(), body_count: ti.i32):
-    """End the step after the last attempt."""
+    """End the step of all bodies after the last attempt."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _end_step(state, body_count)

@@ -1,12 +1,13 @@
-"""Particles that the solve of implicit Euler constrains to the floor or colliders, with Coulomb friction.
+"""Constrain particles to the floor or colliders in the solve of implicit Euler, with Coulomb friction.
 
 Contact after the solve could remove only the momentum of the particles that touch. A body would sink into
-itself until its solve throws these down fast enough, and would follow a conveyor belt only as fast as its
-lowest particles pull it. So the solve constrains each particle that was stopped: along the normal, it gets
-the velocity of the surface. A sticking particle gets that velocity in all directions, a sliding one an
-impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting from the last
-solution: particles that would be pulled are released, particles that stick beyond the friction limit slide,
-and particles that friction would turn back stick.
+itself until its solve moves these particles down fast enough, and would follow a conveyor belt only as fast
+as its lowest particles pull it. So the solve constrains each stopped particle: along the normal, it has the
+velocity of the surface. A sticking particle has the surface velocity in all directions; a sliding particle
+receives an impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting
+from the last solution. Each time, particles that would be pulled are released, particles that stick beyond
+the friction limit begin to slide, and particles stick if friction would
+reverse their sliding.
 
 Groups of fields: reads colliders.
 """
@@ -16,22 +17,23 @@ from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 MAX_IMPULSE = 1e24
-"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: it counts as zero."""
+"""Impulse [N s] above which the solve of a body torn to pieces has overflowed. Such an impulse counts as
+zero."""
 
 MAX_SOLVES = 6
-"""Solves in one substep, at most, to find which particles stick, slide and leave."""
+"""Largest number of solves in one substep to find the particles that stick, slide and leave."""
 
 TOLERANCE = 0.003
-"""Violation of Coulomb's law, over the sum of impulses, at which a substep is not solved again."""
+"""Largest accepted violation of Coulomb's law, over the sum of impulses."""
 
 MAX_REVERSAL = 0.1
-"""Largest relative change of a sliding velocity that undoes too strong friction. Larger changes would keep a
-body from coming to rest."""
+"""Largest relative change of a sliding velocity by which friction that was too strong is undone. Larger
+changes would prevent bodies from coming to rest."""
 
 
 @ti.func
 def _friction_on(state: ti.template(), p):
-    """Friction coefficient of the collider under a particle."""
+    """Return the friction coefficient of the collider under a particle."""
     return state.colliders.surface[state.particle_contact[p] - 1].x
 
 
@@ -39,7 +41,7 @@ def _friction_on(state: ti.template(), p):
 def constrain_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
     """Constrain a particle to the collider in `particle_contact`.
 
-    It sticks in the first solve if it slides no faster than gravity accelerates in a substep.
+    In the first solve, the particle sticks if it slides no faster than `fall`.
 
     Args:
         n: normal of the surface.
@@ -57,7 +59,9 @@ def constrain_particle(state: ti.template(), p, n, sliding, surface_velocity, fa
 
 @ti.func
 def _begin_solve(state: ti.template(), body):
-    """Write the velocities of constrained particles to `solution`, and its residual to `residual`."""
+    """Write the velocities of constrained particles to `solution`, and the residual of `solution` to
+    `residual`.
+    """
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_contact[p] > 0:
@@ -75,10 +79,10 @@ def _begin_solve(state: ti.template(), body):
 
 @ti.func
 def _impulse_of(state: ti.template(), p):
-    """Impulse of the last solve on a constrained particle.
+    """Return the impulse of the last solve on a constrained particle.
 
-    Returns: its component along the normal [N s], the tangential rest, the friction limit of that, and the
-    tangential velocity of the particle relative to the surface [m/s].
+    Returns: component along the normal [N s], tangential component, friction limit of the tangential
+    component, and tangential velocity of the particle relative to the surface [m/s].
     """
     hold = state.particle_hold[p]
     n = hold.xyz
@@ -92,10 +96,10 @@ def _impulse_of(state: ti.template(), p):
 
 @ti.func
 def _measure_errors(state: ti.template(), body):
-    """Measure the violation of Coulomb's law.
+    """Measure how far impulses violate Coulomb's law.
 
-    Returns: sums over all particles [N s]: of impulses, of those that pull, of the excess over the friction
-    limit where particles stick, and of the errors of friction where they slide.
+    Returns: sums over all particles [N s]: impulses; impulses that pull; for sticking particles, the excess
+    over the friction limit; for sliding particles, the errors of friction.
     """
     total, pulling = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     beyond, wrong = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
@@ -117,7 +121,7 @@ def _measure_errors(state: ti.template(), body):
 
 @ti.func
 def _update_constraints(state: ti.template(), body, releases):
-    """Update constraints and friction after a solve.
+    """Update the constraints and the friction of particles after a solve.
 
     Args:
         releases: 1 to release particles that are pulled.
@@ -168,11 +172,11 @@ def solve_held(state: ti.template(), body, held_count, h):
 
 @ti.func
 def held_velocity(state: ti.template(), p):
-    """Velocity of a constrained particle after the solve.
+    """Return the velocity of a constrained particle after the solve.
 
-    Errors of friction that the solves left are corrected on the particle alone, without adding energy.
+    Remaining errors of friction are corrected on the particle alone, without adding energy.
 
-    Returns: the velocity [m/s], the impulse along the normal and the tangential impulse [N s].
+    Returns: velocity [m/s], impulse along the normal, and tangential impulse [N s].
     """
     pressing, across, most, sliding = _impulse_of(state, p)
     if not ti.abs(pressing) + across.norm() < MAX_IMPULSE:

@@ -17,10 +17,10 @@ from taichi_soft.solver.kernels.implicit_solve import add_pin_reactions, record_
 
 @ti.func
 def _surface_velocity(colliders: ti.template(), c, x, since, h):
-    """Mean velocity of a collider's surface at `x` in a substep [m/s].
+    """Return the mean velocity of a collider's surface at `x` in a substep [m/s].
 
-    For a rotating collider it points along the chord: along the tangent, particles on it would spiral
-    outwards.
+    For a rotating collider, the mean velocity points along the chord of the path. Along the tangent,
+    particles on the collider would spiral outwards.
 
     Returns: the velocity, and the vector from the collider's position to `x` [m].
     """
@@ -31,8 +31,8 @@ def _surface_velocity(colliders: ti.template(), c, x, since, h):
 
 @ti.func
 def _surface_below(colliders: ti.template(), c, x, since):
-    """Distance of a point from a collider's skin `since` [s] after the start of the step, and the normal
-    there.
+    """Return the distance of a point from a collider's skin `since` [s] after the start of the step, and the
+    normal there.
     """
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
     place = x - colliders.position[c] - since * colliders.velocity[c]
@@ -46,9 +46,9 @@ def _surface_below(colliders: ti.template(), c, x, since):
 
 @ti.func
 def _constrain_to_colliders(state: ti.template(), body, h, since):
-    """Constrain the particles that lie on colliders, and release others.
+    """Constrain the particles that lie on colliders, and release all others.
 
-    A particle lies on a collider while gravity alone would bring it back within the substep.
+    A particle lies on a collider if gravity alone would return it to the collider within the substep.
 
     Returns: the number of constrained particles.
     """
@@ -78,7 +78,9 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
 
 @ti.func
 def _apply_impulse(state: ti.template(), body, p, h, since):
-    """Apply the impulse of a constrained particle to its collider. Returns: the particle's velocity [m/s]."""
+    """Apply the impulse of a constrained particle to its collider. Returns: the velocity of the particle
+    [m/s].
+    """
     c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
     velocity, pressing, across = held_velocity(state, p)
     surface_velocity, arm = _surface_velocity(state.colliders, c, state.particle_position[p], since, h)
@@ -97,12 +99,12 @@ def _apply_impulse(state: ti.template(), body, p, h, since):
 
 @ti.func
 def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since, is_first, common):
-    """Solve for the new velocities of one body, and write its present positions to `direction`.
+    """Solve for the new velocities of one body, and write its current positions to `direction`.
 
     Args:
         since: time since the start of the step [s].
         is_first: 1 in the first substep of a step.
-    Returns: the highest speed [m/s], and the highest relative to the `common` velocity.
+    Returns: the highest speed [m/s], and the highest speed relative to the `common` velocity.
     """
     held_count = _constrain_to_colliders(state, body, h, since)
     record_residual(state, body, solve_body(state, program, body, h, held_count), is_first)

@@ -1,9 +1,9 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and their change along the path. K is
-projected to be positive semi-definite, and acts only on motion without the body's rotation: see
-`rigid_rotation`. The solve constrains particles that lie on colliders, unless it would have to pull them
-down: see `held_particles`.
+(M + h D + h^2 K) dv = h (f + m g - h K v): the right-hand side contains the forces at the old positions and
+their change along the path. K is projected to be positive semi-definite, and acts only on motion without the
+body's rotation: see `rigid_rotation`. The solve constrains particles that lie on colliders, as long as no
+impulse pulls them: see `held_particles`.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -23,18 +23,18 @@ from taichi_soft.solver.kernels.held_particles import solve_held
 from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rotation
 
 FARTHEST = 0.5
-"""Change of an edge in a substep, over its length, above which the substep is halved."""
+"""Largest change of an edge in a substep, over its length. For a larger change, the substep is halved."""
 
 MIN_LENGTH = 0.1
-"""Edges shorter than this fraction of the mean length count as that long."""
+"""Smallest length, over the mean length, with which the change of an edge is compared."""
 
 MAX_PIECES = 32
-"""Largest number of pieces of a substep, so that the halving ends."""
+"""Largest number of pieces of a substep."""
 
 
 @ti.func
 def assemble(state: ti.template(), program: ti.template(), body, h):
-    """Fill the blocks, and write the right-hand side to `residual` and `particle_force`.
+    """Fill the blocks of the matrix, and write the right-hand side to `residual` and `particle_force`.
 
     `solution` is set to zero.
     """
@@ -59,7 +59,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 @ti.func
 def solve_body(state: ti.template(), program: ti.template(), body, h, held_count):
-    """Solve a body with `held_count` constrained particles: see `solve_held`."""
+    """Solve the system of a body with `held_count` constrained particles, see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
     return solve_held(state, body, held_count, h)
@@ -79,14 +79,16 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 @ti.func
 def record_residual(state: ti.template(), body, residual, is_first):
-    """Record the largest residual of a step's solves, without that of a body that becomes non-finite."""
+    """Record the largest residual of the solves of a step, except for a body that becomes non-finite."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
     state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
 def _scale_motion(state: ti.template(), body, h, share):
-    """Scale the motion of a substep of `h` [s] by `share`, except the mean motion of the body's particles."""
+    """Scale the motion of a body in a substep of `h` [s] by `share`, except the mean motion of its
+    particles.
+    """
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -103,7 +105,7 @@ def _scale_motion(state: ti.template(), body, h, share):
 
 @ti.func
 def _largest_change(state: ti.template(), body):
-    """Largest change of an edge since the positions in `direction`, over its length."""
+    """Return the largest change of an edge since the positions in `direction`, over its length."""
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):

@@ -1,7 +1,7 @@
-"""Islands: bodies that can touch each other in a step or are joined, directly or through others.
+"""Islands: groups of bodies that can touch each other in a step or are joined, directly or through others.
 
 One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
-stays clear of all others is an island of its own.
+cannot touch others is a separate island.
 
 Groups of fields: reads hull, joints; writes islands.
 """
@@ -15,19 +15,21 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 ISLAND_MARGIN = 0.25
-"""Distance, in mean edges, by which bodies can come closer than their velocities predict and still be in one
-island."""
+"""Distance, in mean edges, by which bodies of different islands can come closer than their velocities predict
+without touching."""
 
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Absent bodies get a far one."""
+    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Absent bodies get a box far
+    away.
+    """
     for body in range(body_count):
         if state.body_status[body] == ABSENT:
             state.body_bounds_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
         if state.body_status[body] == ASLEEP:
-            continue  # it keeps its box
+            continue  # its box stays valid
         outer = state.touching.body_outer[body]
         p = state.touching.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
@@ -45,7 +47,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
         surface = state.body_surface[body]
-        # Relative motion of its parts can change direction within the step.
+        # The relative motion of the body's parts can change direction within the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.body_bounds_lower[body] = lower - reach
@@ -54,7 +56,9 @@ def _find_boxes(state: ti.template(), body_count, dt):
 
 @ti.func
 def _sort_by_lower_x(state: ti.template(), body_count):
-    """Insertion sort: bodies keep nearly the order they had a step ago."""
+    """Sort bodies by the lower x of their boxes. Insertion sort, because the order hardly changes between
+    steps.
+    """
     for i in range(1, body_count):
         body = state.islands.sweep_order[i]
         x = state.body_bounds_lower[body].x
@@ -109,23 +113,25 @@ def _join_held(state: ti.template()):
 
 @ti.func
 def _is_listed(state: ti.template(), body, end):
-    """1 if a body and its root have a status below `end`. The parent of the body must be the root."""
+    """1 if a body and its root have a status below `end`. The parent of the body must be its root."""
     root = state.islands.parent[body]
     return int(state.body_status[body] < end) & int(state.body_status[root] < end)
 
 
 @ti.func
 def _list_islands(state: ti.template(), body_count, end):
-    """List the bodies with a status below `end` by island, both in ascending order: a counting sort."""
+    """List the bodies with a status below `end` by island, islands and bodies in ascending order, by a
+    counting sort.
+    """
     fields, islands = state.islands, 0
     for body in range(body_count):
-        # A parent's number never exceeds its child's, so its parent is already the root.
+        # The parent's number is never larger than the child's, so its own parent is already the root.
         root = fields.parent[fields.parent[body]]
         fields.parent[body] = root
         if _is_listed(state, body, end):
             if root == body:
                 fields.of_body[body] = islands
-                fields.first[islands] = 0  # bodies in it so far
+                fields.first[islands] = 0  # number of its bodies so far
                 islands += 1
             island = fields.of_body[root]
             fields.of_body[body] = island
@@ -133,7 +139,7 @@ def _list_islands(state: ti.template(), body_count, end):
     rows, island = 0, 0
     while island < islands:
         rows += fields.first[island]
-        fields.first[island] = rows  # the row after its last one
+        fields.first[island] = rows  # the row after its last row
         island = row_behind(island)
     for i in range(body_count):
         body = body_count - 1 - i
@@ -171,10 +177,12 @@ def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, n
 
 @ti.kernel
 def list_joined_islands(state: ti.template(), body_count: ti.i32):
-    """List the islands of joints in a world whose bodies do not touch each other, until the joints change."""
+    """List the islands of joints in a world whose bodies do not touch each other. Call this when joints
+    change.
+    """
     ti.loop_config(serialize=True)
     for _ in range(1):
         for body in range(body_count):
             state.islands.parent[body] = body
         _join_held(state)
-        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, which can be filled at any time
+        _list_islands(state, body_count, ABSENT + 1)  # includes empty slots, which can be filled at any time

@@ -1,4 +1,4 @@
-"""Sharing an island between threads: phase by phase, each thread takes bodies until none is left.
+"""Share islands between threads: in each phase, threads take bodies until none is left.
 
     thread 0                              thread 1                       thread 2
     owns island 0 of bodies a b c d       owns island 1 of body e        owns none: helper 1
@@ -15,8 +15,8 @@
 
 An island of several bodies is a *shared island*. One thread *owns* it. The owner solves joints and contacts
 between its bodies, and starts *jobs*: phases that each body runs separately. *Helpers* are threads that own
-no island, or have finished theirs. Owner and helpers take bodies that no thread has taken yet. The owner then
-waits for the bodies that others took. It never waits for a thread that has not started: without free threads
+no island, or have finished their own. Owner and helpers take bodies that no thread has taken yet. The owner
+then waits for the bodies that helpers took. It never waits for a thread that has not started: without helpers
 it takes all bodies itself. The result for a body does not depend on the thread.
 
 Groups of fields: reads islands; writes jobs.
@@ -27,30 +27,30 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import MOST_PARTS, Job
 
 OWNER = 0
-"""Number of the worker that owns an island; helpers have the numbers after it."""
+"""Worker number of the owner of an island. Helpers have larger numbers."""
 
 HELP = -1
-"""Used in place of a phase: run the phase that the owner has started."""
+"""Used instead of a phase: run the phase that the owner has started."""
 
 
 @ti.func
 def _now(counter: ti.template()):
     """Read a counter that other threads change.
 
-    A maximum with -1 does not change it, and cannot be optimised into a plain load.
+    A maximum with -1 does not change the counter, but the compiler cannot turn it into a plain load.
     """
     return ti.atomic_max(counter, -1)
 
 
 @ti.func
 def _size_of(state: ti.template(), island):
-    """Number of bodies of an island."""
+    """Return the number of bodies of an island."""
     return state.islands.first[island + 1] - state.islands.first[island]
 
 
 @ti.func
 def is_shared_island(state: ti.template(), island):
-    """True if an island has several bodies, so that other threads can help."""
+    """True if an island has several bodies, so that helpers can take some."""
     return _size_of(state, island) > 1
 
 
@@ -63,15 +63,16 @@ def run_job(
     worker: ti.i32,
     job: Job,
 ):
-    """Take bodies of an island until none is left. The owner starts the job first, and waits for all bodies.
+    """Take bodies of an island until none is left. The owner first starts the job, and at the end waits for
+    all bodies.
 
-    Each worker begins with its own part of the bodies, then takes from the parts of others. So the data of a
-    body stay in the cache of one core from phase to phase.
+    Each worker begins with its own part of the bodies, and then takes bodies from the parts of other workers.
+    So the data of a body stay in the cache of one core.
 
-    The job is stored here and not in another function, because Taichi assumes that a called function does not
-    read earlier writes, and drops a write that the kernel itself overwrites before reading it. Islands with
-    one body are not shared between threads: writing their job would move the cache line away from the threads
-    of their neighbours.
+    The job is stored here and not in a called function, because Taichi assumes that a called function does
+    not read earlier writes, and drops a write that the kernel itself overwrites before reading it. Islands
+    with one body are not shared between threads: writing their jobs would invalidate cache lines of other
+    threads.
 
     Args:
         do_phase: a function (state, program, island, body, job).
@@ -114,7 +115,7 @@ def run_job(
 
 @ti.func
 def open_shared_islands(state: ti.template(), helpers):
-    """Before the islands are stepped, count the work that can be shared."""
+    """Count the work that can be shared. Call this before the islands are stepped."""
     islands, members, island = 0, 0, 0
     while island < state.islands.count[None]:
         if is_shared_island(state, island):
@@ -128,15 +129,15 @@ def open_shared_islands(state: ti.template(), helpers):
 
 @ti.func
 def close_shared_island(state: ti.template(), island):
-    """After the step of an island, release its helpers."""
+    """Release the helpers of an island after its step."""
     if is_shared_island(state, island):
         ti.atomic_sub(state.jobs.unfinished_islands[None], 1)
 
 
 @ti.func
 def help_others(state: ti.template(), program: ti.template(), do_phase: ti.template(), helper):
-    """Work on shared islands until all are finished, as one of the first helpers; more would only slow them
-    down.
+    """Work on shared islands until all are finished. Only the first helpers work, because more would slow
+    them down.
     """
     while helper < state.jobs.useful_helpers[None] and _now(state.jobs.unfinished_islands[None]) > 0:
         for island in range(state.islands.count[None]):

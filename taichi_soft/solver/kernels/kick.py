@@ -1,4 +1,4 @@
-"""Kick among colliders: new velocities from forces. The drift then moves positions.
+"""Kick among colliders: compute new velocities from forces. The drift then moves the particles.
 
 In between, joints and contact between bodies change velocities island by island.
 
@@ -15,16 +15,16 @@ from taichi_soft.solver.step_fields import Job
 
 MAX_VELOCITY_CHANGE = 1.0
 """Largest change of a particle's velocity by the forces of one substep, over the speed of sound in its body.
-Stable vibrations stay below it, even of slivers: a stable substep is about the time in which sound crosses
-the smallest tetrahedron."""
+Stable vibrations stay below it, even those of slivers, because a stable substep is about the time in which
+sound crosses the smallest tetrahedron."""
 
 TOUCHED_FACTOR = 4.0
-"""Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep: contact removes
-most of its change."""
+"""Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep, because contact
+removes most of the change."""
 
 EXPLODING = 20.0
 """Path of a particle within one substep, over the mean edge of its body's surface, above which the body
-counts as exploding. Others pass through it until it is frozen or slower."""
+counts as exploding. Other bodies pass through it until it is frozen or slower."""
 
 
 @ti.func
@@ -32,7 +32,8 @@ def _store_block(state: ti.template(), first, positions: ti.template(), velociti
     """Store new positions and velocities of `LANES` particles from `first` on, and clear their touches and
     forces.
 
-    One loop per field: a loop of constant length over one field compiles to a few wide stores.
+    There is one loop per field, because a loop of constant length over one field compiles to a few wide
+    stores.
     """
     for lane in range(LANES):
         for i in ti.static(range(3)):
@@ -50,7 +51,7 @@ def _store_block(state: ti.template(), first, positions: ti.template(), velociti
 def _store_last_block(
     state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()
 ):
-    """Store the last particles of a body, fewer than `LANES`, in the same way."""
+    """Store the last particles of a body, fewer than `LANES`, as `_store_block` does."""
     lane = 0
     while lane < count:
         p = first + lane
@@ -66,13 +67,13 @@ def _store_last_block(
 def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
     """Store the speeds of up to `LANES` particles relative to the `common` velocity, for contact.
 
-    Call it before new velocities are stored. Returns: the squares of possible impact speeds.
+    Call this before new velocities are stored. Returns: squares of possible impact speeds.
     """
     speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         v = ti.Vector([velocities[lane, i] for i in ti.static(range(3))])
         speeds[lane] = (v - common).norm()
-        # A particle in contact loses the speed that it gains in the kick again.
+        # Contact removes the speed that a touching particle gains in the kick.
         was_touched = state.particle_touches[first + lane] == 1
         beside = ti.select(was_touched, state.particle_velocity[first + lane], v) - common
         striking2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
@@ -93,18 +94,18 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
     Forces are cleared. Rows beyond the last particle are computed too, and ignored.
 
-    Returns: for each the squares of its speed, of its possible impact speed, and of its acceleration, which
-    is reduced for touched particles.
+    Returns: for each particle, the squares of its speed, of its possible impact speed, and of its
+    acceleration. The acceleration is reduced for touched particles.
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
     velocities = ti.Matrix.zero(state.real, LANES, 3)
     speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    # This loop stores to local arrays only: the compiler cannot know that fields do not overlap.
+    # This loop stores only to local arrays, because the compiler cannot know that fields do not overlap.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
-        # All four components of a force (the last is 0), for wide loads without gaps.
+        # Use all four components of a force (the last is 0), for wide loads without gaps.
         acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         x, v = program.integrator.advance(
@@ -131,7 +132,7 @@ def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick
     """Compute velocities after `kick` [s] of the forces, and positions after the job's `drift_time`.
 
     Returns: the highest speed [m/s]; the highest and the mean possible impact speed, if the body has pairs;
-    and 1 if forces changed no velocity by too much at once.
+    and 1 if forces changed no velocity too much.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -151,8 +152,8 @@ def _store_body_speeds(
     state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
 ):
     """Store the speeds of a body for its island and for the search for contacts."""
-    # Unchanged values are not written: neighbouring bodies share a cache line, which a write takes from
-    # other threads.
+    # Do not write unchanged values: bodies in adjacent slots share a cache line, and a write would take it
+    # from other threads.
     state.islands.body_speed[body] = speed
     if state.islands.is_stable[body] != is_stable:
         state.islands.is_stable[body] = is_stable
@@ -166,9 +167,9 @@ def _store_body_speeds(
 
 @ti.real_func
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
-    """Compute new velocities of one body, on which forces act for `felt` [s], and store its speeds.
+    """Compute new velocities of one body after forces have acted for `felt` [s], and store its speeds.
 
-    Returns: 1 if forces changed no velocity by too much at once.
+    Returns: 1 if forces changed no velocity too much.
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):

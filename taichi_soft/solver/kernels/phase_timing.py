@@ -1,4 +1,4 @@
-"""Run one phase of the substep many times, for profiles."""
+"""Run one phase of a substep many times, to profile it."""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces
@@ -18,7 +18,7 @@ def repeat_phase(
     repeats: ti.i32,
     h: ti.f32,
 ):
-    """Run one of `PHASES` `repeats` times on every body, one after the other. Forces accumulate meanwhile."""
+    """Run one of `PHASES` on every body in succession, `repeats` times. Forces accumulate meanwhile."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
         for _ in range(repeats):

@@ -1,6 +1,6 @@
-"""Bodies that skip one step: they cost nothing in it, and then continue with their velocities.
+"""Bodies that skip one step. They cost no time in that step, and then continue with their velocities.
 
-Like sleeping bodies, they take part in the step after all if a moving body comes near: see `wake_island`.
+Skipping bodies are woken and make the step if a moving body comes near: see `wake_island`.
 """
 
 from taichi_soft.bodies.kernels.particles import save_particle
@@ -13,7 +13,7 @@ from taichi_soft.solver.kernels.sleep import store_boxes_of_skipping
 
 @ti.kernel
 def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Make bodies skip the coming step, except those that a force acts on in it."""
+    """Make bodies skip the next step, except those on which a force acts in it."""
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
         body = bodies[i]
@@ -23,7 +23,7 @@ def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndi
 
 @ti.kernel
 def begin_skips(state: ti.template(), body_count: ti.i32):
-    """Update the boxes of the bodies that skip the coming step."""
+    """Update the boxes of the bodies that skip the next step."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         store_boxes_of_skipping(state, body_count)
@@ -33,7 +33,7 @@ def begin_skips(state: ti.template(), body_count: ti.i32):
 def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
     """Make the bodies that skipped a step active again.
 
-    Frames draw them at their current positions. Their contacts and the forces of force fields are cleared.
+    Interpolation returns their current positions. Their contacts and the forces of force fields are cleared.
 
     Returns: the number of bodies that skipped the step.
     """

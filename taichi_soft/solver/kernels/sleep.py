@@ -1,4 +1,4 @@
-"""Sleep: islands at rest are skipped until something comes near.
+"""Sleep: islands at rest are skipped until something approaches or acts on them.
 
 Groups of fields: reads colliders, hull, islands.
 """
@@ -10,16 +10,16 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CALM_TIME = 0.5
-"""Time [s] for which all bodies of an island must be slow: longer than a thrown body is slow at its highest
-point."""
+"""Time for which all bodies of an island must be slow [s]. A thrown body is slow for a shorter time at its
+highest point."""
 
 WAKE_MARGIN = 0.01
-"""Distance [m] from a sleeping body's box within which an event wakes it."""
+"""Distance from the box of a sleeping body within which an event wakes it [m]."""
 
 
 @ti.func
 def _wake_in_box(state: ti.template(), body_count, lower, upper):
-    """Wake bodies that sleep or skip the step and whose box is near another. Returns: how many."""
+    """Wake bodies that sleep or skip the step and whose box is near another box. Returns: their number."""
     woken = 0
     for body in range(body_count):
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
@@ -32,7 +32,7 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
 
 @ti.func
 def wake_by_colliders(state: ti.template(), body_count):
-    """Wake sleeping bodies that a moving collider comes near in this step."""
+    """Wake sleeping bodies that a moving collider approaches in this step."""
     for c in range(state.colliders.count[None]):
         if state.colliders.kind[c] != NO_COLLIDER and state.colliders.speed[c] > 0.0:
             _wake_in_box(state, body_count, state.colliders.lower[c], state.colliders.upper[c])
@@ -40,7 +40,7 @@ def wake_by_colliders(state: ti.template(), body_count):
 
 @ti.real_func
 def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
-    """Wake all bodies of an island if one of them is awake. Returns: 1 if so."""
+    """Wake all bodies of an island if one of them is awake. Returns: 1 if that is so."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     is_awake = 0
     i = first
@@ -58,17 +58,17 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 
 @ti.func
 def reset_rest_timer(state: ti.template(), body, speed):
-    """Reset the rest timer of a body if it is fast."""
+    """Restart the rest timer of a body if `speed` is too high for sleep."""
     if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
         state.body_calm_time[body] = 0.0
 
 
 @ti.func
 def reset_rest_timer_of_hull(state: ti.template(), body, dt):
-    """Reset the rest timer of a body with a hull if its displacement in a step of `dt` [s] is large.
+    """Restart the rest timer of a body with a hull if it has moved too far in a step of `dt` [s].
 
-    Velocities do not count: carriers of points in contact oscillate from substep to substep without moving
-    away.
+    Velocities are ignored, because carriers of points in contact oscillate from substep to substep without
+    moving away.
     """
     if has_hull(state, body):
         displacement = ti.cast(0.0, ti.f32)
@@ -79,7 +79,7 @@ def reset_rest_timer_of_hull(state: ti.template(), body, dt):
 
 @ti.func
 def store_box(state: ti.template(), body):
-    """Store the box around a body that does not move, including its hull."""
+    """Store the box around a body that does not move, and around its hull."""
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
     upper = lower
@@ -98,7 +98,7 @@ def store_box(state: ti.template(), body):
 
 @ti.real_func
 def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
-    """Store the boxes around bodies that skip the coming step. They may have moved since `skip_bodies`."""
+    """Store the boxes around bodies that skip the next step. They may have moved since `skip_bodies`."""
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
             store_box(state, body)
@@ -106,7 +106,7 @@ def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
 
 @ti.func
 def _put_to_sleep(state: ti.template(), body):
-    """Stop a body where it is, and reset its rest timer."""
+    """Stop a body and reset its rest timer."""
     particles = state.body_particles[body]
     p = particles[0]
     while p < particles[1]:
@@ -122,10 +122,10 @@ def _put_to_sleep(state: ti.template(), body):
 
 @ti.real_func
 def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
-    """Add a step of `dt` [s] to the rest timers of an island, and put it to sleep when all have run long
-    enough.
+    """Add a step of `dt` [s] to the rest timers of an island. If all have run long enough, put the island to
+    sleep.
 
-    Returns: 1 if it is still awake.
+    Returns: 1 if the island is still awake.
     """
     first, last = state.islands.first[island], state.islands.first[island + 1]
     calm = ti.cast(1e30, ti.f32)
@@ -147,7 +147,7 @@ def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
 
 @ti.kernel
 def wake_body(state: ti.template(), body: ti.i32):
-    """Wake one body, or all if `body` is -1. Waking a body restarts its rest timer."""
+    """Wake one body, or all if `body` is -1, and restart the rest timers."""
     ti.loop_config(serialize=True)
     for b in range(state.capacity.bodies):
         if body == b or body == -1:
@@ -160,7 +160,7 @@ def wake_body(state: ti.template(), body: ti.i32):
 def wake_near(
     state: ti.template(), body_count: ti.i32, box: ti.types.ndarray(dtype=ti.f32, ndim=1)
 ) -> ti.i32:
-    """Wake bodies that sleep near a box, lower and upper corner [m], (6,). Returns: how many."""
+    """Wake bodies that sleep near a box, given by lower and upper corner [m], (6,). Returns: their number."""
     woken = 0
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -1,4 +1,4 @@
-"""Spawn and despawn bodies: one slot is written, and the rest of the world does not change.
+"""Spawn and despawn bodies. Only one slot is written; the rest of the world does not change.
 
 Groups of fields: reads hull; writes soft.
 """
@@ -13,11 +13,11 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Place a body in its slot as if the world began with it.
+    """Place a body in its slot, with the same state as if the world began with it.
 
     Args:
-        rows: (n, 8): position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the
-            caller's order.
+        rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's
+            order, (n, 8).
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -60,7 +60,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
 
 @ti.kernel
 def despawn_body(state: ti.template(), body: ti.i32):
-    """Empty a slot. Its particles keep finite positions, which no code moves or reads."""
+    """Empty a slot. The positions of its particles stay finite, but no code moves or reads them."""
     if ti.static(state.capacity.contact.colliders > 0):
         clear_contacts(state, body)  # otherwise colliders would receive its last impulse in every step
     state.body_status[body] = ABSENT

@@ -1,11 +1,12 @@
 """One fixed step of the schedule `per_body`: one or more attempts, each of many substeps.
 
-One thread runs all substeps of an island, and islands run in parallel. Nothing waits between substeps, and a
-body stays in one core's cache. An island is all bodies that can touch in the step or are joined. Idle threads
-help with islands of several bodies (`jobs.py`). The result does not depend on the number of threads.
+One thread runs all substeps of an island, and islands run in parallel. Threads do not wait between substeps,
+and the data of a body stay in one core's cache. An island is a group of bodies that can touch in the step or
+are joined. Idle threads help with islands of several bodies (`jobs.py`). The result does not depend on the
+number of threads.
 
-Long steps are split over several kernel calls, so that Ctrl-C works in between: each island continues where
-it stopped.
+Long steps are split over several kernel calls, so that Ctrl-C works between them. In each call, islands
+continue where they stopped.
 
 Groups of fields: reads islands.
 """
@@ -38,20 +39,20 @@ from taichi_soft.solver.kernels.substep import (
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
-"""Returned in place of a number of bodies if no body is awake, so that another step would change nothing."""
+"""Returned instead of a number of bodies if no body is awake, so that another step would change nothing."""
 
 UNFINISHED = -2
-"""Returned in place of a number of bodies if the step needs more calls."""
+"""Returned instead of a number of bodies if the step needs more calls."""
 
 DONE = -1
-"""Used in place of the number of an attempt when the step is complete."""
+"""Used instead of the number of an attempt after the step is complete."""
 
 
 @ti.func
 def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h, most, goes_on):
     """Run one fixed step of an island, or its next `most` substeps.
 
-    Returns: how many of its bodies failed, or UNFINISHED; and 1 if it is awake.
+    Returns: number of failed bodies, or UNFINISHED; and 1 if the island is awake.
     """
     if goes_on == 0:
         _begin(state, program, island)
@@ -85,7 +86,7 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
 
 @ti.func
 def _begin(state: ti.template(), program: ti.template(), island):
-    """Wake the bodies that an awake one can touch, and save the state of all."""
+    """Wake the bodies that an awake body can touch, and save the state of all bodies."""
     is_awake = wake_island(state, island)
     if is_awake == 1:
         each_body(state, program, island, Job(phase=BEGIN))
@@ -99,7 +100,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
         body = state.islands.body[state.islands.first[island]]
-        # Includes the speed gained by gravity, so that near colliders are listed once per step.
+        # Includes the speed gained by gravity, so that near colliders are listed only once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
@@ -109,7 +110,7 @@ def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run
 def _make_substeps(
     state: ti.template(), program: ti.template(), island, end, count, h, is_last, run: ti.template()
 ):
-    """Run substeps before `end`, of `count` in an attempt, until one is found to be too coarse."""
+    """Run substeps up to `end`, of `count` in an attempt, until one of them turns out to be too long."""
     while run.s < end and (run.is_stable | is_last) == 1:
         s = run.s
         now = Moment(s=s, substeps=count, is_last=is_last, h=h, since=s * h, left=h * (count - s))
@@ -119,9 +120,10 @@ def _make_substeps(
 
 @ti.func
 def _mean_velocity(state: ti.template(), island):
-    """Mean velocity of the particles of an island [m/s]; motion shared by all brings no two closer.
+    """Return the mean velocity of the particles of an island [m/s]. Motion that all bodies share brings no
+    two closer.
 
-    It is zero if a body of the island does not move.
+    The velocity is zero if a body of the island does not move.
     """
     total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
     for i in range(state.islands.first[island], state.islands.first[island + 1]):
@@ -140,7 +142,7 @@ def _mean_velocity(state: ti.template(), island):
 
 @ti.func
 def _restore(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
-    """Restore an island for the next attempt."""
+    """Restore an island, and prepare its next attempt."""
     restore_island(state, program, island)
     run.attempt += 1
     run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
@@ -178,9 +180,10 @@ def step_islands(
     """Run one fixed step of every active body, or its next `most` substeps.
 
     Args:
-        helpers: number of threads that can help with islands of others when they own none.
+        helpers: number of threads that can help other threads with their islands.
         goes_on: 1 to continue an unfinished step.
-    Returns: how many bodies failed, or `ALL_SLEEP`; or UNFINISHED: then call it again with `goes_on` = 1.
+    Returns: number of failed bodies, `ALL_SLEEP`, or `UNFINISHED`. After `UNFINISHED`, call this again with
+        `goes_on` = 1.
     """
     failed, awake, unfinished = 0, 0, 0
     ti.loop_config(serialize=True)

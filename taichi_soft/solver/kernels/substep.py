@@ -8,8 +8,8 @@
                            contact: broad phase, narrow phase, solver
     each body              drift: new positions
 
-Contact changes velocities before they move anything. Joints correct its effect on them in the next substep. A
-single body drifts in the same pass as its kick, and collides afterwards.
+Contact changes velocities before particles move. Joints correct the effect of contact on them in the next
+substep. A single body drifts in the same pass as its kick, and collides afterwards.
 
 Groups of fields: reads colliders, soft; writes islands.
 """
@@ -40,16 +40,17 @@ from taichi_soft.solver.kernels.vibration import damp_body, time_to_positions
 from taichi_soft.solver.step_fields import Job
 
 BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
-"""Phases that each body runs separately. The first and the last belong to the whole step."""
+"""Phases that run separately for each body. BEGIN and END belong to the whole step, the others to a
+substep."""
 
 NONE, OUTDATED, VALID = range(3)
-"""Candidates of an island: none, because the last step cleared them; outdated, from a failed attempt;
-usable."""
+"""State of the candidates of an island: NONE, because the last step cleared them; OUTDATED, from a failed
+attempt; VALID."""
 
 MAX_IMPULSE_STEP = 0.1
-"""Distance per substep, in mean edges, above which impacts are passed on within the substep: a struck body
-can strike the next one. Below it, a body can enter the next one by that distance, and contact moves it out
-again."""
+"""Distance per substep, in mean edges, above which impacts are passed on within the substep, so that a struck
+body can strike the next one. Below it, a body can enter the next one by that distance, and contact moves it
+out again."""
 
 
 @ti.func
@@ -71,7 +72,9 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
 
 @ti.func
 def _advance_body(state: ti.template(), program: ti.template(), body, job):
-    """Run the phases of one body up to the kick: wind, external forces, internal forces, damping, kick."""
+    """Run the phases of one body up to the kick: wind, external forces, internal forces, motors, damping,
+    kick.
+    """
     felt = program.integrator.felt_time(state.body_velocity_lag[body], job.h, job.s)
     apply_wind(state, body, job.h)
     apply_external_forces(state, body, program.integrator.drive_time(job.h, job.s, job.substeps))
@@ -95,7 +98,7 @@ def substep_alone(state: ti.template(), program: ti.template(), body, now):
 
 @ti.func
 def do_phase(state: ti.template(), program: ti.template(), island, body, job):
-    """Run one phase of one body, in any thread."""
+    """Run one phase of one body. Any thread can call this."""
     if job.phase != KICK:
         _do_other_phase(state, program, island, body, job)
     elif state.body_status[body] == ACTIVE:
@@ -104,7 +107,7 @@ def do_phase(state: ti.template(), program: ti.template(), island, body, job):
 
 @ti.real_func
 def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """Run a phase of contact. A separate function, because LLVM vectorises the gaps only there."""
+    """Run a phase of contact. This is a separate function, because LLVM vectorises the gaps only there."""
     if job.phase == BOXES:
         begin_search(state, body, job.impact_speed, job.h, job.left, job.forgets)
     if job.phase == BROAD_PHASE:
@@ -115,7 +118,7 @@ def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: J
 
 @ti.real_func
 def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """Run any phase but the kick. Contact is a separate function, because Taichi's compile time grows faster
+    """Run any phase except the kick. This is a separate function, because Taichi's compile time grows faster
     than the length of a function.
     """
     if job.phase == BEGIN:
@@ -133,15 +136,13 @@ def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32
 
 @ti.func
 def each_body(state: ti.template(), program: ti.template(), island, job):
-    """Run a phase of every body of an island, and wait for all."""
+    """Run a phase for every body of an island, and wait until all are finished."""
     run_job(state, program, do_phase, island, OWNER, job)
 
 
 @ti.func
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Kick the bodies of an island. Returns: the time for which they have drifted with their new velocities
-    [s].
-    """
+    """Kick the bodies of an island. Returns: the time for which they have already drifted [s]."""
     body = state.islands.body[state.islands.first[island]]
     is_free = is_alone(state, program, island)
     if is_free == 1:
@@ -172,7 +173,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
-    """1 if an island is one body that only colliders can touch, and its kick can move it."""
+    """1 if an island is one body that can touch only colliders, and whose kick can move it."""
     body = state.islands.body[state.islands.first[island]]
     bodies = state.islands.first[island + 1] - state.islands.first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
@@ -187,7 +188,8 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
     """Combine the results of the bodies' kicks: speeds, and stability of the attempt.
 
     Returns: the highest speed [m/s], and the speed that a body can gain from an impact, relative to the
-    island. Exploding bodies do not count in the second: they would cause new searches again and again.
+    island. Exploding bodies do not count in the second speed, because they would cause new searches in every
+    substep.
     """
     highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     least_edge = ti.cast(NO_CONTACT, ti.f32)
@@ -205,7 +207,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """1 if the bodies of an island are at their new positions: a single body that its kick has moved."""
+    """1 if the bodies of an island are at their new positions, because the kick has moved a single body."""
     has_moved = 0
     body = state.islands.body[state.islands.first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
@@ -217,7 +219,9 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
 def _solve_contact(
     state: ti.template(), program: ti.template(), island, now, run: ti.template(), impact_speed
 ):
-    """Contact between the bodies of an island: update outdated candidates, find contacts, apply impulses."""
+    """Solve contact between the bodies of an island: update outdated candidates, find contacts, apply
+    impulses.
+    """
     if ti.static(program.has_soft_contact):
         if has_contact_pairs(state, island) == 1:
             if run.candidates != VALID or is_outdated(state, island, impact_speed, now.h) == 1:

@@ -1,12 +1,13 @@
-"""Write the numbers that are common to all bodies of a world to their fields."""
+"""Write the numbers that apply to all bodies of a world to their fields."""
 
 from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
 def write_surroundings(state: ti.template(), numbers: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """Write all of them with one kernel: Taichi would compile one kernel per number written from Python.
+    """Write gravity, floor, and settings of retries and implicit Euler with one kernel.
 
+    Taichi would compile one kernel per number that Python writes.
     Args:
         numbers: gravity [m/s^2]; height [m], restitution and friction of the floor; tolerance and largest
             number of iterations of implicit Euler; number of retries, (9,).

@@ -1,13 +1,13 @@
 """Restore bodies with inverted tetrahedra.
 
-Forces alone turn nearly all inverted tetrahedra back. Every `PATIENCE` steps a body is checked for flat or
+Forces alone restore nearly all inverted tetrahedra. Every `PATIENCE` steps a body is checked for flat or
 inverted tetrahedra. If there are any, its vibrations are damped until a check finds none. A body that is
-folded by its own weight can keep a few for ever, because their forces balance. It is reported after
-`REPORTED_AFTER` steps and left as it is. A body with too many of them has lost its shape: within a third of a
-second, its particles move to the best fit of the rest shape.
+folded by its own weight can have a few inverted tetrahedra for ever, because their forces balance. Such a
+body is reported after `REPORTED_AFTER` steps and left as it is. A body with too many inverted tetrahedra has
+lost its shape. Within a third of a second, its particles are moved to the best fit of the rest shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-can be too long for these: parts of them would vibrate for ever. They get more substeps.
+can be too long for these bodies, so that parts of them would vibrate for ever. They get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -22,33 +22,35 @@ from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 PATIENCE = 15
-"""Fixed steps between two checks: a quarter of a second."""
+"""Number of fixed steps between two checks: a quarter of a second."""
 
 REPORTED_AFTER = 8 * PATIENCE
-"""Fixed steps after which a body with inverted tetrahedra is reported: two seconds."""
+"""Number of fixed steps after which a body with inverted tetrahedra is reported: two seconds."""
 
 FAILED_FRACTION = 0.1
-"""Fraction of inverted tetrahedra above which a body counts as failed, if the step was retried."""
+"""Fraction of inverted tetrahedra above which a body counts as failed if the step was retried."""
 
 RESTORING_STEPS, CALMING = 20, 0.8
-"""Steps in which a failed body moves to its rest shape, and fraction of its vibration kept in each. It also
-restores bodies that are twisted by two turns without an inverted tetrahedron."""
+"""Number of steps in which a failed body moves to its rest shape, and fraction of its vibration that remains
+after each of them. This also restores bodies that are twisted by two turns without an inverted tetrahedron.
+"""
 
 FADING = 20.0
-"""Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Inverted slivers would
-otherwise make each other vibrate, light ones for seconds."""
+"""Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Without damping, inverted
+slivers would excite each other, light ones for seconds."""
 
 STEP_MARGIN = 0.9
-"""Square of the substep chosen for a deformed body over its estimated stability limit."""
+"""Square of the substep for a deformed body, over its estimated stability limit."""
 
 MAX_REFINEMENT = 4.0
-"""Number of substeps over that at rest, at most. Shorter substeps are left to retries."""
+"""Largest number of substeps over the number at rest. If even shorter substeps are needed, the step is
+retried."""
 
 RELAXING = 0.8
-"""Fraction of the additional substeps that remains at each check after the shape no longer needs them."""
+"""Fraction of the additional substeps that remains after each check, once the shape no longer needs them."""
 
 FLAT = 1e-5
-"""Volume over that at rest, below which a tetrahedron counts as inverted."""
+"""Volume over the volume at rest, below which a tetrahedron counts as inverted."""
 
 
 @ti.func
@@ -72,11 +74,12 @@ def _count_inverted(state: ti.template(), positions: ti.template(), body):
 
 @ti.func
 def _stiffness_of(state: ti.template(), block, lane):
-    """Square of a tetrahedron's highest frequency due to its resistance to a change of volume [1/s^2].
+    """Return the square of a tetrahedron's highest frequency due to its resistance to a change of volume
+    [1/s^2].
 
     In stable neo-Hookean material that force is (lambda + 5/6 mu) (J - a) dV/dx, so its stiffness grows with
     the square of dV/dx, a third of an area vector. A stretched face therefore makes it stiffer at any volume.
-    Returns: the present value, and that at rest.
+    Returns: the current value, and the value at rest.
     """
     ps = particles_of(state, block, lane)
     inverse = rest_inverse_of(state, block, lane)
@@ -91,7 +94,7 @@ def _stiffness_of(state: ti.template(), block, lane):
     a, b, c = inverse
     r1, r2, r3 = ti.Vector([a.x, b.x, c.x]), ti.Vector([a.y, b.y, c.y]), ti.Vector([a.z, b.z, c.z])
     r = (-(r1 + r2 + r3), r1, r2, r3)
-    determinant6 = ti.abs(determinant(inverse))  # over 1 / (6 V0)
+    determinant6 = ti.abs(determinant(inverse))  # relative to 1 / (6 V0)
     row = block * 2 * LANES + lane
     modulus = state.tet_lame[row] + state.tet_lame[row + LANES] * 5.0 / 6.0
     now, rest = a.x * 0.0, a.x * 0.0
@@ -104,7 +107,9 @@ def _stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def _refinement_of(state: ti.template(), body):
-    """Number of substeps that the present shape of a body requires, over that at rest: 1 or more."""
+    """Return the number of substeps that the current shape of a body requires, over the number at rest; at
+    least 1.
+    """
     now, rest = ti.cast(0.0, state.real), ti.cast(1e-30, state.real)
     row, blocks = state.body_blocks[body][0] * LANES, state.body_blocks[body]
     while row < blocks[1] * LANES:
@@ -116,7 +121,7 @@ def _refinement_of(state: ti.template(), body):
 
 @ti.func
 def _needs_rest_shape(state: ti.template(), body):
-    """True if many tetrahedra were inverted before a step that was retried, or where the caller placed the
+    """True if many tetrahedra were inverted before a step that was retried, or when the caller placed the
     body.
     """
     is_wrecked = False
@@ -129,9 +134,9 @@ def _needs_rest_shape(state: ti.template(), body):
 
 @ti.func
 def _best_fit(state: ti.template(), body):
-    """Find the best fit of the rest shape to the present positions of a body.
+    """Fit the rest shape to the current positions of a body.
 
-    Returns: its centre at rest and now [m], and the rotation, as rows.
+    Returns: centre at rest, current centre [m], and rotation as rows.
     """
     particles = state.body_particles[body]
     x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
@@ -157,11 +162,12 @@ def _best_fit(state: ti.template(), body):
 
 @ti.func
 def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all particles of a failed body part of the way to the best fit, and all of it in the last step.
+    """Move all particles of a failed body a part of the path to the best fit; in the last step, the whole
+    path.
 
-    Pinned particles stay, and the floor stops the others. Among colliders, which can be in the way, particles
-    get a velocity with which they arrive in the coming step of `seconds`. It allows for the damping at the
-    beginning of that step.
+    Pinned particles do not move, and the floor stops the others. If there are colliders, which can block the
+    path, particles instead get the velocity with which they arrive in the next step of `seconds`. It accounts
+    for the damping at the beginning of that step.
     """
     rest, now, rows = _best_fit(state, body)
     particles = state.body_particles[body]
@@ -193,7 +199,7 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _stiffens(state: ti.template(), program: ti.template(), body):
-    """1 if `_refinement_of` applies to the law of a body."""
+    """1 if a body with this law can need more substeps, see `_refinement_of`."""
     stiffens = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.has_energy and model.flips == Flips.RECOVER):
@@ -203,10 +209,12 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def kept_while_inverted(state: ti.template(), body, h, is_first):
-    """Fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h` [s].
+    """Return the fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h`
+    [s].
 
-    It is damped in every substep: at the beginning of steps only, vibrations of twice the step's period would
-    always be damped at their turning points. A failed body is damped in the first substep of each step.
+    The body is damped in every substep. If it were damped only at the beginning of steps, vibrations with
+    twice the step's period would always be damped at their turning points. A failed body is damped only in
+    the first substep of each step.
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
@@ -218,15 +226,16 @@ def kept_while_inverted(state: ti.template(), body, h, is_first):
 
 @ti.real_func
 def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32) -> ti.i32:
-    """At the end of a step of `seconds`, check and restore a body, if its law restores inverted tetrahedra.
+    """Check a body at the end of a step of `seconds`, and restore it, if its law restores inverted
+    tetrahedra.
 
-    Returns: 1 if it has had inverted tetrahedra for so long that it must be reported.
+    Returns: 1 if the body must be reported, because it has had inverted tetrahedra for too long.
     """
     is_reported = 0
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
         age = ti.max(before, -RESTORING_STEPS - 1) + 1
-        if before >= 0 or before == PLACED:  # a restoration that has begun is completed
+        if before >= 0 or before == PLACED:  # complete a restoration that has begun
             if _needs_rest_shape(state, body):
                 age = -RESTORING_STEPS
             elif before == PLACED:

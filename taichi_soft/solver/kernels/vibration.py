@@ -1,4 +1,4 @@
-"""Damping of vibrations: of all motion of a body relative to its rigid motion.
+"""Damp vibrations, that is, all motion of a body relative to its rigid motion.
 
 Velocities v become P v + k (v - P v). P v is the rigid motion with the momentum and angular momentum of v,
 and k = exp(-2 zeta w seconds), with the angular frequency w of the body's first mode and its damping ratio
@@ -7,9 +7,9 @@ conserves, for each mode of frequency w,
 
     v^2 + w^2 (1 - h^2 w^2 / 4) x^2.
 
-A smaller v reduces this, for every stable step and any interval of damping. For velocities half a step later,
-the conserved quantity also contains h w^2 x v: damping these every third substep, for example, would excite
-modes with a period of three substeps.
+A smaller v reduces this quantity, for every stable step and any interval of damping. For velocities half a
+step later, the conserved quantity also contains h w^2 x v: damping these every third substep, for example,
+would excite modes with a period of three substeps.
 
 Groups of fields: reads islands.
 """
@@ -24,32 +24,32 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
 MAX_FADING = 0.43
-"""Largest exponent of damping in one substep: exp(-0.43) = 0.65 is kept, d below. The kick of particles in
-contact is not part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a. That is
-stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A failed body is damped more,
-once per step."""
+"""Largest exponent of damping in one substep: the fraction d = exp(-0.43) = 0.65 remains. For particles in
+contact, the kick is not part of the damped vibration, so a mode of stiffness k and mass 1 becomes d v + h a.
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A failed body is damped
+more strongly, once per step."""
 
 MOVING, SLOW, RESTING = range(3)
-"""Rest states of a body by its overall speed: see `calming`."""
+"""Rest states of a body, by its overall speed: see `calming`."""
 
 RESTING_RATE = 2.0
 """Smallest rate at which the vibrations of a resting body are damped [1/s]."""
 
 STRONG_DAMPING = 0.5
-"""Fraction of the vibration kept in each substep of the last attempt at a step."""
+"""Fraction of the vibration that remains after each substep of the last attempt at a step."""
 
 FARTHEST = 0.1
-"""Path of a particle relative to the rigid motion in a substep of the last attempt, at most, over the
-surface's mean edge."""
+"""Largest path of a particle relative to the rigid motion in a substep of the last attempt, over the mean
+edge of the surface."""
 
 THIN_BODY = 1e-6
-"""Product of the principal moments over the cube of their sum, below which a body counts as a straight line,
-which has no inertia about itself."""
+"""Product of the principal moments over the cube of their sum, below which a body counts as a straight line.
+A line has no inertia about itself."""
 
 
 @ti.func
 def _solve_symmetric(rows: ti.template(), b):
-    """Solve rows x = b for a symmetric matrix given by its rows, scaled to a trace of 1."""
+    """Solve rows x = b for x. The matrix must be symmetric, and scaled to a trace of 1."""
     a0, a1, a2 = rows
     c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
     det = a0.dot(c0)
@@ -63,7 +63,9 @@ def _solve_symmetric(rows: ti.template(), b):
 
 @ti.func
 def _kicked_velocity(state: ti.template(), p, gravity, kick):
-    """Velocity [m/s] of a particle after its forces have acted for `kick` [s]; a pinned one keeps its own."""
+    """Return the velocity of a particle after its forces have acted for `kick` [s], in m/s. A pinned particle
+    keeps its own velocity.
+    """
     inv_mass = state.particle_inv_mass[p]
     change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
     return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
@@ -71,12 +73,12 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 @ti.func
 def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
-    """Velocity of a particle after its forces have acted for `kick` [s], in m/s, and after contact if
-    `is_held` is 1.
+    """Return the velocity of a particle after its forces have acted for `kick` [s], in m/s; if `is_held` is
+    1, also after contact.
 
-    A particle pressed against something loses the speed that it gains in the kick again. If that counted as
-    vibration, damping would push bodies at rest. The effect of the floor in a substep of `h` [s] is known
-    beforehand; of other contacts, that of the last substep is assumed.
+    Contact removes the speed that a pressed particle gains in the kick. If that speed counted as vibration,
+    damping would push bodies at rest. The effect of the floor in a substep of `h` [s] is known in advance.
+    For other contacts, the effect of the last substep is used.
     """
     velocity = _kicked_velocity(state, p, gravity, kick)
     if is_held == 1:
@@ -101,10 +103,10 @@ def _column_sums(rows: ti.template()):
 
 @ti.func
 def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
-    """Rigid motion of a body after its forces have acted for `kick` [s]; `h` and `is_held` as in
+    """Return the rigid motion of a body after its forces have acted for `kick` [s]. `h` and `is_held`: see
     `felt_velocity`.
 
-    Returns: its centre relative to x0 [m], velocity relative to v0 [m/s] and angular velocity [rad/s].
+    Returns: centre relative to x0 [m], velocity relative to v0 [m/s], and angular velocity [rad/s].
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     masses = ti.Vector.zero(state.real, LANES)
@@ -116,7 +118,8 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
             p = first + lane
-            # Rows beyond the last belong to another body, which can be non-finite: times 0 that is NaN.
+            # Rows beyond the last particle belong to another body. If that is non-finite, multiplying by 0
+            # gives NaN.
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
@@ -150,7 +153,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
 
 @ti.func
 def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
-    """Scale the vibration of a body after its forces have acted for `kick` [s] by `keep`.
+    """Scale the vibration that a body has after its forces have acted for `kick` [s] by `keep`.
 
     `h` is the length of the substep [s].
     """
@@ -174,7 +177,7 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
             if state.particle_inv_mass[p] > 0.0:
                 state.particle_velocity[p] = state.particle_velocity[p] + change
             elif state.body_drives[body] & FEELS_REACTION != 0:
-                impulse = state.particle_mass[p] * change  # on the pin
+                impulse = state.particle_mass[p] * change  # impulse on the pin
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
@@ -188,7 +191,7 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, spin = x0 * 0.0, v0 * 0.0, v0 * 0.0
-    for turn in range(2):  # first limit all speeds, then restore the rigid motion
+    for turn in range(2):  # first limit the speeds, then restore the rigid motion
         center_now, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
         if turn == 0:
             center, velocity, spin = center_now, velocity_now, spin_now
@@ -207,20 +210,20 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
 
 @ti.func
 def _limited(beside, most):
-    """Limit a velocity relative to the rigid motion to `most` [m/s]."""
+    """Return a velocity relative to the rigid motion, limited to `most` [m/s]."""
     speed = beside.norm()
     slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
-    if not speed < 1e18:  # its square overflows, so its direction is unknown
+    if not speed < 1e18:  # the square of the speed overflows, so its direction is unknown
         slower = beside * 0.0
     return slower
 
 
 @ti.func
 def kept_vibration(state: ti.template(), body, h, s, substeps):
-    """Fraction of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
+    """Return the fraction of its vibration that a body keeps in substep `s` of `substeps`, of `h` [s] each.
 
-    It is below 1 every few substeps only, but many times in a period of the first mode. The intervals vary:
-    otherwise a mode that is always damped at its turning points would last for ever.
+    The fraction is below 1 only every few substeps, but many times in a period of the first mode. The
+    intervals vary, because a mode that is always damped at its turning points would last for ever.
     """
     keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
     if state.body_is_braked[body] == 1:
@@ -241,7 +244,9 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def time_to_positions(program: ti.template(), kick, h):
-    """Part of a kick [s] that advances velocities to the time of the positions, in a substep of `h` [s]."""
+    """Return the part of a kick [s] after which velocities are at the time of the positions, in a substep of
+    `h` [s].
+    """
     return kick - program.integrator.lag * h
 
 
@@ -249,8 +254,7 @@ def time_to_positions(program: ti.template(), kick, h):
 def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
     """Damp the vibration of a body in substep `s` of `substeps` of `h` [s] each.
 
-    It runs before the kick of `kick` [s] by the body's forces, and damps the velocities in the middle of that
-    kick.
+    Call this before the body's forces act for `kick` [s]. It damps the velocities in the middle of that kick.
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
@@ -273,9 +277,9 @@ def _limit_body(state: ti.template(), program: ti.template(), body: ti.i32, kick
 
 @ti.func
 def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """Damp a body on CPUs: as `damp_vibration`, and more if it has inverted tetrahedra.
+    """Damp a body on CPUs: as `damp_vibration`, and more strongly if the body has inverted tetrahedra.
 
-    Each part is called once only: LLVM inlines it, and its rounding does not depend on the rest of the
+    Each part is called only once. So LLVM inlines it, and its rounding does not depend on the rest of the
     program.
     """
     keep = kept_vibration(state, body, h, s, substeps)
