@@ -37,7 +37,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the strain from the forces on a tetrahedron, linearised and exact, and compute both exactly.
+    """Measure the linear and the exact strain from the forces on a tetrahedron; compute both in closed form.
 
     For nu = 0, the stress is E times the strain. The force on a vertex is the stress times a third of the
     area vector of the opposite face. The result is the strain along the stretch, or the off-diagonal entry of

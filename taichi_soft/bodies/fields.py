@@ -209,7 +209,7 @@ class BodyFields(FieldGroup):
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was too coarse
     # Number of substeps that the present shape needs, over the number at rest.
     body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
-    body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge of its surface
+    body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge length of the surface
     # Distance that sound travels in the longest stable substep at rest.
     body_stride = declare(BODY, REAL, unit="m", start=LOADED)
     body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, inherited=True, most=FINITE)

@@ -40,8 +40,8 @@ class Solid:
     fill: FloatArray  # (nx, ny, nz), 0 to 1
     center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the voxel's corner
     surface: FloatArray  # (nx, ny, nz, 3), mean of the crossings in a voxel [m], NaN without crossings
-    open_fraction: float  # fraction of the rays through the surface that do not return to 0
-    is_simple: bool  # True if all rays return to 0 and no parts overlap: the triangles give the volume
+    open_fraction: float  # fraction of the rays through the surface whose crossing count does not return to 0
+    is_simple: bool  # True if all counts return to 0 and no parts overlap: the triangles give the volume
 
     @property
     def volume(self) -> float:

@@ -64,8 +64,9 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        # Serial loops become one function, which compiles much longer for many fields than one function per
-        # field. For the few fields of a collider, starting threads takes longer than the loops.
+        # Taichi compiles serial loops into one function. With many fields, that takes much longer to compile
+        # than one function per field. With the few fields of a collider, starting threads would take longer
+        # than the loops.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

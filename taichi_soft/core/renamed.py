@@ -4,7 +4,7 @@ import warnings
 
 
 def warn_renamed(old: str, new: str) -> None:
-    """Warn the caller of the calling function that a public name has been renamed."""
+    """Warn that a public name has been renamed. The warning points to the code that used the old name."""
     warnings.warn(
         f"{old} is deprecated and will be removed in the next version: use {new}",
         DeprecationWarning,

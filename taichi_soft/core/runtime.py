@@ -137,7 +137,8 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
             f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
             "leave out one or the other"
         )
-    # Taichi starts at most one thread per core, and the flat schedule waits for all threads.
+    # Taichi starts at most one thread per core. With a larger count, the flat schedule would wait for threads
+    # that never start.
     count = len(bound) or min(threads or len(there), len(there))
     if _device is not None:
         if arch not in ("auto", _device.arch):

@@ -153,7 +153,7 @@ def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float6
 
 
 def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
-    """Check that there is at least one number, all integers from 0 to below `limit`. Raises: ValueError."""
+    """Check that `numbers` are one or more integers from 0 to `limit` - 1. Raises: ValueError if not."""
     found = np.array(numbers, dtype=np.int32)
     if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
         raise ValueError("it has invalid vertices")

@@ -135,7 +135,7 @@ async def _visitor(server: LiveServer) -> AsyncIterator[_Reader]:
 
 
 class _Reader:
-    """A visitor that receives packets like a page."""
+    """Simulated visitor. It receives the same packets as the web page."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket

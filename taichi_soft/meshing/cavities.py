@@ -242,8 +242,8 @@ def _ring_fills(x: FloatArray, mesh: ClosedMesh, edges: Ints, rows: Ints) -> Cav
 
 @cache
 def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
-    """Triples (t, 3) of a ring of n vertices, its triangulations as indices of triples (w, n - 2), and its
-    chords (c, 2).
+    """Return all vertex triples of a ring of n vertices, (t, 3); its triangulations, each as indices of n - 2
+    triples, (w, n - 2); and its chords, (c, 2).
     """
 
     def fill(i: int, j: int) -> list[list[tuple[int, int, int]]]:

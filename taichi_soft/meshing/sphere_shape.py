@@ -96,7 +96,12 @@ def _cut_tetrahedron(pieces: int) -> tuple[NDArray[np.int64], NDArray[np.int64],
 
 
 def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
-    """Positions of lattice points between the centre (column 3 of `lattice`) and a face (3, 3), (k, 3)."""
+    """Return the positions of lattice points between the centre and a face, (k, 3).
+
+    Args:
+        face: corners of the face, (3, 3).
+        lattice: weights of the three corners and of the centre, (k, 4).
+    """
     step = lattice[:, :3].sum(axis=1)
     angle = np.arccos(face[0] @ face[1])
     # Sines of fractions of the angle give even spacing along a great circle, the same from both sides.

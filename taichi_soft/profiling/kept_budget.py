@@ -52,7 +52,7 @@ class KeptBudget:
     settled: Spread  # time of the steps after the budget was met, or of all steps [ms]
     frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
-    late_settled: float  # fraction of longer steps after the budget was met, or of all steps
+    late_settled: float  # the same after the budget was met; of all steps if it was never met
     met_after: int | None  # steps until the budget was met; None if it was never met
     deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
     changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any

@@ -153,7 +153,7 @@ class Camera:
         return matrix
 
     def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
-        """Project points into an image. Returns: pixel right, pixel down and depth [m], (n, 3).
+        """Project points into an image. Returns: pixels from the left and the top, and depth [m], (n, 3).
 
         Args:
             points: (n, 3) [m].

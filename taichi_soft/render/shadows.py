@@ -33,7 +33,7 @@ Floats = NDArray[np.float32]
 class ShadowMaps:
     """Shadow maps of the sun and of contact with the floor, allocated once.
 
-    The sun's map holds back faces, so that a body never shadows its own lit side. Shadows on the floor are
+    The sun's map has only faces turned away from the sun, so that a body never shadows its own lit side. Shadows on the floor are
     blurred copies of this map.
 
     Attributes:

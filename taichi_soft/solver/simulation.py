@@ -111,8 +111,8 @@ class Simulation:
             begin_skips(self.state, len(self.pools.slots))
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
-        self.state.body_status.to_numpy()  # compiles what a failed body needs
-        self.state.body_patience.to_numpy()  # compiles what an inverted body needs
+        self.state.body_status.to_numpy()  # compiles the read after a body failed
+        self.state.body_patience.to_numpy()  # compiles the read of inverted bodies
 
     def _record_failures(self, substeps: int, h: float) -> list[str]:
         """Record the bodies that the last step froze. Returns: a line for each of them."""

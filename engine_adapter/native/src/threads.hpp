@@ -45,7 +45,7 @@ class Threads {
   std::condition_variable begins_, ends_;
   uint64_t round_ = 0;   // current or last round
   int32_t helpers_ = 0;  // number of workers in this round, the first ones
-  int32_t busy_ = 0;     // number of workers that have not finished it
+  int32_t busy_ = 0;     // number of workers that have not finished the round
   bool is_over_ = false;
   void* closure_ = nullptr;
   Task task_ = nullptr;

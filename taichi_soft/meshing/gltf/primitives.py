@@ -99,7 +99,7 @@ class Primitive:
         return positions, normals
 
     def triangles(self, count: int) -> NDArray[np.int64]:
-        """Vertex indices of its triangles, (m, 3).
+        """Return the vertex indices of the primitive's triangles, (m, 3).
 
         Args:
             count: number of vertices.
