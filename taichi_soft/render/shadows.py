@@ -33,8 +33,8 @@ Floats = NDArray[np.float32]
 class ShadowMaps:
     """Shadow maps of the sun and of contact with the floor, allocated once.
 
-    The sun's map has only faces turned away from the sun, so that a body never shadows its own lit side. Shadows on the floor are
-    blurred copies of this map.
+    The sun's map has only faces turned away from the sun, so that a body never shadows its own lit side.
+    Shadows on the floor are blurred copies of this map.
 
     Attributes:
         sun: unit vector to the sun.

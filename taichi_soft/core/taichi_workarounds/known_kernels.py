@@ -68,7 +68,7 @@ class KnownKernels:
             return set()
 
     def keep(self, names: dict[str, str]) -> None:
-        """Copy the code of kernels to the files of their short bodies. Call it after Taichi has written its files.
+        """Copy the code of kernels to the files of their short bodies. Taichi must have written its files.
 
         Args:
             names: names of the kernels that were created from their source, by digest.
