@@ -67,7 +67,7 @@ print(json.dumps([found, are_same, made.value]))
 WANTED = {
     "gravity": (ARGUMENT, "stay below"),
     "friction": (ARGUMENT, "give a number from 0"),
-    "friction of a collider": (ARGUMENT, "there is no collider 7"),
+    "friction of a collider": (ARGUMENT, "collider 7 does not exist"),
     "friction between": (STATE, "export it with soft_contact"),
     "itself": (ARGUMENT, "give another body"),
     "far": (ARGUMENT, "move the two together first"),
