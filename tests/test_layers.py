@@ -218,11 +218,11 @@ def test_the_workarounds_for_taichi_are_applied_before_anybody_uses_it():
         assert not uses or module == runtime or runtime in IMPORTS[module], module
 
 
-def test_each_workaround_for_taichi_names_what_makes_it_needless():
+def test_each_workaround_for_taichi_names_what_makes_it_unnecessary():
     """At the end of its docstring."""
     folder = "taichi_soft.core.taichi_workarounds."
     named = {
-        module: "eedless " in (ast.get_docstring(ast.parse(SOURCES[module])) or "").split("\n\n")[-1]
+        module: "unnecessary" in (ast.get_docstring(ast.parse(SOURCES[module])) or "").split("\n\n")[-1]
         for module in FILES
         if module.startswith(folder)
     }
