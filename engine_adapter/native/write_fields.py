@@ -40,6 +40,7 @@ SOURCES = Path(__file__).parent / "src"
 NOTICE = """\
 // {}. Written by engine_adapter/native/write_fields.py from the declarations
 // in Python: do not edit.
+// clang-format off
 #pragma once
 """
 

@@ -233,7 +233,7 @@ class BodyFields(FieldGroup):
         self.real = ti.f64 if capacity.double else ti.f32
         super().__init__(capacity, self.real)
         fields = [(each, field) for _, each, field in self.declared()]
-        # What `spawn_body` resets in a slot, and what a piece of a cut body gets from it.
+        # `spawn_body` resets the first ones in a slot. A piece of a cut body gets the others from the body.
         self.body_starts = [
             (field, each.start)
             for each, field in fields

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import taichi_soft
-from taichi_soft.core.field_table import LOADED, Declaration
 from taichi_soft.solver.state import State
 
 pytestmark = pytest.mark.numpy
@@ -122,11 +121,7 @@ def test_only_the_owner_of_a_group_of_fields_writes_it(name):
     assert {GROUPS[group].owner for group in written} <= {name.split("/")[0]}
 
 
-def test_each_group_has_an_owner_and_each_field_a_length_or_a_start():
-    declared = [each for kind in (State, *GROUPS.values()) for each in kind.declarations().values()]
-    assert len(declared) > 200
+def test_each_group_has_an_owner():
+    assert len(GROUPS) > 5
     for kind in GROUPS.values():
         assert (ROOT / kind.owner).is_dir()
-    for each in declared:
-        assert isinstance(each, Declaration)
-        assert each.start is None or each.start is LOADED or isinstance(each.start, (int, float))

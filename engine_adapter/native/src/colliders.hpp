@@ -5,12 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "constants.hpp"
 #include "archive.hpp"
+#include "constants.hpp"
 #include "rotations.hpp"
 
 namespace taichi_soft {
-
 
 struct Pose {
   Vector position;

@@ -1,5 +1,6 @@
 // Numbers that fields depend on. Written by engine_adapter/native/write_fields.py from the declarations
 // in Python: do not edit.
+// clang-format off
 #pragma once
 
 #include <cstddef>

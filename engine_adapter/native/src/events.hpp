@@ -7,8 +7,8 @@
 #include <map>
 #include <vector>
 
-#include "constants.hpp"
 #include "archive.hpp"
+#include "constants.hpp"
 #include "taichi_soft.h"
 
 namespace taichi_soft {

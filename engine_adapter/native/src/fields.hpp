@@ -1,5 +1,6 @@
 // Fields of a world, and the bounds of their numbers in snapshots. Written by engine_adapter/native/write_fields.py from the declarations
 // in Python: do not edit.
+// clang-format off
 #pragma once
 
 #include <limits>

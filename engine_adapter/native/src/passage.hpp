@@ -10,13 +10,7 @@ namespace taichi_soft {
 
 // Numbers of the rows of `read_motion` in taichi_soft/fracture/kernels/topology.py.
 struct Motion {
-  enum Column : size_t {
-    kPosition = 0,
-    kInvMass = 12,
-    kTarget = 17,
-    kReaction = 23,
-    kWidth = 26
-  };
+  enum Column : size_t { kPosition = 0, kInvMass = 12, kTarget = 17, kReaction = 23, kWidth = 26 };
 
   explicit Motion(size_t rows) : count(rows), numbers(kWidth * rows, 0.0) {}
   double& operator()(size_t row, size_t column) { return numbers[kWidth * row + column]; }

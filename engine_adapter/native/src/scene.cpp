@@ -85,8 +85,8 @@ bool is_skin_valid(const Mesh::Table& mesh, size_t k, size_t n) {
   return true;
 }
 
-const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh",
-                              "names/joint", "names/motor"};
+const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame",
+                              "names/mesh", "names/joint", "names/motor"};
 
 }  // namespace
 
@@ -174,7 +174,8 @@ void Scene::read_fields() {
   for (size_t i = 0; i + 7 <= rows_kept.count; i += 7) {
     const int64_t* row = rows_kept.data + i;
     KeptField each = {place_from(row, image), size_t(row[5]), int(row[6]), nullptr};
-    if (row[5] < 0 || each.whose < KeptField::kAlways || each.whose > KeptField::kOfMotors || each.count > each.place.count) {
+    if (row[5] < 0 || each.whose < KeptField::kAlways || each.whose > KeptField::kOfMotors ||
+        each.count > each.place.count) {
       invalid_file("the fields of snapshots");
     }
     const auto bound = bounds.find(each.place.offset);
@@ -212,9 +213,9 @@ Asset Scene::read_asset(const std::string& prefix) const {
   if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
       skin.count != 1 || friction.count != 1 || wave_speed.count != 1 || asset.tets.count % 4 != 0 ||
       !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
-      asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) ||
-      asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) ||
-      !are_below(asset.outer, n) || !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
+      asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
+      !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
+      !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
     invalid_file("an asset");
   }
   asset.element_width = asset.elements.sizes[1];

@@ -107,7 +107,7 @@ class Scene {
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;
   bool has_levels = false, has_hulls = false;  // true if any asset has levels of detail, or a hull
-  std::vector<std::string> constant_names;  // names of fields with constants of tetrahedra
+  std::vector<std::string> constant_names;     // names of fields with constants of tetrahedra
   std::vector<Mesh> meshes;
   std::vector<KeptField> kept;
   uint32_t code = 0;  // number that is equal for compatible snapshots

@@ -166,7 +166,8 @@ void World::launch_step(int32_t substeps, double h) {
   machine_->launch("step", {Machine::whole(bodies), Machine::whole(helpers), Machine::whole(substeps), Machine::real(h),
                             Machine::whole(kAll), Machine::whole(0)});
   int32_t busy = 0;
-  for (int32_t island = 0; island < fields_.islands.count(0); ++island) busy += fields_.progress.failed(island) + fields_.progress.is_awake(island);
+  for (int32_t island = 0; island < fields_.islands.count(0); ++island)
+    busy += fields_.progress.failed(island) + fields_.progress.is_awake(island);
   is_still_ = busy == 0;
 }
 
@@ -224,8 +225,7 @@ void World::wake_near(const Box& box) {
   if (!scene_->sleeps) return;
   float* numbers = machine_->numbers.room<float>(6);
   for (int k = 0; k < 3; ++k) numbers[k] = as_float(box.lower[k]), numbers[3 + k] = as_float(box.upper[k]);
-  machine_->launch("wake_near", {Machine::whole(scene_->slot_count),
-                                 Machine::array(machine_->numbers, 6)});
+  machine_->launch("wake_near", {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, 6)});
   is_still_ = false;
 }
 

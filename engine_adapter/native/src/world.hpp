@@ -73,7 +73,7 @@ class World {
   void set_job_system(ts_run_jobs function, void* user) { machine_->threads.use_host(function, user); }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
-  int32_t steps_due(double seconds);   // adds the time of a frame
+  int32_t steps_due(double seconds);  // adds the time of a frame
   void step_in_time();
   void end_frame();  // drops the time of steps that were due but not made
   ts_before_step before_step() const { return before_step_; }
@@ -285,21 +285,21 @@ class World {
   std::vector<ColliderMotion> motion_;
   Events events_;
   Surroundings surroundings_;
-  std::vector<double> friction_;  // of each body, against other bodies
+  std::vector<double> friction_;         // of each body, against other bodies
   std::vector<float> present_, coming_;  // poses of frames after the last and the next step: rotation by rows
                                          // and position, (f, 12)
   std::vector<unsigned char> frame_alive_;
   std::vector<int32_t> levels_;             // level of detail in each slot, even in empty ones
   std::vector<std::vector<int32_t>> held_;  // vertices of the finest level for pins at a coarser one
   std::vector<int32_t> attachments_;        // by particle: attachment that holds it, or 0
-  std::vector<unsigned char> feels_;  // by particle: 1 if its frame reports the load
+  std::vector<unsigned char> feels_;        // by particle: 1 if its frame reports the load
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
   int32_t steps_left_ = 0;  // steps that remain in the current frame
-  double picture_ = 1.0;  // interpolation factor from the previous step to the last one
+  double picture_ = 1.0;    // interpolation factor from the previous step to the last one
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;

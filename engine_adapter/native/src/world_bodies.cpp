@@ -97,7 +97,8 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
     fail(TS_ERROR_ARGUMENT, "asset %d does not exist (%zu in all, numbered from 0)", asset, scene_->assets.size());
   }
   int32_t slot = 0;
-  while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || fields_.body_status(slot) != kAbsent)) ++slot;
+  while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || fields_.body_status(slot) != kAbsent))
+    ++slot;
   if (slot == scene_->slot_count) {
     fail(TS_ERROR_STATE, "all %d bodies of asset %d are in use: reserve more before exporting, or despawn one",
          scene_->assets[asset].slot_count, asset);
@@ -146,8 +147,7 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
     const uint32_t count = uint32_t(scene_->particle_count);
     const float* all = machine_->positions.room<float>(3 * count);
     if (rows_at_ != alpha) {
-      machine_->launch("read_positions", {Machine::real(alpha),
-                                          Machine::array(machine_->positions, count, 3)});
+      machine_->launch("read_positions", {Machine::real(alpha), Machine::array(machine_->positions, count, 3)});
       rows_at_ = alpha;
     }
     std::copy(all + 3 * begin_of(slot), all + 3 * (begin_of(slot) + n), rows);
@@ -169,10 +169,9 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
   if (mesh.is_skin) {
     const uint32_t vertices = uint32_t(asset_of(slot).vertex_count());
     machine_->rows.room<float>(12 * vertices);
-    machine_->launch(kernel.c_str(),
-                     {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
-                      Machine::array(table.floats.data, uint32_t(table.floats.count)),
-                      Machine::array(machine_->rows, 12 * vertices), x_out, n_out});
+    machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_),
+                                      ints, Machine::array(table.floats.data, uint32_t(table.floats.count)),
+                                      Machine::array(machine_->rows, 12 * vertices), x_out, n_out});
   } else {
     machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});
   }
@@ -234,8 +233,7 @@ void World::set_velocity(int32_t slot, const Vector& linear, const Vector& spin)
   for (int k = 0; k < 3; ++k) motion[k] = as_float(linear[k]), motion[3 + k] = as_float(spin[k]);
   const float* fastest = machine_->found.room<float>(1);
   machine_->launch("write_rigid_velocity",
-                   {Machine::whole(slot), Machine::array(machine_->numbers, 6),
-                    Machine::array(machine_->found, 1)});
+                   {Machine::whole(slot), Machine::array(machine_->numbers, 6), Machine::array(machine_->found, 1)});
   if (!(*fastest < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "some vertices would reach %.4g m/s: stay below %g", double(*fastest),
          scene_->velocity_limit);
@@ -255,8 +253,7 @@ void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn,
   place[3] = lowest, place[4] = keeps_velocity ? 1.0 : 0.0;
   for (int i = 0; i < 9; ++i) matrix[i] = rows[i / 3][i % 3];
   machine_->launch("jump", {Machine::whole(slot), Machine::array(machine_->numbers, 5),
-                            Machine::array(machine_->rows, 3, 3),
-                            Machine::array(machine_->found, 3)});
+                            Machine::array(machine_->rows, 3, 3), Machine::array(machine_->found, 3)});
   if (!(found[2] < scene_->position_limit)) {
     fail(TS_ERROR_ARGUMENT, "center puts the body beyond %g m: move it closer to the origin", scene_->position_limit);
   }
@@ -279,8 +276,7 @@ void World::apply_impulse(int32_t slot, const Vector& impulse, Vertices which) {
   float* numbers = machine_->numbers.room<float>(3);
   for (int k = 0; k < 3; ++k) numbers[k] = as_float(change[k]);
   machine_->launch("add_velocity",
-                   {Machine::array(machine_->rows, uint32_t(vertices.size())),
-                    Machine::array(machine_->numbers, 3)});
+                   {Machine::array(machine_->rows, uint32_t(vertices.size())), Machine::array(machine_->numbers, 3)});
   mark_modified(slot);
 }
 
@@ -297,8 +293,7 @@ void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
     numbers[k] = as_float(acceleration);
   }
   give_rows(slot, vertices);
-  machine_->launch("add_push", {Machine::whole(slot),
-                                Machine::array(machine_->rows, uint32_t(vertices.size())),
+  machine_->launch("add_push", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(vertices.size())),
                                 Machine::array(machine_->numbers, 3)});
   mark_modified(slot);
 }
@@ -310,8 +305,7 @@ void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point,
   place[3] = as_float(radius);
   const double* found = machine_->found.room<double>(2);
   machine_->launch("add_impulse_near",
-                   {Machine::whole(slot), Machine::array(machine_->numbers, 7),
-                    Machine::array(machine_->found, 2)});
+                   {Machine::whole(slot), Machine::array(machine_->numbers, 7), Machine::array(machine_->found, 2)});
   if (!(found[1] < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: stay below %g", found[1],
          scene_->velocity_limit);
@@ -344,8 +338,7 @@ void World::pin(int32_t slot, Vertices which) {
   const std::vector<int32_t> vertices = checked(slot, which, false);
   require_unattached(slot, vertices);
   give_rows(slot, vertices);
-  machine_->launch("pin_particles",
-                   {Machine::array(machine_->rows, uint32_t(vertices.size()))});
+  machine_->launch("pin_particles", {Machine::array(machine_->rows, uint32_t(vertices.size()))});
   mark_modified(slot);
 }
 
@@ -362,8 +355,7 @@ void World::unpin(int32_t slot, Vertices which) {
     require_unattached(slot, vertices);
   }
   give_rows(slot, vertices);
-  machine_->launch("free_particles",
-                   {Machine::array(machine_->rows, uint32_t(vertices.size()))});
+  machine_->launch("free_particles", {Machine::array(machine_->rows, uint32_t(vertices.size()))});
   mark_modified(slot);
 }
 
@@ -388,8 +380,7 @@ void World::set_targets(int32_t slot, Vertices which, const float* targets) {
   const int32_t* loose = machine_->found.room<int32_t>(1);
   const uint32_t count = uint32_t(vertices.size());
   machine_->launch("write_targets", {Machine::array(machine_->rows, count),
-                                     Machine::array(machine_->vertices, count, 3),
-                                     Machine::array(machine_->found, 1)});
+                                     Machine::array(machine_->vertices, count, 3), Machine::array(machine_->found, 1)});
   if (*loose >= 0) fail(TS_ERROR_STATE, "vertex %d is not pinned: call ts_body_pin first", vertices[size_t(*loose)]);
   mark_modified(slot);
   has_work_ = true;
@@ -419,9 +410,8 @@ void World::radial_impulse(const Vector& center, double impulse, double radius) 
   for (int k = 0; k < 3; ++k) place[k] = as_float(center[k]);
   place[3] = as_float(radius), place[4] = as_float(impulse);
   const float* highest = machine_->found.room<float>(1);
-  machine_->launch("add_radial_impulse",
-                   {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, 5),
-                    Machine::array(machine_->found, 1)});
+  machine_->launch("add_radial_impulse", {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, 5),
+                                          Machine::array(machine_->found, 1)});
   if (!(*highest < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: stay below %g", double(*highest),
          scene_->velocity_limit);

@@ -83,8 +83,8 @@ void World::collider_impulse(int32_t number, Vector* impulse, Vector* moment) {
   collider(number);
   const uint32_t count = uint32_t(colliders_.rows.size());
   const float* rows = machine_->rows.room<float>(6 * count);
-  machine_->launch("sum_collider_impulses", {Machine::whole(scene_->slot_count),
-                                             Machine::array(machine_->rows, count, 6)});
+  machine_->launch("sum_collider_impulses",
+                   {Machine::whole(scene_->slot_count), Machine::array(machine_->rows, count, 6)});
   for (int k = 0; k < 3; ++k) (*impulse)[k] = rows[6 * number + k], (*moment)[k] = rows[6 * number + 3 + k];
 }
 

@@ -21,10 +21,8 @@ std::map<Pair, std::array<float, 3>> World::look() {
   const int32_t* who = machine_->rows.room<int32_t>(3 * rows);
   const float* impulses = machine_->found.room<float>(3 * rows);
   std::copy(events_.status.begin(), events_.status.end(), status);
-  machine_->launch("read_touches", {Machine::whole(scene_->slot_count),
-                                    Machine::array(machine_->numbers, numbers),
-                                    Machine::array(machine_->rows, rows, 3),
-                                    Machine::array(machine_->found, rows, 3)});
+  machine_->launch("read_touches", {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, numbers),
+                                    Machine::array(machine_->rows, rows, 3), Machine::array(machine_->found, rows, 3)});
   std::copy(status, status + numbers, events_.status.begin());
   std::map<Pair, std::array<float, 3>> touches;
   for (int32_t i = 0; i < status[numbers - 1]; ++i) {
@@ -38,7 +36,8 @@ void World::record_events(int32_t kinds) {
     fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_FROZE", kinds);
   }
   if (Events::looks_for(kinds)) look();
-  if (scene_->has_soft_contact) fields_.soft.records_touches(0) = (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED)) != 0 ? 1 : 0;
+  if (scene_->has_soft_contact)
+    fields_.soft.records_touches(0) = (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED)) != 0 ? 1 : 0;
   events_.record(kinds, present());
 }
 

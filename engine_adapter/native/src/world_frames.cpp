@@ -133,7 +133,8 @@ void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) co
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
     Vector part, arm;
-    for (int k = 0; k < 3; ++k) part[k] = fields_.particle_reaction(p, k), arm[k] = fields_.particle_position(p, k) - origin[k];
+    for (int k = 0; k < 3; ++k)
+      part[k] = fields_.particle_reaction(p, k), arm[k] = fields_.particle_position(p, k) - origin[k];
     for (int k = 0; k < 3; ++k) {
       const int i = (k + 1) % 3, j = (k + 2) % 3;
       impulse[k] += part[k];

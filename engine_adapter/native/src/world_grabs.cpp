@@ -36,7 +36,8 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   const Asset& asset = asset_of(slot);
   if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to grab", slot);
   if (triangle < 0 || size_t(triangle) >= asset.surface.count / 3) {
-    fail(TS_ERROR_ARGUMENT, "triangle %d does not exist (%zu in all, numbered from 0)", triangle, asset.surface.count / 3);
+    fail(TS_ERROR_ARGUMENT, "triangle %d does not exist (%zu in all, numbered from 0)", triangle,
+         asset.surface.count / 3);
   }
   double sum = 0.0, weights[3];
   for (int i = 0; i < 3; ++i) sum = sum + given[i];
@@ -87,13 +88,12 @@ Patch World::patch_around(const Asset& asset, const int32_t* corners, const doub
   const uint32_t n = uint32_t(asset.vertex_count()), elements = uint32_t(asset.element_stiffness.count);
   const double* rows = machine_->rows.room<double>(2 * n);
   const double* strength = machine_->found.room<double>(1);
-  machine_->launch("shape_patch",
-                   {Machine::array(corners, count), Machine::array(weights, count),
-                    Machine::array(scene_->patch_limits.data, uint32_t(scene_->patch_limits.count)),
-                    Machine::array(asset.vertices.data, n, 3), Machine::array(asset.masses.data, n),
-                    Machine::array(asset.elements.data, elements, uint32_t(asset.element_width)),
-                    Machine::array(asset.element_stiffness.data, elements), Machine::array(machine_->rows, n, 2),
-                    Machine::array(machine_->found, 1)});
+  machine_->launch("shape_patch", {Machine::array(corners, count), Machine::array(weights, count),
+                                   Machine::array(scene_->patch_limits.data, uint32_t(scene_->patch_limits.count)),
+                                   Machine::array(asset.vertices.data, n, 3), Machine::array(asset.masses.data, n),
+                                   Machine::array(asset.elements.data, elements, uint32_t(asset.element_width)),
+                                   Machine::array(asset.element_stiffness.data, elements),
+                                   Machine::array(machine_->rows, n, 2), Machine::array(machine_->found, 1)});
   Patch found{{}, {}, *strength};
   for (uint32_t v = 0; v < n; ++v) {
     if (rows[2 * v] == 0.0) continue;

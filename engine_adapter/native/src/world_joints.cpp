@@ -27,10 +27,9 @@ std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, co
   const uint32_t k = uint32_t(points.size());
   const int32_t* corners = machine_->rows.room<int32_t>(4 * k);
   const double* weights = machine_->found.room<double>(4 * k);
-  machine_->launch("embed_points",
-                   {Machine::array(points.data(), k, 3), Machine::array(x, uint32_t(count), 3),
-                    Machine::array(tets.data, uint32_t(tets.count / 4), 4), Machine::array(machine_->rows, k, 4),
-                    Machine::array(machine_->found, k, 4)});
+  machine_->launch("embed_points", {Machine::array(points.data(), k, 3), Machine::array(x, uint32_t(count), 3),
+                                    Machine::array(tets.data, uint32_t(tets.count / 4), 4),
+                                    Machine::array(machine_->rows, k, 4), Machine::array(machine_->found, k, 4)});
   std::vector<Holder> holders(k);
   for (size_t i = 0; i < k; ++i) {
     std::copy(corners + 4 * i, corners + 4 * i + 4, holders[i].vertices);
@@ -44,8 +43,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
     fail(TS_ERROR_ARGUMENT,
-         "the body in slot %d has no tetrahedra: join it to the other body instead, or give vertices in onto",
-         other);
+         "the body in slot %d has no tetrahedra: join it to the other body instead, or give vertices in onto", other);
   }
   std::vector<Vector> points, x;
   for (int32_t vertex : vertices) points.push_back(vertex_place(slot, vertex));

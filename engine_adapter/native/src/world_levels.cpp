@@ -26,7 +26,8 @@ void World::read_levels() {
   levels_.assign(levels.begin(), levels.end());
   held_.assign(slots, {});
   attachments_.assign(attachments.begin(), attachments.end());
-  bool is_whole = levels.count == slots && counts.count == slots && attachments_.size() == size_t(scene_->particle_count);
+  bool is_whole =
+      levels.count == slots && counts.count == slots && attachments_.size() == size_t(scene_->particle_count);
   size_t at = 0;
   for (size_t slot = 0; is_whole && slot < slots; ++slot) {
     const Asset& asset = whole_of(int32_t(slot));
@@ -64,12 +65,12 @@ void World::read_levels() {
       }
     }
     if (is_there && scene_->has_hulls) {
-      is_there = fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.outer.count) &&
-                 fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.touching_outer.count) &&
-                 fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1, rows.triangles.count / 3) &&
-                 fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1,
-                      rows.touching_triangles.count / 3) &&
-                 fits("hull.body_points", slot, count_of("hull.carriers"), 1, rows.carriers.count / 4);
+      is_there =
+          fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.outer.count) &&
+          fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.touching_outer.count) &&
+          fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1, rows.triangles.count / 3) &&
+          fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1, rows.touching_triangles.count / 3) &&
+          fits("hull.body_points", slot, count_of("hull.carriers"), 1, rows.carriers.count / 4);
     }
     if (!is_there) fail(TS_ERROR_FILE, "the world file is invalid: a level of detail. Export it again");
   }
@@ -173,7 +174,7 @@ std::vector<int32_t> World::finest_held(int32_t slot) const {
 
 // Vertices of each attachment at another level. `held` are the held vertices.
 std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, const std::vector<int32_t>& held,
-                                                    int32_t level) const {
+                                                              int32_t level) const {
   std::map<int32_t, Hanging> found;
   const std::vector<int32_t> sources = pinned(slot);
   for (int32_t vertex : sources) {
@@ -312,7 +313,8 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   }
   Motion before(source.vertex_count());
   const float* found = machine_->rows.room<float>(before.numbers.size());
-  machine_->launch("read_motion", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
+  machine_->launch("read_motion",
+                   {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
   std::copy(found, found + before.numbers.size(), before.numbers.begin());
   Motion after = mapped(before, source, target, whole.passage(size_t(from), size_t(level)), held);
   attach_at_level(attached, before, &after);

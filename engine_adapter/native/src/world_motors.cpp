@@ -55,8 +55,10 @@ std::vector<World::MotorRow> World::motors() const {
     MotorRow row;
     row.number = m;
     row.slot = fields_.motors.motor.body(m) - 1;
-    row.turns = fields_.motors.motor.turns(m), row.is_fixed = fields_.motors.motor.is_fixed(m), row.has_point = fields_.motors.motor.has_point(m);
-    for (size_t k = 0; k < 3; ++k) row.axis[k] = fields_.motors.motor.axis(m, k), row.point[k] = fields_.motors.motor.point(m, k);
+    row.turns = fields_.motors.motor.turns(m), row.is_fixed = fields_.motors.motor.is_fixed(m),
+    row.has_point = fields_.motors.motor.has_point(m);
+    for (size_t k = 0; k < 3; ++k)
+      row.axis[k] = fields_.motors.motor.axis(m, k), row.point[k] = fields_.motors.motor.point(m, k);
     row.speed = fields_.motors.motor.speed(m), row.limit = fields_.motors.motor.limit(m);
     for (int32_t r = fields_.motors.motor.first(m); r < fields_.motors.motor.end(m); ++r) {
       row.particles.push_back(fields_.motors.particle(size_t(r)));
@@ -76,8 +78,10 @@ void World::write_motors(const std::vector<MotorRow>& rows) {
     fields_.motors.motor.first(m) = int32_t(at);
     for (int32_t each : row.particles) fields_.motors.particle(at++) = each;
     fields_.motors.motor.end(m) = int32_t(at);
-    fields_.motors.motor.turns(m) = row.turns, fields_.motors.motor.is_fixed(m) = row.is_fixed, fields_.motors.motor.has_point(m) = row.has_point;
-    for (size_t k = 0; k < 3; ++k) fields_.motors.motor.axis(m, k) = row.axis[k], fields_.motors.motor.point(m, k) = row.point[k];
+    fields_.motors.motor.turns(m) = row.turns, fields_.motors.motor.is_fixed(m) = row.is_fixed,
+    fields_.motors.motor.has_point(m) = row.has_point;
+    for (size_t k = 0; k < 3; ++k)
+      fields_.motors.motor.axis(m, k) = row.axis[k], fields_.motors.motor.point(m, k) = row.point[k];
     fields_.motors.motor.speed(m) = row.speed, fields_.motors.motor.limit(m) = row.limit;
   }
   mark_driven();
@@ -123,8 +127,7 @@ ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
   const double length = length_of(drive.axis);
   if (!(length > 0.0)) fail(TS_ERROR_ARGUMENT, "axis has zero length");
   if (drive.has_point && !(drive.turns && drive.is_fixed)) {
-    fail(TS_ERROR_ARGUMENT,
-         "point is only for a rotation about a fixed axis: set turns and is_fixed too");
+    fail(TS_ERROR_ARGUMENT, "point is only for a rotation about a fixed axis: set turns and is_fixed too");
   }
   Vector axis = {drive.axis[0] / length, drive.axis[1] / length, drive.axis[2] / length};
   if (!drive.is_fixed) axis = axis_at_rest(slot, vertices, axis);

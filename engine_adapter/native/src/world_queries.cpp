@@ -56,8 +56,7 @@ Hit World::first_hit(const Vector& origin, const Vector& direction, double farth
   ray[6] = next_above(farthest), ray[7] = 1.0f;
   std::fill(hit, hit + 12, -1.0f);
   if (count > 0) {
-    machine_->launch("find_hits", {Machine::array(machine_->rows, count),
-                                   Machine::array(machine_->numbers, 1, 8),
+    machine_->launch("find_hits", {Machine::array(machine_->rows, count), Machine::array(machine_->numbers, 1, 8),
                                    Machine::array(machine_->found, 1, 12)});
   }
   return hit_from(hit);
@@ -71,8 +70,7 @@ Hit World::closest(const Vector& point, double farthest) {
   asked[3] = next_above(farthest * farthest);
   std::fill(hit, hit + 13, -1.0f);
   if (count > 0) {
-    machine_->launch("find_closest", {Machine::array(machine_->rows, count),
-                                      Machine::array(machine_->numbers, 4),
+    machine_->launch("find_closest", {Machine::array(machine_->rows, count), Machine::array(machine_->numbers, 4),
                                       Machine::array(machine_->found, 1, 13)});
   }
   Hit nearest = hit_from(hit);
@@ -94,11 +92,9 @@ std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector
   }
   std::fill(first, first + slots, -1);
   if (count > 0) {
-    machine_->launch("find_overlaps",
-                     {Machine::whole(is_box ? 1 : 0), Machine::array(machine_->rows, count),
-                      Machine::array(machine_->numbers, 5, 3),
-                      Machine::array(machine_->found, slots),
-                      Machine::array(machine_->vertices, particles)});
+    machine_->launch("find_overlaps", {Machine::whole(is_box ? 1 : 0), Machine::array(machine_->rows, count),
+                                       Machine::array(machine_->numbers, 5, 3), Machine::array(machine_->found, slots),
+                                       Machine::array(machine_->vertices, particles)});
   }
   std::vector<int32_t> found;
   for (uint32_t slot = 0; slot < slots; ++slot) {

@@ -33,7 +33,8 @@ uint64_t World::hash() const {
     mix_two(bits_of(fields_.body_gravity_scale(body)), bits_of(fields_.body_damping(body)));
     const size_t begin = begin_of(body), end = begin + asset_of(body).vertex_count();
     for (size_t p = begin; p < end; ++p) {
-      for (int k = 0; k < 3; ++k) mix_two(bits_of(fields_.particle_position(p, k)), bits_of(fields_.particle_velocity(p, k)));
+      for (int k = 0; k < 3; ++k)
+        mix_two(bits_of(fields_.particle_position(p, k)), bits_of(fields_.particle_velocity(p, k)));
       mix_two(bits_of(fields_.particle_inv_mass(p)), uint32_t(fields_.particle_aim(p)));
     }
   }
@@ -98,7 +99,9 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<KeptField>& ke
 }
 
 // Size of the levels, the numbers of held vertices, and these vertices [bytes].
-size_t size_of_levels(const SnapshotHead& head, size_t slots) { return sizeof(int32_t) * (2 * slots + size_t(head.held)); }
+size_t size_of_levels(const SnapshotHead& head, size_t slots) {
+  return sizeof(int32_t) * (2 * slots + size_t(head.held));
+}
 
 // Size of everything that follows the fields [bytes].
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
@@ -329,7 +332,8 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) return false;
   }
-  at += head.frames + feels_.size() + sizeof(int32_t) * attachments_.size() + sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
+  at += head.frames + feels_.size() + sizeof(int32_t) * attachments_.size() +
+        sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
   std::vector<double> frictions(friction_.size());
   take_all(&at, &frictions);
   if (!are_frictions(frictions.data(), frictions.size())) return false;
@@ -341,8 +345,8 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     Collider row;
     take(&at, &row, 1);
     // Shapes with a grid must be shapes of the export.
-    const bool is_known = row.kind >= 0 && (row.kind <= TS_CAPSULE ||
-                                            (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
+    const bool is_known =
+        row.kind >= 0 && (row.kind <= TS_CAPSULE || (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
         !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
       return false;
@@ -405,7 +409,8 @@ void World::restore(const char* bytes, size_t size) {
   const Packed packed(*this, at, head, levels.levels);
   machine_->launch("forget_held", {});
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    if (packed.lives(slot + 1) && levels.levels[size_t(slot)] != level_of(slot)) refill(slot, levels.levels[size_t(slot)]);
+    if (packed.lives(slot + 1) && levels.levels[size_t(slot)] != level_of(slot))
+      refill(slot, levels.levels[size_t(slot)]);
   }
   held_ = std::move(levels.held);
   for (const KeptField& each : scene_->kept) {

@@ -89,6 +89,8 @@ bool World::is_valid(const Surroundings& given) const {
   return is_friction(given.friction);
 }
 
-bool World::are_frictions(const double* numbers, size_t count) { return std::all_of(numbers, numbers + count, is_friction); }
+bool World::are_frictions(const double* numbers, size_t count) {
+  return std::all_of(numbers, numbers + count, is_friction);
+}
 
 }  // namespace taichi_soft
