@@ -25,6 +25,7 @@ from taichi_soft import (
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION, row_counts
 from taichi_soft.world.bare import bare_world
+from taichi_soft.world.world import context_of_world
 
 
 def middle():
@@ -369,9 +370,10 @@ def set_number(name, to, row=0, column=0):
     """Change a number of a field in a snapshot of `small`."""
 
     def change(content, rows, world):
-        state = world._context.built.state
+        context = context_of_world(world)
+        state = context.built.state
         field = next(field for each, _, field in state.fields if each == name)
-        counts, start = row_counts(world._context, content["slices"]), 0
+        counts, start = row_counts(context, content["slices"]), 0
         for group, members in state.kept.items():
             width = sum(size for *_, size in members)
             for each, first, _ in members:
