@@ -228,6 +228,8 @@ def collide_particle(state: ti.template(), body, p, h, since):
                 (1.0 - earliest) * path + (rest - beyond - lift) * n + left * h * (change - n * change.dot(n))
             )
             touches += 1
+            if state.colliders.near_count[body] == 1 and state.colliders.kind[c] == ShapeKind.PLANE:
+                is_open = 0  # a path along a plane touches nothing else
             if touches == MAX_TOUCHES:
                 path = ti.Vector.zero(ti.f32, 3)
                 is_open = 0
