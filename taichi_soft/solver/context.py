@@ -50,7 +50,7 @@ class WorldContext(Context):
 
     @property
     def floor_collider(self) -> Collider | None:
-        """Collider of the floor, after `World.build`; None in a world without colliders."""
+        """Collider of the floor; None before `World.build`, and in a world without a floor or colliders."""
         return self.colliders.floor
 
     @property

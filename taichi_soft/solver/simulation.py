@@ -105,7 +105,7 @@ class Simulation:
         return reports
 
     def trial_step(self, seconds: float) -> None:
-        """Run a step of one substep that records no events. The caller must restore the state before it."""
+        """Run a step of one substep without recording events. The caller must then undo the step."""
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:
             self.colliders.prepare(seconds)
@@ -229,7 +229,7 @@ class Simulation:
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the lower and upper corner of the box around a body, its hull and its thickness [m]."""
+        """Return the lower and upper corner of the box around a body and its hull, plus thickness [m]."""
         lower, upper = body.aabb()
         asset = present_asset(body)
         if asset.hull is not None:
@@ -267,7 +267,10 @@ class Simulation:
         self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
-        """Set positions [m] and velocities [m/s] of a body, (n, 3). Raises: OptionError if out of range."""
+        """Set positions [m] and velocities [m/s] of a body, (n, 3).
+
+        Raises: OptionError for values out of range.
+        """
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:

@@ -69,7 +69,7 @@ class Capacity(BodyCapacity):
 
 
 _FIELDS: WeakKeyDictionary[State, list[tuple[str, Declaration, Any]]] = WeakKeyDictionary()
-"""`State.fields` of each state. As attributes of a state, they would be part of cached kernels' keys."""
+"""`State.fields` of each state. As attributes of a state, declarations would change kernels' cache keys."""
 
 
 class State(BodyFields):

@@ -54,10 +54,10 @@ class Body(BodyControl, BodyMeasures):
 
         A face opens if the blade passes between the centres of its two tetrahedra. Vertices keep their
         indices, and copies of split vertices are appended. Mass, momentum and elastic energy are conserved.
-        Detached pieces become bodies of the same asset in free slots of its pool; this body keeps the largest
-        piece. If pieces detach, the vertices and tetrahedra of each piece are renumbered in the same order;
-        `vertex_origins` has the original indices. Attached vertices and their copies stay attached in every
-        piece, see `Attachment`.
+        Detached pieces become bodies of the same asset in free slots of the asset's pool; this body keeps the
+        largest piece. If pieces detach, the vertices and tetrahedra of each piece are renumbered in the same
+        order; `vertex_origins` has the original indices. Attached vertices and their copies stay attached in
+        every piece, see `Attachment`.
         Args:
             plane: (point (3,) [m], normal (3,)) of a cut through the whole body.
             triangle: corners, (3, 3) [m], of a cut that ends at its edges.

@@ -217,8 +217,9 @@ class BodyControl(SoftBody):
         Args:
             other: another body of the same world, with tetrahedra unless `onto` is given.
             particles: vertices of this body, preferably of the finer mesh.
-            onto: vertices of `other`, one per particle, to attach to. None attaches each particle at its
-                current position, which must be in a tetrahedron of `other` or just outside.
+            onto: vertices of `other` to which the particles are attached, one per particle. None attaches
+                each particle at its current position, which must be in a tetrahedron of `other` or just
+                outside it.
         Raises: OptionError for this body or a body of another world, for invalid vertices, and without `onto`
             for vertices that are too far away; StateError before `build`, in a world without contact,
             with implicit Euler, and if the world's 64 joints, or their 2,048 particles, are all in use.
@@ -257,7 +258,7 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_material(self, material: AnyMaterial) -> None:
-        """Change the material to another one of the same type, as if the body had been added with it.
+        """Change the material to another of the same type, as if the body had been added with it.
 
         Positions and velocities do not change, so a different density changes the momentum. In a deformed
         body, a stiffer material has more strain energy, which would throw the body. So stiffness rises

@@ -83,7 +83,7 @@ def _find_stable_step(context: WorldContext) -> None:
 
 
 def _fill_pools(context: WorldContext) -> None:
-    """Spawn bodies until every kind has a body and there are two bodies, as far as slots are free."""
+    """Spawn bodies until each kind has a body and the world has at least two bodies, if slots are free."""
     pools = context.slots
     for wanted in (1, 2):
         for asset in pools.kinds:

@@ -73,9 +73,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             physics.
         soft_contact: True for contact between soft bodies. None means True if bodies can touch: if
             there is more than one slot for bodies, or an asset whose bodies touch themselves.
-        sleep_speed: a body falls asleep if its particles, and the particles of all bodies that it can touch,
-            were slower than this [m/s] for 0.5 s. The body wakes when something approaches it or acts on it.
-            None means 0.02 m/s; 0 turns sleep off.
+        sleep_speed: largest speed for sleep [m/s]. A body falls asleep if its particles, and the particles of
+            all bodies that it can touch, were slower for 0.5 s. The body wakes when something approaches it
+            or acts on it. None means 0.02 m/s; 0 turns sleep off.
         collider_room: least number of colliders that can be added after `build`. None means 15.
         sample_room: number of grid samples for colliders that are added after `build`. A `HeightFieldShape`
             or `MeshShape` uses `len(shape.samples)` of them while its collider exists.
@@ -84,8 +84,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             law at a given step. Implicit Euler ignores this number and divides failing steps.
         max_substeps: largest number of substeps of a step. If 1/60 s needs more substeps, `build` raises an
             error; if a step needs more, `step` raises an error. None only warns above 500 substeps.
-        record: number of steps that the flight recorder stores, with all calls between them; 0 turns it off.
-            See `save_recording`.
+        record: number of steps that the flight recorder stores, with all calls between them; 0 turns the
+            recorder off. See `save_recording`.
         record_to: file that the flight recorder writes when a body freezes for the first time.
     Raises: OptionError for a value out of range or an unknown name.
     Example:
@@ -222,7 +222,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
         The number considers all assets with slots, even empty slots, so that spawning changes neither the
         time of a frame nor the motion of other bodies. After a cut or a change of material, the stable step
-        of that body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with
+        of the changed body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with
         `damping`). Steps with `substeps` avoid this estimate. With implicit Euler, the number is 1; if bodies
         can touch, it is the smallest number with substeps of at most 1/240 s.
         Args:

@@ -177,7 +177,7 @@ class WorldBodies(WorldParts):
 
     @recorded
     def despawn(self, body: Body) -> None:
-        """Remove a body from the world. This frees its slot and invalidates its handle.
+        """Remove a body from the world. Its slot becomes free, and its handle becomes invalid.
 
         Args:
             body: body of this world.
@@ -191,10 +191,10 @@ class WorldBodies(WorldParts):
 
         The bodies keep their velocities and continue in the step after the next. A body that skips every
         other step moves at half its speed. Gravity and force fields do not act on a skipping body; impulses
-        take effect when it continues. A body nevertheless makes the step if another body of its island (see
-        `islands`) makes it, if the body is attached, near a moving collider or pushed by `apply_force`, or if
-        its pins have moving targets. Sleeping and frozen bodies do not change. Further calls before the step
-        add bodies.
+        take effect when the body continues. A body makes the step after all if it is attached, near a moving
+        collider or pushed by `apply_force`, if its pins have moving targets, or if another body of its island
+        (see `islands`) makes the step. Sleeping and frozen bodies do not change. Further calls before the
+        step add bodies.
         Args:
             bodies: bodies of this world.
         Raises: OptionError if `bodies` is not a list of this world's bodies; StateError for a removed body,
@@ -219,8 +219,9 @@ class WorldBodies(WorldParts):
         return cast("list[tuple[Body, ...]]", self._built.islands())
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate the largest stable substep of a body. Bodies of one asset have the same estimate until
-        they are cut.
+        """Estimate the largest stable substep of a body.
+
+        Bodies of one asset have the same estimate until they are cut or change material.
 
         Args:
             body: body of any world.
@@ -231,7 +232,7 @@ class WorldBodies(WorldParts):
         return self._context.substeps.stable_step(body)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
-        """Read the positions of a body, interpolated between the previous step (alpha 0) and the last one
+        """Read the positions of a body, interpolated between the previous step (alpha 0) and the last step
         (alpha 1), (n, 3) [m].
 
         The first call after a step copies the positions of all bodies. Further calls with the same alpha read
@@ -257,7 +258,7 @@ class WorldBodies(WorldParts):
         normals: Floats32 | None = None,
     ) -> tuple[Floats32, Floats32]:
         """Read the positions and normals of a render mesh, interpolated between the previous step (alpha 0)
-        and the last one (alpha 1).
+        and the last step (alpha 1).
 
         A normal is the mean of the normals of the triangles around its vertex, weighted by area, so
         degenerate triangles do not contribute. If all triangles are degenerate, the normal is (0, 0, 1). Each

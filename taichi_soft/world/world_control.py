@@ -105,7 +105,7 @@ class WorldControl(WorldParts):
             lift = world.add_collider(BoxShape((1, 1, 0.1)), position=(3, 0, 0.2))
             lift.move_to((3, 0, 0.25))  # its position after the next step
             world.step(1 / 60)
-            print(lift.impulse)  # from the bodies on it [N s]
+            print(lift.impulse)  # from the bodies on the lift [N s]
         """
         if self._context.fields is not None:
             require_per_body(self._context, "colliders beside the floor")
@@ -207,8 +207,8 @@ class WorldControl(WorldParts):
                 particles.
             max_torque: largest torque about the axis [N m]. Give this to rotate the particles.
             max_force: largest force along the axis [N]. Give this to push the particles.
-            is_fixed: False rotates the axis with the particles, as for a wheel or a rocket. True fixes its
-                direction in space, as for a mill or for steering.
+            is_fixed: False rotates the axis with the particles, as for a wheel or a rocket. True fixes the
+                direction of the axis in space, as for a mill or for steering.
             point: point of a fixed axis, (3,) [m], with `is_fixed` and `max_torque`. By default the axis
                 passes through the centre of mass of the particles.
         Returns: a handle to change the speed and the limit, to read the effort, and to remove the motor.
@@ -270,8 +270,8 @@ class WorldControl(WorldParts):
         A triangle of area A, with the relative air speed v_n along its normal n, receives the force 1/4
         density drag A |v_n| v_n n. This force is half the drag of a plate, because a closed body, or a sheet
         with triangles on both sides, has one triangle that faces the wind and one triangle that faces away.
-        So the drag coefficient of a box is `drag`, and that of a sphere is half of it. The wind never
-        accelerates a vertex beyond the wind's speed.
+        So the drag coefficient of a box is `drag`, and the drag coefficient of a sphere is half of `drag`.
+        The wind never accelerates a vertex beyond the wind's speed.
         Args:
             velocity: velocity of the air, (3,) [m/s]; zero means still air, which brakes bodies; None means
                 no air.

@@ -15,14 +15,14 @@ class WorldEvents(WorldParts):
     """Methods of a world that record and return events."""
 
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
-        """From the next step on, record events of these kinds only. `drain_events` returns them.
+        """Record events of these kinds only, from the next step on. `drain_events` returns the events.
 
         Contacts that already exist are reported as new contacts in that step. `StressExceeded` and
         `TearCandidates` are sent only for bodies on which you called `Body.watch_stress` or
         `Body.watch_tearing`.
         Args:
             kinds: classes of events; `Event` means all kinds that this world supports; an empty list means
-                none.
+                no events.
         Raises: OptionError for a class that is not an event; StateError before `build`, and for contacts in a
             world without colliders and soft contact.
         """
@@ -55,7 +55,7 @@ class WorldEvents(WorldParts):
         events wait, the oldest events are dropped, and the step warns with a `DroppedEventsWarning`.
 
         If a listener raises an exception, the other listeners are still called, and the first exception is
-        raised at the end. The next call then returns the same events together with new ones, and calls no
+        raised at the end. The next call then returns the same events together with new events, and calls no
         listener twice for an event.
         Raises: StateError before `build`, before any kind is recorded, and inside a listener.
         """

@@ -85,7 +85,7 @@ class WorldQueries(WorldParts):
             point: point to search from, (3,) [m].
             max_distance: largest distance [m]; infinity for no limit.
             bodies: bodies to test; None for all.
-        Returns: the closest point, or None if none is in range.
+        Returns: the closest point, or None if no point is in range.
         Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
             another world; StateError before `build`.
         """

@@ -50,7 +50,10 @@ class WorldStates(WorldParts):
 
     @property
     def restore_count(self) -> int:
-        """Number of `restore` calls. After a change, states that were stored before can be from undone steps."""
+        """Number of `restore` calls.
+
+        If this number has changed, states that you stored before can belong to undone steps.
+        """
         return self._restore_count
 
     def state_hash(self) -> str:

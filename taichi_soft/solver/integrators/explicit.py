@@ -14,7 +14,7 @@ def whole_substep(lag, h, s):
 
 @ti.func
 def before_each(h, s, substeps):
-    """Return the time for which external forces act before substep `s` [s]: `h`, or 0 after the last one."""
+    """Return the time for which external forces act before substep `s` [s]; 0 if `s` equals `substeps`."""
     return ti.select(s < substeps, h, 0.0)
 
 

@@ -5,9 +5,9 @@ adds its forces in a fixed order, so the result does not depend on the number of
 
 On a CPU, all substeps run inside one kernel call: one task per thread, synchronised by a spinning barrier.
 Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at the same time,
-because Taichi's pool has exactly as many threads. But if another program occupies a core, every barrier can
-wait for the operating system, so only very large bodies use this schedule by default. A GPU has no such
-barrier, so each substep is a separate launch.
+because Taichi's pool has exactly as many threads as there are tasks. But if another program occupies a core,
+every barrier can wait for the operating system, so only very large bodies use this schedule by default. A GPU
+has no such barrier, so on a GPU each substep is a separate launch.
 """
 
 from taichi_soft.bodies.kernels.particles import (
@@ -131,7 +131,7 @@ def _is_damped_now(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def _gather_phase(state: ti.template(), p, h, s, substeps):
-    """For bodies that are damped in this substep, write the forces to the field that damping reads."""
+    """If a particle's body is damped in this substep, write its force to the field that damping reads."""
     if _is_damped_now(state, state.particle_body[p], h, s, substeps):
         state.particle_force[p] = widened(gathered_force(state, p))
 

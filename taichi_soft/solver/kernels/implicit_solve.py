@@ -27,7 +27,7 @@ FARTHEST = 0.5
 """Largest relative change of an edge in a substep. If an edge changes more, the substep is halved."""
 
 MIN_LENGTH = 0.1
-"""Changes of shorter edges are divided by this fraction of the mean edge length instead of their length."""
+"""Smallest reference length for the relative change of an edge, over the mean edge length."""
 
 MAX_PIECES = 32
 """Largest number of pieces into which a failing substep is divided."""

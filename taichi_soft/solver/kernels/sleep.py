@@ -125,8 +125,9 @@ def _put_to_sleep(state: ti.template(), body):
 
 @ti.real_func
 def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
-    """Add a step of `dt` [s] to the rest timers of an island. If all exceed `CALM_TIME`, put the island
-    to sleep.
+    """Add a step of `dt` [s] to the rest timers of an island.
+
+    If all timers exceed `CALM_TIME`, put the island to sleep.
 
     Returns: 1 if the island is still awake.
     """
@@ -150,7 +151,7 @@ def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
 
 @ti.kernel
 def wake_body(state: ti.template(), body: ti.i32):
-    """Wake one body, or all if `body` is -1, and restart the rest timers."""
+    """Wake one body, or all bodies if `body` is -1, and restart the rest timers."""
     ti.loop_config(serialize=True)
     for b in range(state.capacity.bodies):
         if body == b or body == -1:

@@ -62,5 +62,5 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
 def despawn_body(state: ti.template(), body: ti.i32):
     """Empty a slot. The positions of its particles stay finite, but no code moves or reads them."""
     if ti.static(state.capacity.contact.colliders > 0):
-        clear_contacts(state, body)  # otherwise colliders would receive its last impulse in every step
+        clear_contacts(state, body)  # otherwise colliders would receive the last impulse in every step
     state.body_status[body] = ABSENT

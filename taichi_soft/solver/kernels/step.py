@@ -100,7 +100,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
         body = state.islands.body[state.islands.first[island]]
-        # Includes the speed gained by gravity, so that near colliders are listed only once per step.
+        # Add the speed gained by gravity, so that near colliders are listed only once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)

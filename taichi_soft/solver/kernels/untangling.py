@@ -1,13 +1,15 @@
 """Restore bodies with inverted tetrahedra.
 
 Forces alone restore nearly all inverted tetrahedra. Every `PATIENCE` steps a body is checked for flat or
-inverted tetrahedra. If there are any, its vibrations are damped until a check finds none. A body that is
-folded by its own weight can keep a few inverted tetrahedra for ever, because their forces balance. Such a
-body is reported after `REPORTED_AFTER` steps and left as it is. A body with too many inverted tetrahedra has
-lost its shape. Within a third of a second, its particles are moved to the best fit of the rest shape.
+inverted tetrahedra. If a check finds any, the vibrations of the body are damped until a check finds none. A
+body that is folded by its own weight can keep a few inverted tetrahedra for ever, because their forces
+balance. Such a body is reported after `REPORTED_AFTER` steps and left as it is. A body with too many inverted
+tetrahedra has lost its shape. Within a third of a second, its particles are moved to the best fit of the rest
+shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-can be too long for these bodies, so that parts of them would vibrate for ever. They get more substeps.
+can be too long for these bodies, so that parts of the bodies would vibrate for ever. Such
+bodies get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED

@@ -25,9 +25,9 @@ from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
 MAX_FADING = 0.43
 """Largest exponent of damping in one substep: the fraction d = exp(-0.43) = 0.65 remains. For particles in
-contact, the kick is not part of the damped vibration, so a mode of stiffness k and mass 1 becomes d v + h a.
-The substep is stable for h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step. A failed body is
-damped more strongly, once per step."""
+contact, the kick is not part of the damped vibration, so the velocity v of a mode with stiffness k and mass 1
+becomes d v + h a. The substep is stable for h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step.
+A failed body is damped more strongly, once per step."""
 
 MOVING, SLOW, RESTING = range(3)
 """Rest states of a body, by its overall speed: see `calming`."""
@@ -153,7 +153,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
 
 @ti.func
 def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
-    """Scale a body's vibration by `keep`. Its vibration is measured after forces have acted for `kick` [s].
+    """Scale a body's vibration by `keep`. The vibration is measured after forces have acted for `kick` [s].
 
     `h` is the length of the substep [s].
     """
