@@ -1,4 +1,4 @@
-"""Launch the step of a world, with one function per schedule."""
+"""Functions that launch the step of a world, one function per schedule."""
 
 from collections.abc import Callable
 

@@ -92,6 +92,6 @@ class JobFields(FieldGroup):
     job = declare(BODY, Job, below={})  # current job of each island
     unfinished_islands = declare(WORLD, ti.i32)  # number of unfinished islands with several bodies
     useful_helpers = declare(WORLD, ti.i32)  # number of helpers that can find work in these islands
-    parts = declare(WORLD, ti.i32)  # parts into which the bodies of an island are divided, one per thread
+    parts = declare(WORLD, ti.i32)  # number of parts into which an island's bodies are divided
     untaken = declare(BODY, ti.i32, each=MOST_PARTS)  # number of bodies of each part that no thread has taken
     unfinished = declare(BODY, ti.i32)  # number of bodies of each island that have not finished the job

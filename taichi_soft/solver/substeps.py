@@ -41,7 +41,7 @@ TET_TIME = 15e-9
 
 
 class Substeps:
-    """Number of substeps of one world: estimate, choice and warnings."""
+    """Estimate and choose the number of substeps of one world."""
 
     def __init__(
         self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool | None, most: int | None

@@ -98,8 +98,8 @@ class BodyMeasures(SoftBody):
     def force_across(self, point: ArrayLike, normal: ArrayLike) -> Floats:
         """Elastic force across a plane, (3,) [N].
 
-        The part of the body on the side of `normal` exerts this force on the other part. It is the sum of
-        `stresses` times the areas in which the plane cuts the tetrahedra. In a body at rest, the force
+        The part of the body on the side of `normal` exerts this force on the other part. The force is the sum
+        of `stresses` times the areas in which the plane cuts the tetrahedra. In a body at rest, the force
         balances the load beyond the plane, to the accuracy with which the mesh resolves the stress.
         Args:
             point: point of the plane, (3,) [m].

@@ -67,7 +67,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             stable for every step, but solves a linear system per step, and its damping grows with the step.
             If an edge would change by more than half its length, the step is divided into 2 to 32 parts.
         tolerance: largest residual of implicit solves, over the load on the body, 1e-6 to 0.5.
-        most_iterations: largest number of iterations of an implicit solve. If a solve needs more, its last
+        most_iterations: largest number of iterations of an implicit solve. If a solve needs more, the last
             iterate is used, with a `SolverWarning`.
         schedule: "auto", "per_body" or "flat", the loop structure of the computation. It does not change the
             physics.

@@ -34,10 +34,10 @@ class WorldStates(WorldParts):
         """Restore a state that `snapshot` returned. The same calls then give bit-identical steps.
 
         Handles of objects in the state stay valid, or become valid again; other handles become invalid, as
-        after a removal. `bodies` and `colliders` provide new handles for objects that have none. The force
-        field and listeners do not change. Bodies whose stress was watched in that state are watched again,
-        and bodies that are watched now stay watched. Waiting events of undone steps are dropped. Repeating
-        the steps records these events again, even those that were drained before.
+        after a removal. `bodies` and `colliders` provide new handles for objects without a valid handle. The
+        force field and listeners do not change. Bodies whose stress was watched in that state are watched
+        again, and bodies that are watched now stay watched. Waiting events of undone steps are dropped.
+        Repeating the steps records these events again, even those that were drained before.
         Args:
             data: result of `snapshot`, from this world or a world that was built in the same way.
         Raises: SnapshotError for damaged data, or for a world that was built differently, with the first
@@ -60,7 +60,7 @@ class WorldStates(WorldParts):
         """Return a hash of the state, 16 hexadecimal digits. Two synchronised worlds have the same hash.
 
         The hash covers step count, gravity, positions, velocities, pins, the status of bodies, colliders,
-        frames, grabs and joints. It does not depend on the number of threads.
+        frames, grabs and joints. The hash does not depend on the number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self._context)

@@ -8,7 +8,7 @@ from taichi_soft.core.types import Integrator
 
 @dataclass(frozen=True, repr=False)
 class IntegratorModel:
-    """Five Taichi functions that convert forces to motion, and properties of the integrator.
+    """Taichi functions that convert forces to motion, and properties of the integrator.
 
     No other code distinguishes integrators.
     """

@@ -23,7 +23,7 @@ MAX_SOLVES = 6
 """Largest number of solves in one substep to find the particles that stick, slide and leave."""
 
 TOLERANCE = 0.003
-"""Largest accepted violation of Coulomb's law, over the sum of impulses."""
+"""Largest accepted violation of Coulomb's law, relative to the sum of impulses."""
 
 MAX_REVERSAL = 0.1
 """Largest relative increase of a sliding velocity that corrects too strong friction. Larger increases would

@@ -46,7 +46,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
         surface = state.body_surface[body]
-        # The relative motion of the body's parts can change direction within the step.
+        # Extend the box, because parts of a body can change the direction of their motion in the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.body_bounds_lower[body] = lower - reach

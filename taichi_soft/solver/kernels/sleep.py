@@ -14,7 +14,7 @@ CALM_TIME = 0.5
 highest point."""
 
 WAKE_MARGIN = 0.01
-"""Distance from the box of a sleeping body within which an event wakes it [m]."""
+"""Distance from the box of a sleeping body within which an event wakes the body [m]."""
 
 
 @ti.func
@@ -70,8 +70,8 @@ def reset_rest_timer(state: ti.template(), body, speed):
 def reset_rest_timer_of_hull(state: ti.template(), body, dt):
     """Restart the rest timer of a body with a hull if it has moved too far in a step of `dt` [s].
 
-    Velocities are ignored, because carriers of points in contact oscillate from substep to substep without
-    moving away.
+    Velocities are ignored, because particles that carry touching hull points oscillate from substep to
+    substep without moving away.
     """
     if has_hull(state, body):
         displacement = ti.cast(0.0, ti.f32)

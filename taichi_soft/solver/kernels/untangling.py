@@ -39,7 +39,7 @@ tetrahedron."""
 
 FADING = 20.0
 """Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Without damping, inverted
-slivers would excite each other, light ones for seconds."""
+slivers would excite each other, light slivers for seconds."""
 
 STEP_MARGIN = 0.9
 """Square of the ratio of a deformed body's substep to the estimated stability limit of the substep."""
@@ -209,12 +209,11 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def kept_while_inverted(state: ti.template(), body, h, is_first):
-    """Return the fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h`
-    [s].
+    """Return the fraction of a body's vibration that remains after a substep of `h` [s]; 1 without damping.
 
-    The body is damped in every substep. If it were damped only at the beginning of steps, vibrations with
-    twice the step's period would always be damped at their turning points. A failed body is damped only in
-    the first substep of each step.
+    A body with inverted tetrahedra is damped in every substep. If it were damped only at the beginning of
+    steps, vibrations with twice the step's period would always be damped at their turning points. A failed
+    body is damped only in the first substep of each step.
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:

@@ -220,7 +220,7 @@ def _limited(beside, most):
 
 @ti.func
 def kept_vibration(state: ti.template(), body, h, s, substeps):
-    """Return the fraction of its vibration that a body keeps in substep `s` of `substeps`, of `h` [s] each.
+    """Return the fraction of a body's vibration that remains after substep `s` of `substeps` of `h` [s] each.
 
     The fraction is below 1 only every few substeps, but many times in a period of the first mode. The
     intervals vary, because a mode that is always damped at its turning points would last for ever.
