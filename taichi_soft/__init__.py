@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING
 
-from taichi_soft.core import signals  # noqa: F401 - first: it watches while the rest is imported
+from taichi_soft.core import signals  # noqa: F401 - first, to handle Ctrl-C during all other imports
 
 # isort: split
 from taichi_soft.bodies.asset import SoftBodyAsset
@@ -115,7 +115,7 @@ else:
     )
 
     def __getattr__(name):
-        """Import `engine_adapter` at the first use of one of its names, because it imports this package."""
+        """Return a name of `engine_adapter`, which is only imported now because it imports this package."""
         if name == "GivenUp":
             from taichi_soft.core.renamed import warn_renamed
 
@@ -232,4 +232,4 @@ __all__ = [
     "voxels",
 ]
 
-logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent, unless a game asks for it
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the game configures logging

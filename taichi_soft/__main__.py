@@ -1,4 +1,4 @@
-"""`python -m taichi_soft`: the command line."""
+"""Run the command line for `python -m taichi_soft`."""
 
 from taichi_soft.cli import main
 

@@ -1,1 +1,1 @@
-"""The step: schedules, substeps, integrators, sleep, and recovery from failures."""
+"""Simulation of a step: schedules, substeps, integrators, sleep, and recovery from failures."""

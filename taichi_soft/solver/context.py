@@ -1,4 +1,4 @@
-"""Context of a world: all its parts, for persistence and the world itself."""
+"""Internal parts of a world, which `World` and the persistence modules share."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class WorldContext(Context):
 
     contact_request: ContactRequest
     substeps: Substeps
-    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # makes the handle for a slot
+    make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # creates the handle of a slot's body
     fields: Simulation | None = None
-    built_with: list[str] = field(default_factory=list)  # digests of the shapes of colliders at `build`
-    structure: bytes = b""  # digest of the structure that snapshots of this world must have, cached
+    built_with: list[str] = field(default_factory=list)  # digests of the colliders' shapes at `build`
+    structure: bytes = b""  # cached digest of the structure that this world's snapshots must have
 
     @property
     def contact(self) -> ContactSettings:
-        """Contact and sleep settings; before `World.build`, for the slots that were added so far."""
+        """Contact and sleep settings. Before `World.build`, they depend on the slots added so far."""
         return self._contact(can_touch=self.slots.can_touch)
 
     @property
     def contact_with_another(self) -> ContactSettings:
-        """Contact and sleep settings for this world with one more body."""
+        """Contact and sleep settings that this world would have with one more body."""
         return self._contact(can_touch=True)
 
     def _contact(self, *, can_touch: bool) -> ContactSettings:
@@ -50,7 +50,7 @@ class WorldContext(Context):
 
     @property
     def floor_collider(self) -> Collider | None:
-        """Collider of the floor, after `World.build`; None in a world without colliders."""
+        """Collider of the floor; None before `World.build`, and in a world without a floor or colliders."""
         return self.colliders.floor
 
     @property

@@ -13,7 +13,10 @@ from taichi_soft.solver.state import State
 
 
 def find_failure(state: State, program: StepProgram, scene: Scene, body: int, failed: FailedStep) -> Failure:
-    """Repeat the step that froze a body, and return where it fails. The state of the body does not change."""
+    """Repeat the step that froze a body, and return the element that failed first and the substep.
+
+    The state of the body does not change.
+    """
     found = np.full(2, -1, dtype=np.int32)
     find_failed_element(state, program, body, failed.substeps, failed.h, int(failed.is_braked), found)
     element, substep = found.tolist()

@@ -24,15 +24,16 @@ Floats32 = NDArray[np.float32]
 
 
 class Readout:
-    """Reads positions, velocities, render meshes and rest shapes of the bodies of a world."""
+    """Reader of the positions, velocities, render meshes and rest shapes of a world's bodies."""
 
     def __init__(
         self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints
     ) -> None:
         self.settings = settings
         self._state, self._program, self._scene, self._joints = state, program, scene, joints
-        self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # all positions
-        self._alpha: float | None = None  # interpolation factor of `_rows`; None if they are outdated
+        # Positions of all particles.
+        self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)
+        self._alpha: float | None = None  # interpolation factor of `_rows`; None if `_rows` is outdated
 
     def has_moved(self) -> None:
         """Mark the cached positions as outdated."""
@@ -73,12 +74,13 @@ class Readout:
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0
-            acceleration[self._is_carried(body)] = 0.0  # these velocities already include contact
+            # Velocities of touching vertices already include contact.
+            acceleration[self._is_carried(body)] = 0.0
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 
     def _is_carried(self, body: SoftBody) -> NDArray[np.bool_]:
-        """Return True for each vertex that touched something in the last substep, (n,)."""
+        """Return a mask of the vertices that touched something in the last substep, (n,)."""
         if self._program.has_contact:
             begin = self._scene.ranges[body.index].particles[0]
             touches = self._state.particle_touches.to_numpy()[begin : begin + body.vertex_count]
@@ -89,8 +91,9 @@ class Readout:
         return np.asarray(body.positions()[:, 2] <= floor)
 
     def rest_inverses(self, body: SoftBody) -> Floats:
-        """Return A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m], in the caller's
-        order.
+        """Return the inverse edge matrix A^-1 of each tetrahedron's current rest shape, (m, 3, 3) [1/m].
+
+        Tetrahedra are in the caller's order.
         """
         rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
         read_rest_inverses(self._state, body.index, rows)

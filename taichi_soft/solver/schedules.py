@@ -1,4 +1,4 @@
-"""Launch the step of a world, with one function per schedule."""
+"""Functions that launch the step of a world, one function per schedule."""
 
 from collections.abc import Callable
 
@@ -12,15 +12,15 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 FLAT_FROM_TETS = 100_000
-"""Number of tetrahedra of a world's largest body from which threads compute bodies together. On free cores,
-this is faster for much smaller bodies (`taichi-soft profile --crossover`). But if another program occupies a
-core, a barrier waits milliseconds for the interrupted thread, and only the largest bodies are still faster.
-"""
+"""Smallest size of a world's largest body, in tetrahedra, for which all threads compute each body together.
+On idle cores, this schedule is faster even for much smaller bodies (`taichi-soft profile --crossover`). But
+if another program occupies a core, a barrier waits milliseconds for the interrupted thread, and the schedule
+is faster only for the largest bodies."""
 
 MAX_CALL_WORK = 2_000_000
-"""Largest number of tetrahedra times substeps in one kernel call. Ctrl-C waits for the end of the call:
-0.03 s on one thread, several times longer with contact, and up to 23 times if the step is retried. A step
-that needs several calls takes a snapshot first."""
+"""Largest product of tetrahedra and substeps in one kernel call. Ctrl-C waits until the call ends. A call
+takes 0.03 s on one thread, several times as long with contact, and up to 23 times as long if the step is
+retried. Before a step that needs several calls, the world takes a snapshot."""
 
 ALL = 2**31 - 1
 """Number of substeps for a kernel call that runs the whole step."""
@@ -29,10 +29,10 @@ Launch = Callable[[int, float], int]
 
 
 def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
-    """Return the schedule that was asked for; for AUTO, the fastest schedule.
+    """Return the requested schedule, or the fastest schedule if the request is AUTO.
 
-    A GPU needs one thread per tetrahedron. On a CPU, each body runs in one thread if there are enough bodies
-    for all threads, or if no body is large enough for several threads.
+    A GPU uses FLAT, with one thread per tetrahedron. On a CPU, each body runs in one thread if there are
+    enough bodies for all threads, or if no body is large enough for several threads.
     """
     if asked is not Schedule.AUTO:
         return asked
@@ -47,7 +47,7 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
 
 
 def substeps_per_call(scene: Scene, integrator: IntegratorModel) -> int:
-    """Return the largest number of substeps that fits one kernel call."""
+    """Return the largest number of substeps in one kernel call within `MAX_CALL_WORK`, at least 1."""
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     return max(1, MAX_CALL_WORK // max(1, integrator.work * sum(sizes)))
 
@@ -55,7 +55,7 @@ def substeps_per_call(scene: Scene, integrator: IntegratorModel) -> int:
 def make_launch(
     schedule: Schedule, state: State, program: StepProgram, scene: Scene, device: Device, retries: int = 0
 ) -> Launch:
-    """Return a function (substeps, h) -> number of failed bodies, which runs one fixed step.
+    """Return the function that runs one fixed step: (substeps, h [s]) -> number of failed bodies.
 
     Args:
         retries: number of retries of a failed step.
@@ -73,7 +73,7 @@ def make_launch(
             found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 1))
         return found
 
-    attempts = retries + 2 if retries else 1  # the last has the same substeps as the one before
+    attempts = retries + 2 if retries else 1  # the last two attempts have the same substeps
 
     def flat_cpu(substeps: int, h: float) -> int:
         failed, attempt = 1, 0

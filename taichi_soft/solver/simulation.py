@@ -1,4 +1,4 @@
-"""A built world: its fields, its step kernel, and the Python side of a step."""
+"""Fields and step kernel of a built world, and the Python part of a step."""
 
 from __future__ import annotations
 
@@ -58,23 +58,24 @@ class Simulation:
     state: State
     program: StepProgram
     launch: Launch
-    long_from: int  # number of substeps from which a step takes several calls
+    long_from: int  # largest number of substeps that one kernel call runs
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
-    loss: str = ""  # why events of the last step were lost; set once per drain
-    troubled: int = 0  # number of bodies in the last step with failures, lasting inversions or inexact solves
-    _skips: bool = True  # True if bodies may skip the next step
+    loss: str = ""  # why the last step lost events; "" if it lost none, or a loss was already reported
+    troubled: int = 0  # number of failed, inverted or inexactly solved bodies in the last step
+    _skips: bool = True  # True if bodies can skip the next step
     _is_still: bool = False  # True if no body is awake, and nothing changed since the last step
-    _warned: set[int] = field(default_factory=set)  # slots reported for inexact solves
-    _inverted: set[int] = field(default_factory=set)  # slots reported for inverted tetrahedra
+    _warned: set[int] = field(default_factory=set)  # slots whose inexact solves were reported
+    _inverted: set[int] = field(default_factory=set)  # slots whose inverted tetrahedra were reported
 
     def __post_init__(self) -> None:
         self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
 
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
-        """Run one fixed step of `seconds` [s] in `substeps` substeps of `h` [s]. Returns: a line for each
-        body that the step froze.
+        """Run one fixed step of `seconds` [s] in `substeps` substeps of `h` [s].
+
+        Returns: a message for each body that the step froze.
         """
         clock, colliders = self.clock, self.colliders
         if self.easings.by_body:
@@ -104,20 +105,20 @@ class Simulation:
         return reports
 
     def trial_step(self, seconds: float) -> None:
-        """Run a step that records nothing. The caller must undo it."""
+        """Run a step of one substep without recording events. The caller must then undo the step."""
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:
             self.colliders.prepare(seconds)
             begin_skips(self.state, len(self.pools.slots))
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
-        self.state.body_status.to_numpy()  # compiles the read after a body failed
-        self.state.body_patience.to_numpy()  # compiles the read of inverted bodies
+        self.state.body_status.to_numpy()  # compiles the kernel that reads after a failure
+        self.state.body_patience.to_numpy()  # compiles the kernel that finds inverted bodies
 
     def _record_failures(self, substeps: int, h: float) -> list[str]:
-        """Record the bodies that the last step froze. Returns: a line for each of them."""
+        """Record the bodies that the last step froze. Returns: a message for each frozen body."""
         clock, reports = self.clock, []
-        # The last attempt freezes the body.
+        # Record the substeps of the last attempt, because only the last attempt freezes bodies.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
         if self.program.integrator.halvings > 0:
             finer, is_braked = 1 << self.program.integrator.halvings, False
@@ -136,7 +137,7 @@ class Simulation:
         return reports
 
     def _suggest_fix(self, body: SoftBody) -> str:
-        """Suggest a remedy for a body that the last step froze."""
+        """Return advice to the user for a body that the last step froze."""
         lower, upper = body.aabb()
         moved, size = self.frames.displacement(body), float((upper - lower).max())
         if moved > size:
@@ -181,7 +182,7 @@ class Simulation:
             )
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
-        """Place a body in an empty slot. For `rows`, see `SoftBodyAsset.placed`."""
+        """Place a body in an empty slot, with the initial state `rows` (see `SoftBodyAsset.placed`)."""
         spawn_body(self.state, slot, rows)
         self.mark_changed()
 
@@ -193,14 +194,14 @@ class Simulation:
         despawn_body(self.state, slot)
 
     def skip(self, slots: Sequence[int]) -> None:
-        """Make bodies skip the next step."""
+        """Make the bodies in `slots` skip the next step."""
         if slots:
             skip_bodies(self.state, np.array(slots, dtype=np.int32))
             self._skips = True
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Return the islands of the last step, by slot. Bodies added since then form separate islands."""
+        """Return the islands of the last step, sorted by slot. A body added since that step is an island."""
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)
@@ -211,7 +212,7 @@ class Simulation:
         return [tuple(bodies) for bodies in found.values()]
 
     def wake(self, slot: int) -> None:
-        """Wake the body in a slot; -1 wakes all."""
+        """Wake the body in a slot, or all bodies if `slot` is -1."""
         self._is_still = False
         if self.sleeps:
             wake_body(self.state, slot)
@@ -221,14 +222,14 @@ class Simulation:
         self.wake(-1)
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
-        """Wake bodies that sleep near a box, given by two corners [m]."""
+        """Wake the bodies that sleep near the box with the corners `lower` and `upper` [m]."""
         if self.sleeps:
             box = np.concatenate([lower, upper]).astype(np.float32)
             if wake_near(self.state, len(self.pools.slots), box):
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the corners of the current box around a body and its contact hull [m]."""
+        """Return the lower and upper corner of the box around a body and its hull, plus thickness [m]."""
         lower, upper = body.aabb()
         asset = present_asset(body)
         if asset.hull is not None:
@@ -238,32 +239,38 @@ class Simulation:
         return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, first particle of a body, *arguments) that only reads, and return its
-        result.
+        """Call `kernel(state, first, *arguments)`, which only reads the state, and return its result.
+
+        `first` is the first particle of the body in the slot.
         """
         return kernel(self.state, self.scene.ranges[slot].particles[0], *arguments)
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that changes the body in a slot, or all for -1. All control uses
-        this.
+        """Call `kernel(state, *arguments)` and return its result. The kernel changes the body in a slot.
+
+        If `slot` is -1, the kernel changes all bodies. All methods that control bodies call this method.
         """
         found = self.attempt(kernel, *arguments)
         self.mark_modified(slot)
         return found
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that can refuse a change. Bodies stay asleep until
-        `mark_modified`.
+        """Call `kernel(state, *arguments)`, which can refuse a change, and return its result.
+
+        Sleeping bodies stay asleep until the caller calls `mark_modified`.
         """
         return kernel(self.state, *arguments)
 
     def mark_modified(self, slot: int) -> None:
-        """Record that control changed the body in a slot, or all for -1."""
+        """Wake the body in a slot, or all bodies if `slot` is -1, after their state has changed."""
         self.wake(slot)
         self.mark_changed()
 
     def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
-        """Set positions and velocities of a body. Raises: OptionError for values out of range."""
+        """Set positions [m] and velocities [m/s] of a body, (n, 3).
+
+        Raises: OptionError for values out of range.
+        """
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
@@ -285,24 +292,24 @@ class Simulation:
         return self.readout.velocities(body)
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """Return A^-1 of each tetrahedron of a body after plastic flow, (m, 3, 3) [1/m]."""
+        """Return the inverse edge matrix A^-1 of each tetrahedron's current rest shape, (m, 3, 3) [1/m]."""
         return self.readout.rest_inverses(body)
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Return the vertices that are currently pinned, ascending."""
+        """Return the indices of the pinned vertices of a body, ascending."""
         return pinned_vertices(body)
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
         """Raise an OptionError if points of a body's surface, (k, 3) [m], are too deep inside a collider.
 
-        The caller must check the floor separately, because its error contains the missing height.
+        The caller must check the floor separately, because the error for the floor states the missing height.
         """
         if self.colliders is not None:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
             require_clear(others, present_asset(body), points, f"body {body.index}")
 
     def mark_joints_changed(self) -> None:
-        """Rebuild the islands of joined bodies, in worlds whose steps do not search for islands."""
+        """Rebuild the islands of joined bodies, if the world's steps do not search for islands."""
         if self.program.has_contact and not self.program.has_soft_contact:
             list_joined_islands(self.state, len(self.pools.slots))
 
@@ -317,21 +324,21 @@ class Simulation:
             mark_placed(self.state, body.index)
 
     def on_cut(self, body: SoftBody) -> None:
-        """Record that the vertices of a body changed."""
+        """Renew the stress watches of a body whose vertices changed."""
         self.events.renew_watches(body)
 
     def was_restored(self) -> None:
-        """Record that a snapshot was restored."""
+        """Discard cached results after a snapshot was restored."""
         self._skips = True
         self.mark_changed()
 
     def mark_changed(self) -> None:
-        """Record that the fields changed."""
+        """Discard cached results after the fields changed."""
         self._is_still = False
         self.readout.has_moved()
 
     def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the rows of a body's vertices in the fields."""
+        """Return the rows in the fields for vertices of the body in a slot, (n,)."""
         rows: NDArray[np.int32] = self.scene.bodies[slot].rank[vertices]
         return (rows + self.scene.ranges[slot].particles[0]).astype(np.int32)
 
@@ -345,5 +352,5 @@ class Simulation:
         return float(self.state.body_residual[body.index]) if has_solved else None
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """Return the first failure of the body in a slot."""
+        """Return which element of the body in a slot failed first in the step `failed`."""
         return find_failure(self.state, self.program, self.scene, slot, failed)

@@ -1,4 +1,4 @@
-"""All Taichi fields of one world: those of its bodies, and those of the features that it uses."""
+"""All Taichi fields of one world: the fields of its bodies and of the features that the world uses."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ _NO_CONTACT = ContactCapacity()
 
 @dataclass(frozen=True)
 class Capacity(BodyCapacity):
-    """Capacity of a state, with that for contact."""
+    """Capacity of all fields of a state, including the fields for contact."""
 
     contact: ContactCapacity = _NO_CONTACT
 
     @property
     def has_contact(self) -> bool:
-        """True if the state has fields of contact."""
+        """True if the state has fields for contact."""
         return self.contact != _NO_CONTACT
 
     @property
@@ -53,12 +53,12 @@ class Capacity(BodyCapacity):
 
     @property
     def has_hulls(self) -> bool:
-        """True if the state has fields of hulls."""
+        """True if the state has fields for hulls."""
         return self.contact.hull
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of rows, as `BodyCapacity.counts`, with those of contact."""
+        """Number of rows for each group of fields: `BodyCapacity.counts` and the groups for contact."""
         colliders = self.contact.colliders
         return super().counts | {
             COLLIDER: colliders,
@@ -69,11 +69,11 @@ class Capacity(BodyCapacity):
 
 
 _FIELDS: WeakKeyDictionary[State, list[tuple[str, Declaration, Any]]] = WeakKeyDictionary()
-"""`State.fields`. As attributes of a state, declarations would be part of the keys of cached kernels."""
+"""`State.fields` of each state. As attributes of a state, declarations would change kernels' cache keys."""
 
 
 class State(BodyFields):
-    """The fields of bodies, and the groups of fields of the slices that a world uses."""
+    """Fields of bodies, and a group of fields for each feature that a world uses."""
 
     capacity: Capacity
     grabs: GrabFields
@@ -97,10 +97,10 @@ class State(BodyFields):
         "hull": HullFields,
         "jobs": JobFields,
     }
-    """Further groups of fields, by the attribute that holds them."""
+    """Classes of the further groups of fields, by the attribute of the state that holds the group."""
 
     def __init__(self, capacity: Capacity) -> None:
-        """Allocate fields of `capacity`, filled with zeros until `load`."""
+        """Allocate all fields. They contain zeros until `load`."""
         super().__init__(capacity)
         self.groups: dict[str, FieldGroup] = {}
         for name, kind in self.GROUPS.items():
@@ -110,23 +110,23 @@ class State(BodyFields):
         _FIELDS[self] = self.declared()
         for prefix, group in self.groups.items():
             _FIELDS[self] += [(f"{prefix}.{name}", each, field) for name, each, field in group.declared()]
-        # Fields in a snapshot, by group of rows: (field, column, width). The next step, or a read before it,
-        # depends on them. All other fields are constant, follow from the assets, or are written in each step
-        # before they are read.
+        # Fields that a snapshot stores, by group of rows, each as (field, first column, width). The next
+        # step, or a read before it, depends on these fields. All other fields are constant, follow from the
+        # assets, or are written in each step before they are read.
         self.kept = self._kept()
 
     @property
     def fields(self) -> list[tuple[str, Declaration, Any]]:
-        """`FieldGroup.declared` of all groups, with the names that kernels use, such as `grabs.body`."""
+        """All fields, as (name, declaration, field). Kernels use the same names, such as `grabs.body`."""
         return _FIELDS[self]
 
     @property
     def touching(self) -> Any:
-        """Group of fields with the contact surfaces of bodies."""
+        """Group that contains the fields of the bodies' contact surfaces."""
         return self.hull if self.capacity.contact.hull else self
 
     def is_kept(self, declared: Declaration) -> bool:
-        """True if snapshots store a field. Rest shapes change only if a body is plastic."""
+        """True if snapshots store the field. They store rest shapes only in worlds with plasticity."""
         return declared.keep != "" and (declared.keep != SHAPE or self.capacity.plastic)
 
     def _kept(self) -> dict[str, list[tuple[Any, int, int]]]:

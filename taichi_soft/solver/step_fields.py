@@ -7,7 +7,7 @@ from taichi_soft.core.field_table import BODY, LOADED, WORLD, FieldGroup, declar
 from taichi_soft.core.runtime import ti
 
 MOST_PARTS = 16
-"""Maximum number of parts of an island's bodies. Further threads share these parts."""
+"""Largest number of parts into which an island's bodies are divided. Further threads share these parts."""
 
 
 @ti.dataclass
@@ -15,14 +15,14 @@ class Progress:
     """State of an island within a step. Long steps are split over several kernel calls."""
 
     attempt: ti.i32  # number of the attempt at the step, from 0; or DONE
-    s: ti.i32  # next substep of the attempt
-    is_stable: ti.i32  # 0 if forces changed a velocity by too much at once in the attempt
+    s: ti.i32  # number of the next substep of the attempt
+    is_stable: ti.i32  # 0 if forces in one substep changed a velocity by too much
     failed: ti.i32  # number of failed bodies, after the step
     is_awake: ti.i32
-    candidates: ti.i32  # NONE, OUTDATED or VALID
+    candidates: ti.i32  # state of the contact candidates: NONE, OUTDATED or VALID
     fastest: ti.f32  # highest speed in the last substep [m/s]
     velocity: ti.math.vec3  # mean velocity of the particles before the attempt [m/s]
-    shift: ti.math.vec3  # displacement with that velocity since the last search for candidates [m]
+    shift: ti.math.vec3  # displacement at `velocity` since the last search for candidates [m]
 
 
 @ti.dataclass
@@ -34,30 +34,30 @@ class Moment:
     is_last: ti.i32  # 1 in the last attempt
     h: ti.f32  # length of the substep [s]
     since: ti.f32  # time since the start of the step [s]
-    left: ti.f32  # time until its end [s]
+    left: ti.f32  # time until the end of the step [s]
 
 
 @ti.dataclass
 class Job:
-    """A phase that runs separately for each body of an island, and its arguments."""
+    """Phase that runs separately for each body of an island, with the arguments of the phase."""
 
     phase: ti.i32
     s: ti.i32  # number of the substep, from 0
     substeps: ti.i32  # number of substeps of the attempt
-    has_pairs: ti.i32  # 1 if bodies of the island can touch each other, or themselves
+    has_pairs: ti.i32  # 1 if bodies of the island can touch each other or themselves
     forgets: ti.i32  # 1 if the search must drop the old candidates
     h: ti.f32  # length of the substep [s]
     since: ti.f32  # time since the start of the step [s]
-    left: ti.f32  # time until its end [s]
+    left: ti.f32  # time until the end of the step [s]
     drift_time: ti.f32  # time for which the kick also moves the particles [s]; 0 if they move later
     fastest: ti.f32  # highest speed in the island [m/s]
-    impact_speed: ti.f32  # speed that a body can gain from others in the substep [m/s]
-    velocity: ti.math.vec3  # as in `Progress`
-    shift: ti.math.vec3
+    impact_speed: ti.f32  # speed that a body can gain from impacts in the substep [m/s]
+    velocity: ti.math.vec3  # mean velocity of the island, see `Progress` [m/s]
+    shift: ti.math.vec3  # displacement of the island, see `Progress` [m]
 
 
 class IslandFields(FieldGroup):
-    """Islands, and the results of a substep by body."""
+    """Islands, and the results of the last substep for each body."""
 
     owner, when = "solver", "has_contact"
     count = declare(WORLD, ti.i32, start=LOADED, native=True)
@@ -67,15 +67,15 @@ class IslandFields(FieldGroup):
     of_body = declare(BODY, ti.i32, start=LOADED, keep=BODY)
     parent = declare(BODY, ti.i32)  # parent body in the forest of islands
     sweep_order = declare(BODY, ti.i32, start=LOADED)  # bodies in the order of their lowest x
-    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING of `vibration`
-    is_exploding = declare(BODY, ti.i32)  # 1 if joints and searches ignore it, to protect other bodies
+    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING, see `vibration`
+    is_exploding = declare(BODY, ti.i32)  # 1 if joints and searches ignore the body
     is_stable = declare(BODY, ti.i32)  # 0 if forces changed a velocity by too much
-    has_failed = declare(BODY, ti.i32)  # 1 if it failed, or a solve missed its tolerance, in this step
+    has_failed = declare(BODY, ti.i32)  # 1 if the body failed, stays inverted or was solved inexactly
     body_speed = declare(BODY, ti.f32, unit="m/s")  # highest speed of a particle in this substep
-    # Possible impact speeds, relative to the mean velocity of the island. A touched particle counts with its
-    # speed before the kick, if the integrator is explicit.
-    body_speed_beside = declare(BODY, ti.f32, unit="m/s")  # highest of all particles
-    body_mean_beside = declare(BODY, ti.f32, unit="m/s")  # root mean square over particles
+    # Possible impact speeds, relative to the mean velocity of the island. With explicit integrators,
+    # a touched particle counts with its speed before the kick.
+    body_speed_beside = declare(BODY, ti.f32, unit="m/s")  # highest of all particles of the body
+    body_mean_beside = declare(BODY, ti.f32, unit="m/s")  # root mean square over the body's particles
 
     def load(self, loader: Loader, bodies: int) -> None:
         """Give each body its own island."""
@@ -86,12 +86,12 @@ class IslandFields(FieldGroup):
 
 
 class JobFields(FieldGroup):
-    """Work that threads share: see `kernels/jobs.py`."""
+    """Fields for the work that threads share, see `kernels/jobs.py`."""
 
     owner, when = "solver", "has_contact"
     job = declare(BODY, Job, below={})  # current job of each island
     unfinished_islands = declare(WORLD, ti.i32)  # number of unfinished islands with several bodies
-    useful_helpers = declare(WORLD, ti.i32)  # number of helpers that can find work there
-    parts = declare(WORLD, ti.i32)  # parts into which the bodies of an island are divided, one per thread
+    useful_helpers = declare(WORLD, ti.i32)  # number of helpers that can find work in these islands
+    parts = declare(WORLD, ti.i32)  # number of parts into which an island's bodies are divided
     untaken = declare(BODY, ti.i32, each=MOST_PARTS)  # number of bodies of each part that no thread has taken
-    unfinished = declare(BODY, ti.i32)  # number of bodies of each island with an unfinished phase
+    unfinished = declare(BODY, ti.i32)  # number of bodies of each island that have not finished the job

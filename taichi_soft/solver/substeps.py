@@ -19,19 +19,19 @@ from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, Un
 _log = logging.getLogger(__name__)
 
 _PLAIN = {float, int, np.float64, type(None)}
-"""Types whose values can safely be compared with those of the last step."""
+"""Types of arguments that `choose` can safely compare with the arguments of the last step."""
 
 
 SOFT_CONTACT_STEP = 1 / 240
-"""Longest substep of implicit Euler that is chosen for a world with contact between bodies [s]. The solve
+"""Longest substep that implicit Euler uses by default in a world with contact between bodies [s]. The solve
 ignores forces between bodies, so bodies in a pile look softer with longer substeps: twice this substep
 compresses a pile of three blocks about three times as much, and with four times this substep the pile falls.
 """
 
 
 MANY_SUBSTEPS = 500
-"""Number of substeps per step above which a world warns. A body of 1,000 tetrahedra then takes 8 ms per
-step."""
+"""Number of substeps per step above which a world warns. With 500 substeps, a body of 1,000 tetrahedra takes
+8 ms per step."""
 
 FRAME = 1 / 60
 """Length of the step for which a world is checked when it is built [s]."""
@@ -41,7 +41,7 @@ TET_TIME = 15e-9
 
 
 class Substeps:
-    """Stable and chosen numbers of substeps of one world."""
+    """Estimate and choose the number of substeps of one world."""
 
     def __init__(
         self, pools: Pools[SoftBody], *, has_stable_step: bool, soft_contact: bool | None, most: int | None
@@ -49,14 +49,15 @@ class Substeps:
         """Start without estimates.
 
         Args:
-            has_stable_step: True if longer substeps explode.
-            most: see `World(max_substeps=)`.
+            has_stable_step: True if substeps above a stable length explode.
+            soft_contact, most: see `World(soft_contact=, max_substeps=)`.
         """
         self._pools = pools
         self.has_stable_step, self._soft_contact = has_stable_step, soft_contact
-        self._estimates: dict[BodyDescription, StableStep] = {}  # estimates for bodies with another material
+        # Estimates for bodies that were cut or changed material.
+        self._estimates: dict[BodyDescription, StableStep] = {}
         self._asked: tuple[Any, ...] = ()
-        self._chosen = (0.0, 0, 0.0)  # result for `_asked`
+        self._chosen = (0.0, 0, 0.0)  # result of `choose` for the arguments `_asked`
         self._warned: set[float] = set()
         self._most, self._is_said = most, False
 
@@ -77,9 +78,7 @@ class Substeps:
 
     @property
     def rule(self) -> tuple[float, float]:
-        """Factor and divisor [s] that give the stable number of substeps.
-
-        The number is the length of the step times the factor, over the divisor, rounded up.
+        """Factor f and divisor d [s] of the stable number of substeps, which is f dt / d rounded up.
 
         Raises: StateError for a world without bodies.
         """
@@ -95,14 +94,14 @@ class Substeps:
         return 1.0, longest
 
     def stable_count(self, dt: float) -> int:
-        """Implement `World.stable_substeps`."""
+        """Return the number of substeps for `World.stable_substeps`."""
         share, longest = self.rule
         return max(1, math.ceil(share * as_step(dt) / longest))
 
     def review(self) -> None:
         """Warn before a world is built if a frame needs many substeps.
 
-        Raises: OptionError if a frame needs more than the world allows.
+        Raises: OptionError if a frame needs more substeps than the world allows.
         """
         if self._pools.slots and self.has_stable_step:
             self._require_few(FRAME, self.stable_count(FRAME))
@@ -132,9 +131,9 @@ class Substeps:
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         """Return the length of a step [s], the number of substeps and their length [s], for `World.step`.
 
-        Raises: OptionError.
+        Raises: OptionError for invalid arguments, or if the step needs more substeps than the world allows.
         """
-        asked = (dt, substeps, type(dt), type(substeps))  # types, because 4.0 == 4 and True == 1
+        asked = (dt, substeps, type(dt), type(substeps))  # includes types, because 4.0 == 4 and True == 1
         if not {type(dt), type(substeps)} <= _PLAIN or self._asked != asked:
             self._chosen = self._check(dt, substeps)
             self._asked = asked
@@ -152,7 +151,7 @@ class Substeps:
         _log.info("a step of %g s is made in %d substeps", seconds, count)
         if not self.has_stable_step:
             return seconds, count, h
-        # Do not estimate bodies that were cut or changed material, because the caller chose the number.
+        # Check assets only. Callers choose the number to avoid new estimates for cut or changed bodies.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned:

@@ -1,1 +1,1 @@
-"""Public interface: a world and its bodies."""
+"""Public interface of a world and its bodies."""

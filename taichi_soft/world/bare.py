@@ -8,11 +8,11 @@ from taichi_soft.world.world import World
 
 
 def bare_world(**options: Any) -> World:
-    """Make a world without contact between bodies, without sleep, and without room for more colliders.
+    """Make a world without contact between bodies, without sleep, and without capacity for more colliders.
 
-    Use it for experiments, measurements and tests of one feature: sleep would damp slow bodies, and contact
-    between bodies takes longer to compile. `options` can turn these features on.
+    Use it for experiments, measurements and tests of one feature, because sleep would damp slow bodies, and
+    contact between bodies takes longer to compile.
     Args:
-        options: arguments of `World`.
+        options: arguments of `World`, which can turn these features on.
     """
     return World(**{"soft_contact": False, "sleep_speed": 0.0, "collider_room": 0, **options})

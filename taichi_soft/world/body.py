@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 
 class Body(BodyControl, BodyMeasures):
-    """A handle of one body. Positions and velocities are in the vertex order of its mesh."""
+    """Handle of one body. Positions and velocities are in the order of the mesh's vertices."""
 
     @property
     def _context(self) -> WorldContext:
@@ -53,17 +53,18 @@ class Body(BodyControl, BodyMeasures):
         """Cut the body in its current shape, along the faces of tetrahedra next to a plane or a triangle.
 
         A face opens if the blade passes between the centres of its two tetrahedra. Vertices keep their
-        indices, and copies are appended. Mass, momentum and elastic energy are conserved. Detached pieces
-        become bodies of the same asset in free slots of its pool; this body keeps the largest piece. In each
-        piece, vertices and tetrahedra are numbered again in the same order; `vertex_origins` has the original
-        indices. Attached vertices and their copies stay attached in every piece, see `Attachment`.
+        indices, and copies of split vertices are appended. Mass, momentum and elastic energy are conserved.
+        Detached pieces become bodies of the same asset in free slots of the asset's pool; this body keeps the
+        largest piece. If pieces detach, the vertices and tetrahedra of each piece are renumbered in the same
+        order; `vertex_origins` has the original indices. Attached vertices and their copies stay attached in
+        every piece, see `Attachment`.
         Args:
             plane: (point (3,) [m], normal (3,)) of a cut through the whole body.
             triangle: corners, (3, 3) [m], of a cut that ends at its edges.
         Returns: the detached bodies, the largest first; empty if the body stays connected.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
             `spare_vertices`; StateError if vertices or slots run out, for a body that is frozen, grabbed,
-            joined to another or driven by a motor, and before `build`. After an error, nothing is changed.
+            joined to another body or driven by a motor, and before `build`. An error changes nothing.
         Example:
             pieces = body.cut(plane=((0, 0, 0.25), (1, 0, 0)))
             world.step(1 / 60)
@@ -74,8 +75,8 @@ class Body(BodyControl, BodyMeasures):
     def render_mesh(self, *, crease: float | None = DEFAULT_CREASE) -> RenderMesh:
         """Make a render mesh of the body's surface, with one vertex per side of a sharp edge.
 
-        `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once per frame. A cut or a
-        tear invalidates the render mesh, see `RenderMesh.is_outdated`.
+        Call `EngineAdapter.render_mesh` or `World.read_render_mesh` once per frame to fill the buffers of the
+        render mesh. A cut or a tear invalidates the render mesh, see `RenderMesh.is_outdated`.
         Args:
             crease: angle between adjacent triangles at rest above which their edge is sharp, 0 to 180
                 [degrees]; None shades all edges smooth.
@@ -86,10 +87,10 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def render_meshes(self) -> tuple[SkinMesh, ...]:
-        """Skins of the body (the artist's meshes), in order; empty if its asset has none.
+        """Skins of the body (the artist's meshes), in order; empty if the body's asset has no skin.
 
-        Draw them like a `render_mesh`. Each also has trimesh's `visual`, with texture coordinates and
-        material.
+        Draw a skin like a `render_mesh`. In addition, the attribute `visual` of a skin, from trimesh,
+        contains texture coordinates and material.
         """
         return skin_meshes(self)
 
@@ -106,8 +107,9 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def solve_residual(self) -> float | None:
-        """Largest residual of the last step's implicit solves, over the load on the body; None before the
-        first step.
+        """Largest residual of the last step's implicit solves, over the load on the body.
+
+        None before the first step, and with integrators other than "implicit_euler".
         """
         return self._context.built.solve_residual(self)
 
@@ -115,10 +117,10 @@ class Body(BodyControl, BodyMeasures):
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Set the positions and velocities of the vertices between two steps.
 
-        A frozen body becomes active again, and a change of material is completed at once.
+        A frozen body becomes active again, and a gradual change of material is completed at once.
         Args:
             positions: (n, 3) [m].
-            velocities: (n, 3) [m/s], at the same time.
+            velocities: (n, 3) [m/s], at the time of the positions.
         Raises: OptionError for wrong shapes or numbers that are not finite; StateError before `build`.
         """
         shape = (self.vertex_count, 3)
@@ -129,30 +131,30 @@ class Body(BodyControl, BodyMeasures):
 
     @recorded
     def set_level(self, level: int, *, release: bool = False) -> None:
-        """Change the level of detail, and with it the number of tetrahedra; 0 is the finest level.
+        """Change the level of detail, which determines the number of tetrahedra; level 0 is the finest.
 
         Position, velocity, rotation and deformation are transferred; centre of mass, momentum and angular
         momentum are conserved to round-off. Pins and attachments move to the nearest vertices. Grabs continue
-        at the same point of the rest shape, with the same target and largest force. `topology_version` counts
-        the change of vertices and tetrahedra. `render_meshes` stay valid and follow the new mesh.
+        at the same point of the rest shape, with the same target and largest force. `topology_version`
+        increases, because vertices and tetrahedra change. `render_meshes` stay valid and follow the new mesh.
         Args:
             level: new level, 0 or more.
             release: True releases joints, motors, and attachments that have no vertex at the new level, with
                 an event `Released`. False raises an error in that case.
         Raises: OptionError for a level that the asset does not have; StateError for a body that is frozen or
-            has its own material, for constraints that prevent the change, and before `build`. Then nothing is
-            changed.
+            has its own material, for constraints that prevent the change, and before `build`. An error
+            changes nothing.
         """
         released = set_level(self, level, release)
         clock = self._context.clock
         self._context.built.events.record_released(clock.steps, clock.time, self, released)
 
     def watch_stress(self, threshold: float | None) -> None:
-        """Record a `StressExceeded` in every step in which tetrahedra exceed a stress.
+        """Record a `StressExceeded` in every step in which the stress of tetrahedra exceeds a threshold.
 
-        A tetrahedron is reported again only after its stress was below 0.9 of the threshold. The first call
-        in a world compiles kernels, which takes many seconds with an empty cache, unless `World.warm_up` has
-        compiled them.
+        A tetrahedron is reported again only after its stress has fallen below 0.9 of the threshold. The first
+        call in a world compiles kernels, which takes many seconds with an empty cache, unless `World.warm_up`
+        has compiled them.
         Args:
             threshold: threshold of `tet_stress` [Pa]; None stops watching.
         Raises: OptionError for a threshold that is not above 0; MeshError for a body without tetrahedra;

@@ -39,8 +39,8 @@ class BodyControl(SoftBody):
 
         Further calls before the step add their forces.
         Args:
-            force: total force, (3,) [N]. The share of pinned particles goes to their constraint.
-            particles: particles that it acts on; None means all.
+            force: total force, (3,) [N]. Pins absorb the part of the force on pinned particles.
+            particles: particles on which the force acts; None means all.
         Raises: OptionError for invalid numbers or vertices; StateError before `build` and with schedule
             "flat".
         """
@@ -48,7 +48,7 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
-        """Set the factor on gravity for this body: with 0 it floats, with -1 it rises.
+        """Set the factor on gravity for this body. With 0 the body floats, with -1 it rises.
 
         Args:
             scale: factor on the gravity of the world; 1 in a new body.
@@ -83,7 +83,7 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_linear_damping(self, rate: float) -> None:
-        """Damp all velocities by exp(-rate t), relative to the world at rest.
+        """Make all velocities of the body decay with exp(-rate t), including those of rigid motion.
 
         Args:
             rate: damping rate [1/s], 0 or more; 0 in a new body.
@@ -93,22 +93,21 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_sheltered(self, is_sheltered: bool) -> None:
-        """Shelter the body from the wind of `World.set_wind`, or expose it.
+        """Shelter the body from the wind of `World.set_wind`, or expose the body to it.
 
         Args:
-            is_sheltered: True shelters the body; False in a new body.
+            is_sheltered: True shelters the body. A new body is not sheltered.
         """
         set_sheltered(self, is_sheltered)
 
     @recorded
     def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
-        """Change the momentum at once, with the same change of velocity for all given particles.
+        """Change the momentum at once. All given particles get the same change of velocity.
 
         Args:
-            impulse: total impulse, (3,) [N s]. The share of pinned particles goes to their constraint.
-            particles: particles that it acts on; None means all.
-        Raises: OptionError for invalid numbers or vertices; StateError before `build`. The same applies to
-            the following methods.
+            impulse: total impulse, (3,) [N s]. Pins absorb the part of the impulse on pinned particles.
+            particles: particles on which the impulse acts; None means all.
+        Raises: OptionError for invalid numbers or vertices; StateError before `build`.
         Example:
             body.apply_impulse((0, 0, 2.0 * body.masses.sum()))  # 2 m/s upwards
         """
@@ -123,7 +122,7 @@ class BodyControl(SoftBody):
             impulse: total impulse on all particles within range, (3,) [N s].
             point: centre, (3,) [m].
             radius: range of the impulse [m].
-        Raises: OptionError with the smallest distance if no particle is in range.
+        Raises: as `apply_impulse`; OptionError with the smallest distance if no particle is in range.
         """
         apply_impulse_at_point(self, impulse, point, radius)
 
@@ -135,6 +134,7 @@ class BodyControl(SoftBody):
         Args:
             linear: velocity of the centre of mass, (3,) [m/s].
             angular: angular velocity about the centre of mass, (3,) [rad/s].
+        Raises: OptionError for invalid numbers; StateError before `build`.
         """
         set_velocity(self, linear, angular)
 
@@ -142,15 +142,17 @@ class BodyControl(SoftBody):
     def teleport(
         self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
     ) -> None:
-        """Move the whole body at once, keeping its deformation. Interpolated frames and the targets of pins
-        jump with it.
+        """Move the whole body at once, with its current deformation.
+
+        Interpolated frames and the targets of pins jump with the body.
 
         Args:
             position: new position of the centre of mass, (3,) [m].
             rotation: rotation about the centre of mass from its current orientation, matrix or quaternion
                 (x, y, z, w).
-            keep_velocity: True rotates velocities with the body, False stops it.
-        Raises: OptionError if the body would be below the floor or inside a collider.
+            keep_velocity: True rotates the velocities with the body, False stops the body.
+        Raises: OptionError for invalid numbers, or if the body would be below the floor or inside a collider;
+            StateError before `build`.
         """
         teleport(self, position, rotation, keep_velocity)
 
@@ -160,6 +162,7 @@ class BodyControl(SoftBody):
 
         Args:
             particles: vertices of this body.
+        Raises: OptionError for invalid vertices; StateError before `build`, and for attached vertices.
         Example:
             left = np.flatnonzero(body.mesh.vertices[:, 0] < -0.24)
             body.pin(left)
@@ -181,7 +184,7 @@ class BodyControl(SoftBody):
     def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
         """Move pinned particles in a straight line to `positions` over the next step.
 
-        Then they stay at these positions until they get new targets.
+        Afterwards, the particles stay at these positions until they get new targets.
         Args:
             particles: pinned vertices, (n,).
             positions: targets, (n, 3) [m].
@@ -194,7 +197,7 @@ class BodyControl(SoftBody):
         """Attach particles to a frame, at their current positions relative to the frame.
 
         Args:
-            particles: vertices, which can be pinned.
+            particles: vertices of this body; pinned vertices are allowed.
             frame: frame of the same world.
             two_way: True records the load on the frame: `Attachment.force` and `Attachment.torque`.
         Raises: OptionError for a frame of another world; StateError for a particle that is already attached,
@@ -209,15 +212,16 @@ class BodyControl(SoftBody):
         The joined parts then move together, for any masses and stiffnesses. Action equals reaction, so
         momentum and angular momentum are conserved. A gap, for example after `teleport`, closes only as fast
         as the bodies can follow. There is no contact between the joined parts; with `soft_contact` the rest
-        of the two bodies collides. Joined bodies sleep and wake together. `World.despawn` of either body
-        removes the joint. A frozen body holds the other one in place.
+        of the two bodies collides. Joined bodies sleep and wake together. `World.despawn` of one of the
+        two bodies removes the joint. If one body is frozen, it holds the other body in place.
         Args:
             other: another body of the same world, with tetrahedra unless `onto` is given.
             particles: vertices of this body, preferably of the finer mesh.
-            onto: vertices of `other`, one per particle, to attach to. None attaches each particle at its
-                current position, which must be in a tetrahedron of `other` or just outside.
-        Raises: OptionError for the same body or a body of another world, for invalid vertices, and without
-            `onto` for vertices that are too far away; StateError before `build`, in a world without contact,
+            onto: vertices of `other` to which the particles are attached, one per particle. None attaches
+                each particle at its current position, which must be in a tetrahedron of `other` or just
+                outside it.
+        Raises: OptionError for this body or a body of another world, for invalid vertices, and without `onto`
+            for vertices that are too far away; StateError before `build`, in a world without contact,
             with implicit Euler, and if the world's 64 joints, or their 2,048 particles, are all in use.
         Example:
             rider = world.spawn(ball, position=(0, 0, 0.8))
@@ -237,14 +241,15 @@ class BodyControl(SoftBody):
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab:
-        """Grab the surface with a critically damped spring: `move` pulls the body, `release` ends the grab.
+        """Grab the surface with a critically damped spring.
 
-        The spring holds a patch of about a quarter of the body's size. If the force exceeds the strength of
-        the patch, it acts on the whole body, so that strong pulls do not distort the patch.
+        `Grab.move` pulls the body; `Grab.release` ends the grab. The spring holds a patch of about a quarter
+        of the body's size. If the force exceeds the strength of the patch, the force acts on the whole body,
+        so that strong pulls do not distort the patch.
         Args:
             triangle: triangle of `surface`.
             barycentrics: barycentric coordinates of the point on the triangle, (3,).
-            frequency: frequency of the spring with the whole body attached [Hz].
+            frequency: frequency of the spring with the mass of the whole body [Hz].
             max_force: largest force [N]; None is ten times the body's weight on Earth.
         Raises: OptionError for invalid numbers; MeshError for a body without surface; StateError before
             `build`, with schedule "flat", and if the world's 16 grabs are all in use.
@@ -253,14 +258,14 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_material(self, material: AnyMaterial) -> None:
-        """Change the material to another one of the same type, as if the body had been added with it.
+        """Change the material to another of the same type, as if the body had been added with it.
 
         Positions and velocities do not change, so a different density changes the momentum. In a deformed
         body, a stiffer material has more strain energy, which would throw the body. So stiffness rises
         gradually over 0.5 s, or over 1.3 periods of the slowest vibration if that is longer, and vibrations
-        are damped meanwhile. `material` changes at once. `World.stable_substeps` and steps without `substeps`
-        estimate the new stable step at once (about 0.2 s for 5,000 tetrahedra); with `substeps` there is no
-        estimate and no warning.
+        are damped meanwhile. The property `material` changes at once. `World.stable_substeps` and steps
+        without `substeps` estimate the new stable step at once (about 0.2 s for 5,000 tetrahedra); steps with
+        `substeps` cause no estimate and no warning.
         Args:
             material: material of the same type, valid for the body's law and mesh.
         Raises: MaterialError for another type or invalid constants; StateError before `build`.

@@ -15,14 +15,14 @@ Ints = NDArray[np.int64]
 
 
 class BodyMeasures(SoftBody):
-    """Quantities of a body. Each call computes them in float64 from the body's float32 state."""
+    """Measurements of a body. Each call computes its result in float64 from the body's float32 state."""
 
     def volumes(self) -> Floats:
-        """Signed volume of each tetrahedron, (m,) [m^3]; negative if it is inverted."""
+        """Signed volume of each tetrahedron, (m,) [m^3]; negative for inverted tetrahedra."""
         return measures.tet_volumes(self)
 
     def volume(self) -> float:
-        """Volume of the body [m^3]; inverted tetrahedra count negative."""
+        """Volume of the body [m^3]. Inverted tetrahedra contribute negative volumes."""
         return float(self.volumes().sum())
 
     def flipped_count(self) -> int:
@@ -34,10 +34,10 @@ class BodyMeasures(SoftBody):
         return np.flatnonzero(self.volumes() < 0)
 
     def pose(self) -> Pose:
-        """Rigid motion that fits the rest shape to the body best, weighted by mass.
+        """Rigid motion that best fits the rest shape to the current positions, weighted by mass.
 
-        `mesh.vertices @ pose.rotation.T + pose.position` is the best fit to the positions. The rotation never
-        mirrors, even for a flat or inverted body. For a straight rope, the rotation about its axis is
+        The fitted positions are `mesh.vertices @ pose.rotation.T + pose.position`. The rotation never mirrors
+        the body, even for a flat or inverted body. For a straight rope, the rotation about its axis is
         minimal.
         """
         return measures.pose(self)
@@ -61,7 +61,7 @@ class BodyMeasures(SoftBody):
     def elastic_energy(self) -> float:
         """Elastic energy [J] of springs and of the laws "st_venant_kirchhoff" and "neo_hookean".
 
-        For the other laws this returns 1/2 sum V0 sigma : eps with the linear strain, which is only an
+        For other laws, the result is 1/2 sum V0 sigma : eps with the linear strain, which is only an
         indicator. The stress of these laws is not the derivative of this energy, so without damping the total
         energy can drift.
         """
@@ -70,8 +70,8 @@ class BodyMeasures(SoftBody):
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
 
-        For a body with plasticity, F is the elastic part, relative to the current rest shape. The same
-        applies to all strains and stresses.
+        For a body with plasticity, F is the elastic part, relative to the current rest shape. All strains and
+        stresses are also relative to the current rest shape.
         """
         return measures.deformations(self)
 
@@ -89,16 +89,17 @@ class BodyMeasures(SoftBody):
         """Stress of each tetrahedron, (m, 3, 3) [Pa], in world axes; tension is positive.
 
         This is the Cauchy stress of the body's law, force per current area, without damping. Laws along edges
-        define no stress; for them, it is computed by Hooke's law with the linear strain. Inverted tetrahedra
-        have a finite stress: that of the mirror image, or with "neo_hookean" that of the negative volume.
+        define no stress; for such laws, the stress is computed by Hooke's law with the linear strain.
+        Inverted tetrahedra have a finite stress: the stress of their mirror image, or with "neo_hookean" the
+        stress at the negative volume.
         """
         return measures.tet_stresses(self)
 
     def force_across(self, point: ArrayLike, normal: ArrayLike) -> Floats:
         """Elastic force across a plane, (3,) [N].
 
-        The part of the body on the side of `normal` exerts this force on the other part. It is the sum of
-        `stresses` times the areas in which the plane cuts the tetrahedra. In a body at rest, the force
+        The part of the body on the side of `normal` exerts this force on the other part. The force is the sum
+        of `stresses` times the areas in which the plane cuts the tetrahedra. In a body at rest, the force
         balances the load beyond the plane, to the accuracy with which the mesh resolves the stress.
         Args:
             point: point of the plane, (3,) [m].
@@ -112,11 +113,10 @@ class BodyMeasures(SoftBody):
         return measures.tet_stress(self)
 
     def tet_strain(self) -> Floats:
-        """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), where e is the deviator of
-        `strains`.
+        """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,).
 
-        Under uniaxial tension at constant volume this equals the strain of the tension. A pure change of
-        volume has the equivalent strain 0.
+        e is the deviator of `strains`. Under uniaxial tension at constant volume, the equivalent strain is
+        the axial strain. A pure change of volume has the equivalent strain 0.
         """
         return measures.tet_strain(self)
 

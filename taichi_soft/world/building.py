@@ -93,7 +93,7 @@ def build(context: WorldContext) -> Simulation:
     )
     if has_contact:
         colliders.load(state.colliders, len(pools.slots))
-        woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would make a cycle
+        woken = weakref.WeakMethod(simulation.wake_near)  # a strong reference would create a cycle
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
     _log.info(
         "built a world of %d slots for bodies and %d tetrahedra: schedule %s, %s, %s; %d substeps in 1/60 s",
@@ -125,7 +125,7 @@ def _add_floor(context: WorldContext) -> None:
 
 
 def _schedule(context: WorldContext, device: Device) -> Schedule:
-    """Choose the schedule of a world. Raises: OptionError if the requested schedule lacks a feature."""
+    """Choose the schedule of a world. Raises: OptionError if a feature excludes the requested schedule."""
     settings, request = context.settings, context.contact_request
     asked = settings.schedule
     integrator = INTEGRATORS[settings.integrator]
@@ -210,7 +210,7 @@ def _fill(context: WorldContext, contact: ContactSettings, state: State, program
 
 
 def _warm_up(context: WorldContext, state: State) -> None:
-    """Spawn and despawn a body of each kind, so that nothing compiles during the game."""
+    """Spawn and despawn a body of each kind, so that spawning compiles nothing during the game."""
     for asset in context.slots.kinds:
         slot = context.slots.assets.index(asset)
         if asset.spare_vertices or asset.coarser:

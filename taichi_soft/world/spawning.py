@@ -49,9 +49,7 @@ def add_body(
     on_floor: bool,
     overlap: OverlapName,
 ) -> Body:
-    """Implement `World.add_body` for a new asset. If the asset is a copy of an earlier one, use the earlier
-    one.
-    """
+    """Implement `World.add_body`. If an asset equal to `new` was added before, the body uses that asset."""
     rule, key = Overlap.parse(overlap), _content(new)
     asset = context.slots.added.get(key, new)
     place = _place(context, asset, position, rotation, on_floor)
@@ -63,7 +61,7 @@ def add_body(
 
 
 def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
-    """Return a key of an asset's content. It is equal for copies while one of them exists."""
+    """Return a key that is equal for assets with equal options and the same mesh and material objects."""
     made_of = asset.description
     return (
         id(asset.mesh),
@@ -124,8 +122,7 @@ def _place(
 ) -> ArrayLike:
     """Return the position of the mesh's origin, (3,) [m].
 
-    With `on_floor`, `position` is relative to a body that stands on the floor: its z is the height of the
-    lowest point above the floor.
+    With `on_floor`, z of `position` is the height of the body's lowest point above the floor.
 
     Raises: OptionError for invalid values, and for `on_floor` in a world without a floor.
     """
@@ -142,9 +139,7 @@ def _place(
 
 
 def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:
-    """Raise an OptionError if `rule` forbids overlaps and a body with the initial state `rows` overlaps
-    another.
-    """
+    """Raise an OptionError if `rule` forbids overlaps and a body in the state `rows` overlaps another."""
     if rule is Overlap.REFUSE and context.contact_with_another.soft:
         mesh, starts = asset.mesh, context.slots.starts
         others = (
@@ -169,7 +164,7 @@ def despawn(context: WorldContext, body: Body) -> None:
     simulation = context.fields
     if simulation is not None:
         _release_all(context, body)
-        simulation.wake_near(*simulation.box_of(body))  # wake bodies that may rest on it
+        simulation.wake_near(*simulation.box_of(body))  # wake bodies that can lie on the removed body
     context.slots.leave(body)
     record_of(body).removed_in = context.clock.steps
     if simulation is not None:
@@ -177,7 +172,7 @@ def despawn(context: WorldContext, body: Body) -> None:
 
 
 def _release_all(context: WorldContext, body: Body) -> None:
-    """Release all constraints of a body and reset its own settings. Call this before its slot is emptied."""
+    """Release all constraints of a body, and reset its material and friction, before its slot is emptied."""
     for each in context.slices:
         each.release_body(body)
     present = present_asset(body)

@@ -35,7 +35,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def warm_up_step(context: WorldContext) -> None:
-    """Compile only the kernels of a step. The state of the world stays bit-identical."""
+    """Compile only the kernels of a step. Afterwards, the state of the world is bit-identical."""
     before = take_snapshot(context)
     try:
         context.built.trial_step(SHORTEST)
@@ -77,13 +77,13 @@ def warm_up(context: WorldContext) -> None:
 
 
 def _find_stable_step(context: WorldContext) -> None:
-    """Compute the stable step if it is not yet known."""
+    """Compute the stable step of the world if it is not yet known."""
     if context.slots.occupants:
         context.substeps.stable_count(FRAME)
 
 
 def _fill_pools(context: WorldContext) -> None:
-    """Spawn bodies until there is one of every kind and at least two in total, if slots allow."""
+    """Spawn bodies until each kind has a body and the world has at least two bodies, if slots are free."""
     pools = context.slots
     for wanted in (1, 2):
         for asset in pools.kinds:
@@ -139,7 +139,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
 
 
 def _measure(context: WorldContext, body: Body) -> None:
-    """Call all measurements of a body."""
+    """Call the measurements of a body that compile kernels."""
     _ = body.positions(), body.velocities(), body.pinned
     if len(body.tets):
         body.tet_stress()

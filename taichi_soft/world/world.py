@@ -1,4 +1,4 @@
-"""The class `World`: add bodies, build, step, read."""
+"""Class `World`, with the methods that build a world and run its steps."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ MOST_RETRIES = 10
 
 
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
-    """Soft bodies under gravity, above a floor. SI units, z is up.
+    """World of soft bodies under gravity, above a floor. All units are SI units, and z points up.
 
     By default bodies touch each other and fall asleep, and colliders can be added after `build`. For an
-    experiment that sleep would disturb, or in which bodies pass through each other, turn these features off:
+    experiment that sleep or contact between bodies would disturb, turn these features off:
     `World(soft_contact=False, sleep_speed=0, collider_room=0)`. The schedule "flat" and the integrator
-    "explicit_euler" support none of these features, so they are off there by default. "auto" chooses "flat"
-    for a single large body.
+    "explicit_euler" support none of these features, so the features are off by default with "flat" and
+    "explicit_euler". The schedule "auto" chooses "flat" for a single large body.
 
     Any thread can call a world and its handles, but only one at a time. A concurrent call raises a StateError
     that names both threads, and changes nothing. A call in a process that was forked after Taichi started
@@ -57,35 +57,35 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     Args:
         gravity: acceleration of gravity, (3,) [m/s^2].
-        floor: height of a horizontal floor [m], or None for none.
+        floor: height of a horizontal floor [m], or None for a world without a floor.
         restitution: restitution of the floor, 0 to 1, as in `add_collider`; None applies only the elasticity
-            of the bodies. With the schedule "flat" the floor reflects each vertex separately: with 0, the
-            default there, only the elasticity of the bodies acts, and a damped body can bounce lower with 1
-            than with 0.
+            of the bodies. With the schedule "flat", the floor reflects each vertex separately, and the
+            default is 0. With 0, only the elasticity of the bodies acts, and a damped body can bounce higher
+            than with 1.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". "implicit_euler" is
             stable for every step, but solves a linear system per step, and its damping grows with the step.
-            It divides a step in which edges would change by more than half their length into 2 to 32 parts.
+            If an edge would change by more than half its length, the step is divided into 2 to 32 parts.
         tolerance: largest residual of implicit solves, over the load on the body, 1e-6 to 0.5.
-        most_iterations: largest number of iterations of an implicit solve. If a solve needs more, its last
+        most_iterations: largest number of iterations of an implicit solve. If a solve needs more, the last
             iterate is used, with a `SolverWarning`.
         schedule: "auto", "per_body" or "flat", the loop structure of the computation. It does not change the
             physics.
-        soft_contact: True for contact between soft bodies. None is True if bodies can touch, that is, if
-            there is more than one slot for bodies, or an asset that touches itself.
-        sleep_speed: a body falls asleep if its particles, and those of bodies that it may touch, were slower
-            than this [m/s] for 0.5 s. It wakes when something approaches it or acts on it. None is 0.02 m/s;
-            0 turns sleep off.
-        collider_room: smallest number of colliders that can be added after `build`. None is 15.
-        sample_room: number of grid samples for these colliders. A `HeightFieldShape` or `MeshShape` uses
-            `len(shape.samples)` while its collider exists.
-        retries: number of times that a step that fails for a body is retried, each time with twice the
-            substeps; then there is one more retry with damped vibrations. 0 freezes the body at once, to
-            study a law at a given step. Implicit Euler divides its steps itself.
-        max_substeps: largest number of substeps of a step, and of 1/60 s at `build`; a world that needs more
-            refuses the build or the step. None only warns above 500.
-        record: number of steps that the flight recorder stores, with all calls between them; 0 turns it off.
-            See `save_recording`.
+        soft_contact: True for contact between soft bodies. None means True if bodies can touch: if
+            there is more than one slot for bodies, or an asset whose bodies touch themselves.
+        sleep_speed: largest speed for sleep [m/s]. A body falls asleep if its particles, and the particles of
+            all bodies that it can touch, were slower for 0.5 s. The body wakes when something approaches it
+            or acts on it. None means 0.02 m/s; 0 turns sleep off.
+        collider_room: least number of colliders that can be added after `build`. None means 15.
+        sample_room: number of grid samples for colliders that are added after `build`. A `HeightFieldShape`
+            or `MeshShape` uses `len(shape.samples)` of them while its collider exists.
+        retries: number of retries of a step that fails for a body. Each retry has twice the substeps. One
+            more retry damps the vibrations of the body. 0 freezes the body at once, for example to study a
+            law at a given step. Implicit Euler ignores this number and divides failing steps.
+        max_substeps: largest number of substeps of a step. If 1/60 s needs more substeps, `build` raises an
+            error; if a step needs more, `step` raises an error. None only warns above 500 substeps.
+        record: number of steps that the flight recorder stores, with all calls between them; 0 turns the
+            recorder off. See `save_recording`.
         record_to: file that the flight recorder writes when a body freezes for the first time.
     Raises: OptionError for a value out of range or an unknown name.
     Example:
@@ -189,12 +189,12 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def time(self) -> float:
-        """Time that the world has simulated [s]."""
+        """Simulated time since the start of the world [s]."""
         return self._context.clock.time
 
     @property
     def last_dt(self) -> float:
-        """Length of the last fixed step [s]; 0 before the first."""
+        """Length of the last fixed step [s]; 0 before the first step."""
         return self._context.clock.last_dt
 
     @property
@@ -203,11 +203,10 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         return self._context.fields is not None
 
     def build(self) -> None:
-        """Allocate Taichi fields for all bodies and choose the kernels. Starts Taichi if it is not running.
+        """Start Taichi if it is not running, allocate fields for all bodies, and choose the kernels.
 
         Warns: SlowStepWarning with the cause if 1/60 s takes more than 500 substeps; TooSoftWarning for
-        bodies
-            that collapse under their weight.
+            bodies that collapse under their weight.
         Raises: StateError in a world without bodies and for a second call; OptionError for a body that starts
             inside a collider, or if 1/60 s takes more substeps than `max_substeps`.
         """
@@ -223,9 +222,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
         The number considers all assets with slots, even empty slots, so that spawning changes neither the
         time of a frame nor the motion of other bodies. After a cut or a change of material, the stable step
-        of that body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with
-        `damping`); give `substeps` to avoid this. For implicit Euler the number is 1, or with `soft_contact`
-        the number of substeps of at most 1/240 s.
+        of the changed body is estimated again (about 35 ms for 5,000 tetrahedra, several times as long with
+        `damping`). Steps with `substeps` avoid this estimate. With implicit Euler, the number is 1; if bodies
+        can touch, it is the smallest number with substeps of at most 1/240 s.
         Args:
             dt: length of the fixed step [s], above 0.
         """
@@ -234,17 +233,18 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s].
 
-        If a body becomes non-finite, the step is retried for it and the bodies that it may touch, with up to
-        eight times the substeps (`World(retries=3)`). If that fails, the body is frozen in its state before
-        the step, with a `FrozenBodyWarning` and `body.failure`; other bodies continue.
+        If a body becomes non-finite, the step is retried for the body and all bodies that it can touch, with
+        up to eight times the substeps (`World(retries=3)`). If all retries fail, the body is frozen in its
+        state before the step, with a `FrozenBodyWarning` and `body.failure`; other bodies continue.
+
         On Ctrl-C, a step of less than about 0.03 s is completed. A longer step stops within a second, and the
         state before it is restored.
         Args:
             dt: length of the fixed step [s], above 0.
             substeps: number of equal substeps, 1 or more; None uses `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once per world; SolverWarning for inexact solves of implicit
-            Euler, and once for a body with inverted tetrahedra for 120 steps.
+            asset; SlowStepWarning as in `build`, once per world; SolverWarning for inexact solves of implicit
+            Euler, and once for each body that has had inverted tetrahedra for 120 steps.
         Raises: OptionError if dt is not a positive number, substeps is not a positive integer, or more than
             `max_substeps` are needed; StateError before `build`.
         Example:
@@ -289,7 +289,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._recorder.rewind(self._context, data)
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
-        """Make a step that Ctrl-C can interrupt. On Ctrl-C, restore the state before it."""
+        """Make a step that Ctrl-C can interrupt. On Ctrl-C, restore the state before the step."""
         before = take_snapshot(self._context)
         try:
             self._push()
@@ -300,13 +300,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @recorded
     def warm_up(self) -> None:
-        """Compile all kernels that a game can call, for example behind a loading screen, to avoid pauses
-        later.
+        """Compile all kernels that a game can call, to avoid pauses later.
 
-        Without this call, each kind of call compiles kernels at its first use: 0.1 s to 1 s with an empty
-        cache, less in later processes. The first step with contact and the first `Body.watch_stress` take
-        many seconds. A terminal shows the progress. The world's state stays bit-identical. `Body.failure` is
-        not compiled, because it is rarely needed.
+        Call this for example behind a loading screen. Otherwise, the first call of each method compiles
+        kernels, which takes 0.1 s to 1 s with an empty cache, and less in later processes. The first step
+        with contact and the first `Body.watch_stress` take many seconds. Progress is shown in a terminal. The
+        world's state stays bit-identical. The kernels of `Body.failure` are not compiled, because they are
+        rarely needed.
 
         Raises: StateError before `build`.
         """
@@ -319,7 +319,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._context.fields.wake_all()
 
     def set_force_field(self, function: ForceField | None) -> None:
-        """Accelerate all bodies by a function of position and time; None removes it.
+        """Accelerate all bodies by a function of position and time. None removes the function.
 
         Args:
             function: (positions float32 (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2], called once

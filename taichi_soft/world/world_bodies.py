@@ -40,14 +40,12 @@ class WorldBodies(WorldParts):
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """All bodies, in the order of their slots. Bodies of `add_body` are in the order in which they were
-        added.
-        """
+        """All bodies, in the order of their slots. Bodies from `add_body` are in the order of the calls."""
         return cast("tuple[Body, ...]", self._context.slots.occupants)
 
     @property
     def slot_count(self) -> int:
-        """Number of slots for bodies, including empty ones."""
+        """Number of slots for bodies, including empty slots."""
         return len(self._context.slots.slots)
 
     def add_body(
@@ -70,12 +68,12 @@ class WorldBodies(WorldParts):
         tearing: Tearing | None = None,
         overlap: OverlapName = Overlap.PART,
     ) -> Body:
-        """Add a body before `build`, with its own asset and slot.
+        """Add a body before `build`, with a slot for it.
 
         Bodies with the same mesh, material and options share an asset.
         Args:
-            mesh: rest shape [m], or a `SoftBodyAsset`. An asset contains all options of a kind of body: with
-                it, give only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
+            mesh: rest shape [m], or a `SoftBodyAsset`. An asset contains all options of a kind of body. With
+                an asset, give only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
             material: material constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a
                 mesh.
             law: force law, a key of `LAWS`; None uses "neo_hookean", or the law that the material and the
@@ -83,22 +81,23 @@ class WorldBodies(WorldParts):
             strain: "linear" or "exact", for laws that support both; None uses the default of the law.
             flips: treatment of inverted tetrahedra: "tolerant", "recover" or "off"; None uses the default of
                 the law.
-            damping_model: "edge" damps along edges, "tet_mean" towards the mean of each tetrahedron.
+            damping_model: "edge" damps along edges; "tet_mean" damps towards the mean velocity of each
+                tetrahedron.
             position: position of the mesh's origin, (3,) [m]. The origin of built-in shapes is their centre;
                 the origin of an artist's mesh is that of its file.
             rotation: rotation about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w); None for no
                 rotation.
             velocity: velocity of all vertices that are not pinned, (3,) [m/s].
-            on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
-                vertex, or below the lowest point of its hull [m].
-            overlap: for a body that starts inside another body, in a world in which bodies touch: "part"
-                moves the two apart in the next steps, "refuse" raises an error.
+            on_floor: True places the body on the floor. Then z of `position` is the height of its lowest
+                vertex, or of the lowest point of its hull, above the floor [m].
+            overlap: rule for a body that starts inside another body, if bodies can touch: "part" moves the
+                two bodies apart in the next steps, "refuse" raises an error.
             pinned: vertices that stay fixed.
             contact: friction, thickness and groups of the body's surface.
-            plasticity: permanent deformation; None for none.
-            spare_vertices: capacity for the vertices that `Body.cut` adds, about n^(2/3) for a cut through n
-                vertices; 0 for a body that cannot be cut.
-            tearing: tearing by stress, which uses the spare vertices; None for none.
+            plasticity: permanent deformation; None for a body without plasticity.
+            spare_vertices: capacity for the vertices that `Body.cut` adds, about n^(2/3) for a cut through a
+                body of n vertices; 0 for a body that cannot be cut.
+            tearing: tearing by stress, which uses the spare vertices; None for a body that does not tear.
         Returns: a handle of the body.
         Raises: MeshError, MaterialError or OptionError for invalid arguments; StateError after `build`.
         Example:
@@ -161,12 +160,12 @@ class WorldBodies(WorldParts):
             velocity: velocity of the centre of mass, (3,) [m/s].
             angular_velocity: angular velocity about the centre of mass, (3,) [rad/s]. Pinned vertices are at
                 rest.
-            on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
-                vertex, or below the lowest point of its hull [m].
-            overlap: for a body that starts inside another body, in a world in which bodies touch: "part"
-                moves the two apart in the next steps, "refuse" raises an error.
+            on_floor: True places the body on the floor. Then z of `position` is the height of its lowest
+                vertex, or of the lowest point of its hull, above the floor [m].
+            overlap: rule for a body that starts inside another body, if bodies can touch: "part" moves the
+                two bodies apart in the next steps, "refuse" raises an error.
         Returns: a new handle.
-        Raises: OptionError for a value or a position out of range, a position below the floor, inside a
+        Raises: OptionError for a value or a position out of range, and for a body below the floor, inside a
             collider or, with "refuse", inside another body; StateError for an asset without slots in this
             world, or without a free slot.
         Example:
@@ -178,7 +177,7 @@ class WorldBodies(WorldParts):
 
     @recorded
     def despawn(self, body: Body) -> None:
-        """Remove a body from the world. This frees its slot and invalidates its handle.
+        """Remove a body from the world. Its slot becomes free, and its handle becomes invalid.
 
         Args:
             body: body of this world.
@@ -192,9 +191,10 @@ class WorldBodies(WorldParts):
 
         The bodies keep their velocities and continue in the step after the next. A body that skips every
         other step moves at half its speed. Gravity and force fields do not act on a skipping body; impulses
-        take effect when it continues. A body does not skip if a body of its island (see `islands`) makes the
-        step, if it is attached, near a moving collider, pushed by `apply_force`, or has moving targets.
-        Sleeping and frozen bodies do not change. Further calls before the step add bodies.
+        take effect when the body continues. A body makes the step after all if it is attached, near a moving
+        collider or pushed by `apply_force`, if its pins have moving targets, or if another body of its island
+        (see `islands`) makes the step. Sleeping and frozen bodies do not change. Further calls before the
+        step add bodies.
         Args:
             bodies: bodies of this world.
         Raises: OptionError if `bodies` is not a list of this world's bodies; StateError for a removed body,
@@ -209,18 +209,19 @@ class WorldBodies(WorldParts):
 
     @property
     def islands(self) -> list[tuple[Body, ...]]:
-        """Islands: groups of bodies that came near each other in the last step or are joined, directly or
-        through others.
+        """Islands, that is, groups of bodies that came near each other in the last step or are joined.
 
-        Each body is in exactly one island, and islands are sorted by slot. With `soft_contact=False` only
-        joints form islands. A body spawned since the last step is a separate island.
+        Bodies can also be connected through other bodies. Each body is in exactly one island, and islands are
+        sorted by slot. With `soft_contact=False` only joints form islands. A body spawned since the last step
+        is a separate island.
         Raises: StateError before `build`.
         """
         return cast("list[tuple[Body, ...]]", self._built.islands())
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate the largest stable substep of a body. Bodies of one asset have the same estimate until
-        they are cut.
+        """Estimate the largest stable substep of a body.
+
+        Bodies of one asset have the same estimate until they are cut or change material.
 
         Args:
             body: body of any world.
@@ -231,7 +232,7 @@ class WorldBodies(WorldParts):
         return self._context.substeps.stable_step(body)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
-        """Read the positions of a body, interpolated between the previous step (alpha 0) and the last one
+        """Read the positions of a body, interpolated between the previous step (alpha 0) and the last step
         (alpha 1), (n, 3) [m].
 
         The first call after a step copies the positions of all bodies. Further calls with the same alpha read
@@ -257,14 +258,14 @@ class WorldBodies(WorldParts):
         normals: Floats32 | None = None,
     ) -> tuple[Floats32, Floats32]:
         """Read the positions and normals of a render mesh, interpolated between the previous step (alpha 0)
-        and the last one (alpha 1).
+        and the last step (alpha 1).
 
         A normal is the mean of the normals of the triangles around its vertex, weighted by area, so
         degenerate triangles do not contribute. If all triangles are degenerate, the normal is (0, 0, 1). Each
         call runs one kernel.
         Args:
-            mesh: render mesh of a body of this world, see `Body.render_mesh`; or a body, for the first of its
-                `render_meshes`.
+            mesh: render mesh of a body of this world, see `Body.render_mesh`; or a body, which means the
+                first of its `render_meshes`.
             positions, normals: C-contiguous float32 arrays (k, 3) to fill; None allocates new ones.
             alpha: interpolation factor, 0 to 1.
         Returns: positions [m] and outward unit normals of the render vertices.
@@ -287,7 +288,7 @@ class WorldBodies(WorldParts):
 
 
 def _require_defaults(material: AnyMaterial | None, options: dict[str, Any]) -> None:
-    """Raise an OptionError for options that were given although the asset already contains them."""
+    """Raise an OptionError for options that the caller passed together with an asset."""
     defaults = {field.name: field.default for field in fields(SoftBodyAsset)}
     given = [name for name, value in options.items() if value is not defaults[name]]
     if material is not None or given:

@@ -31,7 +31,7 @@ from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
 
 SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears, Easings)
-"""Slices in the order in which a snapshot restores them. Each is after those on which it depends."""
+"""Slices in the order in which a snapshot restores them. A slice comes after the slices that it needs."""
 
 
 class WorldControl(WorldParts):
@@ -64,8 +64,9 @@ class WorldControl(WorldParts):
 
     @property
     def floor_collider(self) -> Collider | None:
-        """Collider of the floor after `build`, in worlds with colliders, for example to read impulses
-        on it.
+        """Collider of the floor, for example to read impulses on the floor.
+
+        None before `build`, and in worlds without a floor or without colliders.
         """
         return self._context.floor_collider
 
@@ -82,29 +83,29 @@ class WorldControl(WorldParts):
         group: int = 1,
         mask: int = ALL_GROUPS,
     ) -> Collider:
-        """Add a collider, which the vertices of bodies collide with.
+        """Add a collider. The vertices of bodies collide with its surface.
 
-        A shape smaller than the triangles of a body can slip between its vertices. After `build` there is
-        room for `World(collider_room=15)` more colliders, with `sample_room` samples of height fields and
-        meshes.
+        A shape smaller than the triangles of a body can slip between the body's vertices. After `build`, at
+        least `World(collider_room=15)` more colliders can be added, with `sample_room` samples for height
+        fields and meshes.
         Args:
             shape: `PlaneShape`, `SphereShape`, `BoxShape`, `CapsuleShape`, `HeightFieldShape` or `MeshShape`.
             position: position of the collider's origin, (3,) [m].
             rotation: rotation of the collider, matrix (3, 3) or quaternion (x, y, z, w).
             friction: Coulomb coefficient, 0 or more.
             restitution: speed of a body's centre of mass after an impact over its speed before, 0 to 1, for
-                impacts faster than 0.5 m/s. The elasticity of the body limits it; None applies only that
-                elasticity.
+                impacts faster than 0.5 m/s. The elasticity of the body limits the restitution; with None,
+                only the elasticity acts.
             thickness: distance outside the shape at which contact begins [m].
             group, mask: groups as bits. A body and a collider collide if the mask of each contains a bit of
                 the other's group.
-        Returns: a handle, to move the collider and to read the impulse on it.
-        Raises: OptionError for invalid values; StateError if there is no room left.
+        Returns: a handle to move the collider and to read the impulse on the collider.
+        Raises: OptionError for invalid values; StateError if the capacity for colliders is used up.
         Example:
             lift = world.add_collider(BoxShape((1, 1, 0.1)), position=(3, 0, 0.2))
             lift.move_to((3, 0, 0.25))  # its position after the next step
             world.step(1 / 60)
-            print(lift.impulse)  # from the bodies on it [N s]
+            print(lift.impulse)  # from the bodies on the lift [N s]
         """
         if self._context.fields is not None:
             require_per_body(self._context, "colliders beside the floor")
@@ -123,8 +124,9 @@ class WorldControl(WorldParts):
 
     @recorded
     def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
-        """Add a frame: a pose that the game moves and bodies can be attached to. Allowed at any time.
+        """Add a frame: a pose that the game moves, and to which bodies can be attached.
 
+        Frames can be added at any time.
         Args:
             position: position of the frame's origin, (3,) [m].
             rotation: rotation of the frame, matrix (3, 3) or quaternion (x, y, z, w).
@@ -150,9 +152,10 @@ class WorldControl(WorldParts):
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab | None:
-        """Grab the first body that a ray hits, as `raycast` and `Body.grab` do.
+        """Grab the first body that a ray hits, with `raycast` and `Body.grab`.
 
-        Colliders do not stop the ray. If your level blocks the view, limit the ray with `max_distance`.
+        Colliders do not stop the ray. If walls of the level block the view, limit the ray with
+        `max_distance`.
 
         Args:
             origin, direction, max_distance, bodies: see `raycast`.
@@ -189,29 +192,29 @@ class WorldControl(WorldParts):
         is_fixed: bool = False,
         point: ArrayLike | None = None,
     ) -> Motor:
-        """Add a motor, which rotates a part of a body about an axis, or pushes it along the axis, up to a
-        target speed.
+        """Add a motor, which rotates a part of a body about an axis or pushes the part along the axis.
 
-        The motor accelerates the particles as a rigid part; the rest of the body follows by its elasticity.
-        The torque or force is external, as from a shaft in the level: no other body receives a reaction. The
-        motor does not keep the body on the axis. With implicit Euler, elastic forces act after the motor, so
-        heavily loaded particles stay below the target speed; more substeps reduce the difference.
+        The motor accelerates the particles as a rigid part, up to a target speed; the rest of the body
+        follows by its elasticity. The torque or force is external, as from a shaft in the level: no other
+        body receives a reaction. The motor does not keep the body on the axis. With implicit Euler, elastic
+        forces act after the motor, so heavily loaded particles stay below the target speed; more substeps
+        reduce the difference.
         Args:
             body: body of this world.
             particles: vertices to drive. Pinned vertices stay fixed.
-            axis: direction (3,), of any nonzero length, for the current pose of the body.
-            speed: target speed, right-handed about the axis [rad/s] or along it [m/s]. 0 brakes the
+            axis: direction (3,) of the axis in the body's current pose, of any nonzero length.
+            speed: target speed, right-handed about the axis [rad/s] or along the axis [m/s]. 0 brakes the
                 particles.
             max_torque: largest torque about the axis [N m]. Give this to rotate the particles.
             max_force: largest force along the axis [N]. Give this to push the particles.
-            is_fixed: False rotates the axis with the particles, as for a wheel or a rocket. True fixes its
-                direction in space, as for a mill or for steering.
+            is_fixed: False rotates the axis with the particles, as for a wheel or a rocket. True fixes the
+                direction of the axis in space, as for a mill or for steering.
             point: point of a fixed axis, (3,) [m], with `is_fixed` and `max_torque`. By default the axis
                 passes through the centre of mass of the particles.
         Returns: a handle to change the speed and the limit, to read the effort, and to remove the motor.
-        Raises: OptionError for invalid numbers or vertices, a body of another world, both limits or none, and
-            without `is_fixed` for particles on a line; StateError before `build`, with schedule "flat", and
-            if the world's 64 motors, or their 16,384 particles, are all in use.
+        Raises: OptionError for invalid numbers or vertices, a body of another world, both limits or no limit,
+            and without `is_fixed` for particles on a line; StateError before `build`, with schedule "flat",
+            and if the world's 64 motors, or their 16,384 particles, are all in use.
         """
         require_own(self._context, body)
         motors = self._context.of(Motors)
@@ -219,14 +222,14 @@ class WorldControl(WorldParts):
 
     @recorded
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
-        """Push all bodies away from a point: an explosion.
+        """Push all bodies away from a point, as an explosion does.
 
-        A particle of mass m at the distance r receives impulse m/M (1 - (r/radius)^2)^2, where M is the mass
-        of its body: a light body is thrown farther than a heavy one, and the impulse acts only on the part of
-        a body within the radius.
+        A particle of mass m at the distance r receives `impulse` times m/M (1 - (r/radius)^2)^2, where M is
+        the mass of its body. So a light body is thrown farther than a heavy body, and the impulse acts only
+        on the part of a body within the radius.
         Args:
             center: centre of the explosion, (3,) [m].
-            impulse: impulse on a small body near the centre [N s]; a negative one pulls.
+            impulse: impulse on a small body near the centre [N s]; a negative impulse pulls.
             radius: range of the impulse [m].
         Raises: OptionError for a number out of range; StateError before `build`.
         """
@@ -234,7 +237,7 @@ class WorldControl(WorldParts):
 
     @recorded
     def set_gravity(self, gravity: ArrayLike) -> None:
-        """Change gravity from the next step on, and wake all bodies. Can also be called before `build`.
+        """Change gravity from the next step on, and wake all bodies. This call also works before `build`.
 
         With leapfrog, velocities lag by half a substep, and the new gravity also applies to that half. Bodies
         that are too soft for their new weight cause no warning.
@@ -248,7 +251,7 @@ class WorldControl(WorldParts):
     def set_friction(self, friction: float) -> None:
         """Change the floor's Coulomb coefficient from the next step on, and wake all bodies.
 
-        Can also be called before `build`. For other colliders, see `Collider.set_friction`; for contact
+        This call also works before `build`. For other colliders, see `Collider.set_friction`; for contact
         between bodies, see `Body.set_friction`.
         Args:
             friction: Coulomb coefficient, 0 or more.
@@ -265,10 +268,10 @@ class WorldControl(WorldParts):
         """Set the wind, which acts on the surfaces of all bodies.
 
         A triangle of area A, with the relative air speed v_n along its normal n, receives the force 1/4
-        density drag A |v_n| v_n n. This is half of the drag of a plate, because a closed body, or a sheet
-        with triangles for each side, has one triangle facing the wind and one facing away. So the drag
-        coefficient of a box is `drag`, and that of a sphere is half of it. The wind never accelerates a
-        vertex beyond the wind's speed.
+        density drag A |v_n| v_n n. This force is half the drag of a plate, because a closed body, or a sheet
+        with triangles on both sides, has one triangle that faces the wind and one triangle that faces away.
+        So the drag coefficient of a box is `drag`, and the drag coefficient of a sphere is half of `drag`.
+        The wind never accelerates a vertex beyond the wind's speed.
         Args:
             velocity: velocity of the air, (3,) [m/s]; zero means still air, which brakes bodies; None means
                 no air.

@@ -15,14 +15,14 @@ class WorldEvents(WorldParts):
     """Methods of a world that record and return events."""
 
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
-        """Record only events of these kinds for `drain_events`, from the next step on.
+        """Record events of these kinds only, from the next step on. `drain_events` returns the events.
 
-        Contacts that already exist are reported as beginning in that step. `StressExceeded` and
+        Contacts that already exist are reported as new contacts in that step. `StressExceeded` and
         `TearCandidates` are sent only for bodies on which you called `Body.watch_stress` or
         `Body.watch_tearing`.
         Args:
             kinds: classes of events; `Event` means all kinds that this world supports; an empty list means
-                none.
+                no events.
         Raises: OptionError for a class that is not an event; StateError before `build`, and for contacts in a
             world without colliders and soft contact.
         """
@@ -37,7 +37,7 @@ class WorldEvents(WorldParts):
         Args:
             kind: a class of events; `Event` means all kinds that this world supports.
             function: function that is called with each event.
-        Returns: a listener. Call its `remove` to end it.
+        Returns: a listener. Its method `remove` ends the calls.
         Raises: as `record_events`; OptionError for a function that is not callable.
         Example:
             listener = world.on(ContactBegan, lambda event: print(event.a, "touches", event.b))
@@ -50,13 +50,12 @@ class WorldEvents(WorldParts):
     def drain_events(self) -> list[Event]:
         """Call the listeners, and return all events since the last call.
 
-        Events are sorted by step; within a step by kind (released before the step, contacts begun and ended,
-        stress, tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. Up to
-        10,000 events can wait; beyond that, the oldest are dropped, with a `DroppedEventsWarning` in the
-        step.
+        Events are sorted by step, then by kind (released before the step, contacts begun and ended, stress,
+        tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. If more than 10,000
+        events wait, the oldest events are dropped, and the step warns with a `DroppedEventsWarning`.
 
         If a listener raises an exception, the other listeners are still called, and the first exception is
-        raised at the end. The next call then returns the same events together with new ones, and calls no
+        raised at the end. The next call then returns the same events together with new events, and calls no
         listener twice for an event.
         Raises: StateError before `build`, before any kind is recorded, and inside a listener.
         """

@@ -23,7 +23,7 @@ from taichi_soft.world.world_parts import WorldParts
 
 
 class WorldQueries(WorldParts):
-    """Methods of a world that search its surfaces."""
+    """Methods of a world that search the surfaces of its bodies."""
 
     def raycast(
         self,
@@ -36,14 +36,14 @@ class WorldQueries(WorldParts):
     ) -> RayHit | None:
         """Find the first hit of a ray on the deformed surfaces after the last step.
 
-        Bodies without triangles, such as ropes, cannot be hit. Between equally near triangles, the first one
-        of the first body wins. All queries include frozen bodies.
+        Bodies without triangles, such as ropes, cannot be hit. If several triangles are equally near, the hit
+        is on the first triangle of the first body. All queries include frozen bodies.
         Args:
             origin: start of the ray, (3,) [m].
             direction: direction of the ray, (3,), of any nonzero length.
             max_distance: largest distance of a hit [m]; infinity for no limit.
             bodies: bodies to test; None for all.
-            cull_back: True ignores back faces, so that a ray from inside a body leaves it.
+            cull_back: True ignores back faces, so that a ray from inside a body leaves the body.
         Returns: the hit, or None.
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
@@ -69,7 +69,7 @@ class WorldQueries(WorldParts):
         Args:
             origins, directions: starts [m] and directions of the rays, (n, 3) each.
             max_distance, bodies, cull_back: as in `raycast`, for all rays.
-        Returns: arrays with one row per ray, with the results of `raycast`.
+        Returns: the results of `raycast` as arrays with one row per ray.
         Raises: as `raycast`.
         """
         state, slots = self._built.state, self._context.slots.slots
@@ -78,14 +78,14 @@ class WorldQueries(WorldParts):
     def closest_point(
         self, point: ArrayLike, *, max_distance: float = math.inf, bodies: Iterable[Body] | None = None
     ) -> ClosestPoint | None:
-        """Find the point of all surfaces that is closest to `point`, from outside or inside.
+        """Find the point of all surfaces that is closest to `point`, which can be outside or inside a body.
 
-        For a body without triangles, such as a rope, this is the closest vertex.
+        For a body without triangles, such as a rope, only the vertices are searched.
         Args:
             point: point to search from, (3,) [m].
             max_distance: largest distance [m]; infinity for no limit.
             bodies: bodies to test; None for all.
-        Returns: the closest point, or None if none is in range.
+        Returns: the closest point, or None if no point is in range.
         Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
             another world; StateError before `build`.
         """
@@ -96,7 +96,7 @@ class WorldQueries(WorldParts):
     ) -> tuple[Overlap, ...]:
         """Find the bodies that touch or enclose a sphere.
 
-        Of a body without triangles, only the vertices are tested.
+        For a body without triangles, only the vertices are tested.
         Args:
             center: centre of the sphere, (3,) [m].
             radius: radius of the sphere [m], above 0.
@@ -117,7 +117,7 @@ class WorldQueries(WorldParts):
     ) -> tuple[Overlap, ...]:
         """Find the bodies that touch or enclose a box.
 
-        Of a body without triangles, only the vertices are tested.
+        For a body without triangles, only the vertices are tested.
         Args:
             center: centre of the box, (3,) [m].
             size: lengths of the edges of the box, (3,) [m], above 0.

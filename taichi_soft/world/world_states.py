@@ -13,12 +13,12 @@ class WorldStates(WorldParts):
     """Methods of a world that save, restore and compare states."""
 
     def snapshot(self) -> bytes:
-        """Return the complete state between two steps, for `restore` in this world or an identical one.
+        """Return the complete state between two steps, for `restore` in this world or an identical world.
 
         The snapshot contains bodies, colliders, frames, grabs, attachments and joints, gravity, wind, changed
         materials and frictions, all forces of the next step, and current contacts if their events are
-        recorded, but no force field. It contains no code. The first call compiles kernels for a few seconds
-        at most.
+        recorded, but no force field. The snapshot contains no code. The first call compiles kernels for a few
+        seconds at most.
         Raises: StateError before `build`.
         Example:
             before = world.snapshot()  # bytes: keep them in a file, or send them
@@ -31,16 +31,15 @@ class WorldStates(WorldParts):
         return data
 
     def restore(self, data: bytes) -> None:
-        """Restore a state that `snapshot` returned. After the same calls, the following steps are
-        bit-identical.
+        """Restore a state that `snapshot` returned. The same calls then give bit-identical steps.
 
         Handles of objects in the state stay valid, or become valid again; other handles become invalid, as
-        after a removal. `bodies` and `colliders` provide new handles for objects that have none. The force
-        field and listeners do not change. The bodies whose stress is watched are restored, and bodies watched
-        only now stay watched. Waiting events of undone steps are dropped. Repeating the steps records these
-        events again, even those that were drained before.
+        after a removal. `bodies` and `colliders` provide new handles for objects without a valid handle. The
+        force field and listeners do not change. Bodies whose stress was watched in that state are watched
+        again, and bodies that are watched now stay watched. Waiting events of undone steps are dropped.
+        Repeating the steps records these events again, even those that were drained before.
         Args:
-            data: result of `snapshot`, from this world or one that was built the same way.
+            data: result of `snapshot`, from this world or a world that was built in the same way.
         Raises: SnapshotError for damaged data, or for a world that was built differently, with the first
             difference; OptionError for data that is not bytes; StateError before `build`.
         """
@@ -51,20 +50,23 @@ class WorldStates(WorldParts):
 
     @property
     def restore_count(self) -> int:
-        """Number of `restore` calls. If it has changed, earlier stored states belong to another history."""
+        """Number of `restore` calls.
+
+        If this number has changed, states that you stored before can belong to undone steps.
+        """
         return self._restore_count
 
     def state_hash(self) -> str:
         """Return a hash of the state, 16 hexadecimal digits. Two synchronised worlds have the same hash.
 
         The hash covers step count, gravity, positions, velocities, pins, the status of bodies, colliders,
-        frames, grabs and joints. It does not depend on the number of threads.
+        frames, grabs and joints. The hash does not depend on the number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self._context)
 
     def bodies_hash(self) -> str:
-        """Return a hash of the state of all bodies, 16 hexadecimal digits. The exported world has the same
+        """Return a hash of the state of all bodies, 16 hexadecimal digits. An exported world has the same
         hash.
 
         In an exported world, call `ts_world_hash` in C and `world.hash()` in JavaScript. The hash covers
@@ -75,13 +77,13 @@ class WorldStates(WorldParts):
         return bodies_hash(self._context)
 
     def save_recording(self, path: str | Path) -> Path:
-        """Write a recording of at least the last `record` steps to a file: the snapshot before them, and all
-        calls.
+        """Write a recording of at least the last `record` steps to a file.
 
-        The recording excludes steps that `restore` has undone. After a `restore` of a state that the recorder
-        does not store, the recording starts again from that state. `taichi-soft replay FILE` replays it on
-        any machine, bit by bit on the same kind of machine. The file also contains the assets and shapes, and
-        the accelerations of a force field, but no code.
+        A recording contains the snapshot before these steps, and all calls. It excludes steps that `restore`
+        has undone. After a `restore` of a state that the recorder does not store, the recording starts again
+        from that state. `taichi-soft replay FILE` repeats the steps on any machine, and bit by bit on the
+        same kind of machine. The file also contains the assets and shapes, and the accelerations of a force
+        field, but no code.
         Args:
             path: path of the file.
         Returns: the path.

@@ -1,5 +1,8 @@
-"""Integrators. To add one that evaluates forces once per substep, write one file, and add one line here and
-its name in `core.types`."""
+"""Integrators of a step.
+
+To add an integrator that evaluates forces once per substep, write its file, add one line here, and add its
+name to `core.types`.
+"""
 
 from taichi_soft.solver.integrators.explicit_euler import EXPLICIT_EULER
 from taichi_soft.solver.integrators.implicit_euler import IMPLICIT_EULER

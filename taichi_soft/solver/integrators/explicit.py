@@ -1,4 +1,4 @@
-"""Functions of all explicit integrators, which use the forces at the old positions."""
+"""Functions that all explicit integrators share. These integrators use the forces at the old positions."""
 
 from taichi_soft.control.kernels.drives import add_reactions
 from taichi_soft.control.kernels.grabs import pull_grabs
@@ -14,9 +14,7 @@ def whole_substep(lag, h, s):
 
 @ti.func
 def before_each(h, s, substeps):
-    """Return the time for which external forces act before a substep: the whole substep, or 0 after the last
-    one [s].
-    """
+    """Return the time for which external forces act before substep `s` [s]; 0 if `s` equals `substeps`."""
     return ti.select(s < substeps, h, 0.0)
 
 
@@ -30,5 +28,5 @@ def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def any_shape(state: ti.template(), body, h, is_last):
-    """Return 1: accept every shape. `kick_by_forces` checks changes of velocity instead."""
+    """Return 1, to accept every shape. `kick_by_forces` checks the changes of velocity instead."""
     return 1

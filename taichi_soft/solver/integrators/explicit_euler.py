@@ -1,4 +1,7 @@
-"""Explicit Euler (thesis section 3.5.1, eq. 3.16), for comparison: it gains energy in every oscillation."""
+"""Explicit Euler (thesis section 3.5.1, eq. 3.16), for comparison only.
+
+The energy grows in every oscillation.
+"""
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator

@@ -1,8 +1,8 @@
-"""Implicit Euler (thesis section 3.5.3, eq. 3.26), with the forces of the new positions.
+"""Implicit Euler (thesis section 3.5.3, eq. 3.26), with the forces at the new positions.
 
 One linear solve per substep and body (`solver.kernels.implicit_solve`) finds these forces. The equations
 include grabs, pins and the colliders under the body. Forces are linearised, so a substep that changes a shape
-too much is retried in halves.
+too much is retried as two halves.
 """
 
 from taichi_soft.core.runtime import ti
@@ -15,7 +15,7 @@ from taichi_soft.solver.kernels.implicit_solve import MAX_PIECES, keeps_shape, s
 
 @ti.func
 def felt_time(lag, h, s):
-    """Return 0: forces at the old positions do not act [s]."""
+    """Return 0 s, because the forces at the old positions do not act."""
     return 0.0 * h
 
 
@@ -26,15 +26,15 @@ def hold(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def predict(state: ti.template(), program: ti.template(), body, job, felt):
-    """Solve for the new velocities of a body."""
+    """Solve for the new velocities of a body. Returns: see `IntegratorModel.predict`."""
     speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
     return speed, beside, beside, 1
 
 
 @ti.func
 def check(state: ti.template(), body, h, is_last):
-    """Return 1 if the body kept its shape. In the last attempt, slow a body down whose shape changed too
-    much.
+    """Return 1 if the body kept its shape. In the last attempt, first slow down a body whose shape
+    changed too much.
     """
     if is_last == 1:
         slow_down(state, body, h)
@@ -52,5 +52,5 @@ IMPLICIT_EULER = IntegratorModel(
     has_hulls=False,  # the solve constrains vertices only
     drifts_at_once=False,
     halvings=MAX_PIECES.bit_length() - 1,
-    work=50,  # products with the matrix in a solve
+    work=50,  # typical number of matrix products in a solve
 )

@@ -14,5 +14,5 @@ LAZY_LEAPFROG = IntegratorModel(
     predict=kick_by_forces,
     check=any_shape,
     advance=advance,
-    lag=0.5,  # accurate to the order of the method's own error
+    lag=0.5,  # a value as accurate as the method itself
 )

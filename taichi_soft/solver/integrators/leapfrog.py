@@ -1,8 +1,8 @@
 """Leapfrog (thesis section 3.5.2, eq. 3.17 with v_3/2 = v_1/2 + h M^-1 f(x_1)).
 
 Velocities are half a substep behind positions. A kick lasts from the time of the old velocity to the middle
-of the next substep: h normally; h / 2 at the start, when velocity and position belong to the same time;
-(h_old + h) / 2 when the substep changes.
+of the next substep. Its length is h normally; h / 2 at the start, when velocity and position belong to the
+same time; and (h_old + h) / 2 when the substep changes.
 """
 
 from taichi_soft.core.runtime import ti
@@ -27,7 +27,7 @@ def felt_time(lag, h, s):
 
 @ti.func
 def drive_time(h, s, substeps):
-    """Return half a substep before the first substep and after the last one, otherwise a whole one [s]."""
+    """Return the time for which external forces act [s]: h / 2 at both ends of a step, otherwise h."""
     return 0.5 * h if s == 0 or s == substeps else h
 
 

@@ -1,7 +1,6 @@
-"""Attempts at a step: save and restore bodies, and decide whether the substeps of an attempt were short
-enough.
+"""Save and restore bodies in attempts at a step, and decide whether an attempt had short enough substeps.
 
-The number of substeps is chosen for small deformation, and raised for shapes that are found to be stiffer. An
+The number of substeps is chosen for small deformation, and raised for bodies whose shape is stiffer. An
 impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces in one
 substep change a velocity by more than `MAX_VELOCITY_CHANGE`, or if the result is not finite. The island is
 then restored, and the step is retried with twice as many substeps. The last attempt damps vibrations
@@ -27,9 +26,10 @@ from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 @ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
-    """Return how often the substep can be halved, and the number of the last attempt.
+    """Return the largest number of halvings of the substep, and the number of the last attempt.
 
-    If the two differ, the last attempt has the same substeps as the attempt before it, and strong damping.
+    If the two numbers differ, the last attempt has the same substeps as the attempt before it, and strong
+    damping.
     """
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
@@ -52,7 +52,7 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
                 body = state.islands.body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
-                    # Limited, because a forged snapshot can contain any number.
+                    # Limit the refinement, because a forged snapshot can contain any number.
                     refinement = ti.min(state.body_refinement[body], MAX_REFINEMENT)
                     least = ti.max(least, ti.min(at_rest * refinement, MAX_REFINEMENT * substeps))
                 row = row_behind(row)
@@ -61,8 +61,8 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
 
 @ti.real_func
 def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
-    """Save the state of a body before the step, for interpolation and retries, and clear its last
-    contacts.
+    """Save the state of a body before the step, for interpolation and retries, and clear the contacts
+    of the last step.
     """
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
@@ -70,7 +70,7 @@ def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
             save_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
-                if state.body_status[body] == FROZEN:  # its pins have no targets, so they would reset it
+                if state.body_status[body] == FROZEN:  # `aim_pinned` skips frozen bodies
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
         _begin_contacts(state, program, body)
@@ -142,7 +142,7 @@ def set_strong_damping(state: ti.template(), island, is_braked):
 
 @ti.func
 def body_is_valid(state: ti.template(), body):
-    """1 if all particles of a body have valid positions and velocities."""
+    """Return 1 if all particles of a body have valid positions and velocities."""
     particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -154,7 +154,7 @@ def body_is_valid(state: ti.template(), body):
 
 @ti.func
 def island_is_valid(state: ti.template(), island):
-    """1 if all active bodies of an island are valid."""
+    """Return 1 if all active bodies of an island are valid."""
     sound = 1
     first, end = state.islands.first[island], state.islands.first[island + 1]
     for row in range(first, end):

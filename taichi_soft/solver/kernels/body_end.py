@@ -1,4 +1,4 @@
-"""End a step, body by body."""
+"""End the step of one body."""
 
 from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body
@@ -18,7 +18,7 @@ from taichi_soft.solver.kernels.untangling import untangle_body
 
 @ti.func
 def _freeze_if_invalid(state: ti.template(), body):
-    """Freeze a body that became invalid in its last valid state. Returns: 1 if the body was frozen."""
+    """If a body is invalid, restore its last valid state and freeze it. Returns: 1 if the body was frozen."""
     sound = body_is_valid(state, body)
     if sound == 0:
         particles = state.body_particles[body]
@@ -26,7 +26,7 @@ def _freeze_if_invalid(state: ti.template(), body):
         while p < particles[1]:
             restore_particle(state, p)
             p = row_behind(p)
-        place_points(state, body)  # needed because a snapshot with non-finite points cannot be restored
+        place_points(state, body)  # a snapshot with non-finite points cannot be restored
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN
@@ -35,7 +35,7 @@ def _freeze_if_invalid(state: ti.template(), body):
 
 @ti.func
 def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """End the step of an active body. Returns: 1 if it failed, stays inverted, or its solve was inexact."""
+    """End the step of an active body. Returns: see `end_body`."""
     apply_external_forces(state, body, program.integrator.drive_time(h, substeps, substeps))
     failed = _freeze_if_invalid(state, body)
     if failed == 0:
@@ -60,7 +60,7 @@ def end_body(
     """End the step of a body after `substeps` substeps of `h` [s]: apply external forces and plastic flow,
     and restore inverted tetrahedra.
 
-    Returns: 1 if the body failed, stays inverted, or its solve was inexact.
+    Returns: 1 if the body failed, stays inverted, or was solved inexactly.
     """
     failed = 0
     if state.body_status[body] == ACTIVE:

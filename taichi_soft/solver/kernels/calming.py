@@ -1,9 +1,9 @@
-"""Bring bodies to rest: damp fast vibrations, but not slow ones and rigid motion.
+"""Damp fast vibrations of slow bodies, so that they come to rest. Rigid motion is not damped.
 
-Material damping acts on every vibration at the rate of the slowest one, so fast vibrations of a floppy body
-would last for half a minute. Here the ends of each edge lose part of their relative velocity along the edge,
-one edge after the other. This damps a vibration more if neighbours move against each other more, and
-conserves momentum and angular momentum.
+Material damping acts on all vibrations at the rate of the slowest vibration, so fast vibrations of a floppy
+body would last for half a minute. Here the ends of each edge lose part of their relative velocity along the
+edge, one edge after the other. The damping is stronger if neighbouring particles move against each other
+more. It conserves momentum and angular momentum.
 
 If the overall speed of a body is below `sleep_speed`, `vibration` also damps its slow vibrations. Otherwise
 one swinging limb would keep the body awake.
@@ -20,12 +20,13 @@ CALMING = 0.5
 """Fraction of the relative velocity along an edge that its ends lose per step."""
 
 SLOW_FACTOR = 10.0
-"""Root mean square speed, weighted by mass, over `sleep_speed`, below which a body counts as slow."""
+"""A body counts as slow if its root mean square speed, weighted by mass, is below `SLOW_FACTOR` times
+`sleep_speed`."""
 
 
 @ti.func
 def update_rest_state(state: ti.template(), body):
-    """If bodies can fall asleep, set the `rest_state` of a damped body to moving, slow or resting."""
+    """Set the `rest_state` of a body. It is MOVING if bodies cannot sleep or the body has no damping."""
     rest_state, sleep_speed = MOVING, state.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
@@ -46,9 +47,9 @@ def update_rest_state(state: ti.template(), body):
 def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
     """Damp the fast vibrations of a slow body in substep `s` of `substeps`.
 
-    `kick` and `h`: see `fade_vibration`. Each edge is damped once per step, the edges of a particle in
-    different substeps. Otherwise a vibration with the period of the step would always be damped at its
-    turning point.
+    Each edge is damped once per step, but the edges of a particle are damped in different substeps. If all
+    were damped in one substep, a vibration with the period of the step would always be damped at its turning
+    point. For `kick` and `h`, see `fade_vibration`.
     """
     if state.islands.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)
@@ -68,7 +69,7 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        # Skip touched particles. Damping them between contact impulses would make a weight on them creep.
+        # Skip touched particles. Damping between contact impulses would make a weight on the particles creep.
         if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)

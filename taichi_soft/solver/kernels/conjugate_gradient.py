@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 SLIDES, STICKS = 0.0, 1.0
-"""Constraint of a particle by the floor or a collider: along the normal only, or in all directions."""
+"""Constraints of a touching particle: SLIDES acts only along the normal, STICKS in all directions."""
 
 
 @ti.func
@@ -32,7 +32,7 @@ def _dot(a, b):
 
 @ti.func
 def invert_blocks(state: ti.template(), body):
-    """Compute the preconditioner, which is the inverse of every diagonal block."""
+    """Compute the preconditioner, which consists of the inverses of the diagonal blocks."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
@@ -47,10 +47,11 @@ def _squared_norm(state: ti.template(), p, impulse):
 
 @ti.func
 def squared_load(state: ti.template(), body, h):
-    """Return the square of the impulse in a substep of `h` [s] to which the tolerance is relative.
+    """Return the square of the load in a substep of `h` [s]. The tolerance is relative to the load.
 
-    The impulse is the larger of the weight and the right-hand side. Both include the part that floor and
-    colliders support. Without that part, the right-hand side of a body at rest would be only rounding errors.
+    The load is the impulse of the weight or the right-hand side, whichever is larger. Both impulses include
+    the part that floor and colliders support. Without that part, the right-hand side of a body at rest would
+    consist of rounding errors.
     """
     weight, total = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     gravity = gravity_on(state, body)
@@ -66,9 +67,9 @@ def squared_load(state: ti.template(), body, h):
 def _correct_common_velocity(state: ti.template(), body):
     """Add a common change of velocity of all particles to `solution`, and update `residual`.
 
-    Each call corrects one direction. Before the iterations, this solves the system of a body in free fall,
-    for which conjugate gradients need many iterations. After the iterations, this removes the momentum in the
-    residual, which would make bodies slide faster or creep on slopes.
+    Each call corrects one direction. Before the iterations, the correction solves the system of a body in
+    free fall, for which conjugate gradients need many iterations. After the iterations, the correction
+    removes the momentum in the residual, which would make bodies slide faster or creep on slopes.
     """
     particles = state.body_particles[body]
     total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
@@ -91,10 +92,10 @@ def _correct_common_velocity(state: ti.template(), body):
 
 @ti.func
 def solve_system(state: ti.template(), body, load):
-    """Solve the equation system times `solution` = right-hand side, to the tolerance in `solver`.
+    """Solve the linear system of a body for `solution`, to the tolerance in `solver`.
 
-    Before the call, `solution` must contain the initial guess, and `residual` its residual. Both are
-    overwritten. Residuals are measured in the norm of the preconditioner.
+    Before the call, `solution` must contain the initial guess, and `residual` the residual of that guess.
+    Both fields are overwritten. Residuals are measured in the norm of the preconditioner.
 
     Args:
         load: result of `squared_load`, to which the tolerance is relative.
@@ -133,6 +134,6 @@ def solve_system(state: ti.template(), body, load):
                 state.direction[p] = state.image[p] + turn * state.direction[p]
             count += 1
         else:
-            count = most_iterations  # end: the remaining direction is only rounding errors
+            count = most_iterations  # stop, because only rounding errors remain
     _correct_common_velocity(state, body)
     return ti.sqrt(ti.cast(left / ti.max(load, 1e-300), state.real))

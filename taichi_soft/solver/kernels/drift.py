@@ -1,4 +1,4 @@
-"""Drift among colliders: move particles by their velocities, and collide them on their paths.
+"""Drift: move particles by their velocities, and collide them with the colliders on their paths.
 
 Groups of fields: reads colliders.
 """
@@ -24,10 +24,10 @@ def list_near_colliders(state: ti.template(), body, speed, since, left):
 
 @ti.func
 def can_drift_at_once(state: ti.template(), body, path):
-    """1 if a single body can move its next `path` [m] first and collide afterwards.
+    """Return 1 if a body alone in its island can first move along its next path and then collide.
 
-    The colliders near the body must be known. A hull near a collider prevents this, because it changes
-    velocities before the move.
+    The colliders within `path` [m] must be known. A body with a hull near a collider must collide first,
+    because the contact of a hull changes velocities before the move.
     """
     is_known = int(state.colliders.gone[body] + path <= state.colliders.reach[body])
     if ti.static(state.capacity.contact.hull):
@@ -83,7 +83,7 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
 
 @ti.real_func
 def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
-    """Collide a body that its velocities have moved, and update its rest timer.
+    """Collide a body whose particles have moved, and update its rest timer.
 
     Args:
         travelled: distance that the body has travelled since near colliders were listed, including this path
@@ -95,14 +95,15 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
     place_points(state, body)
     updates_timer = int(state.body_calm_time[body] != 0.0)
     if ti.static(state.capacity.contact.hull):
-        updates_timer = updates_timer & int(not has_hull(state, body))  # see `reset_rest_timer_of_hull`
+        # `reset_rest_timer_of_hull` updates the timer of a body with a hull.
+        updates_timer = updates_timer & int(not has_hull(state, body))
     if updates_timer == 1:
         reset_rest_timer(state, body, highest_speed(state, body))
 
 
 @ti.real_func
 def drift_body(state: ti.template(), body: ti.i32, job: Job):
-    """Move one body by its velocities, and collide it on its path."""
+    """Move the particles of one body by their velocities, and collide them on their paths."""
     travelled = state.colliders.gone[body] + job.fastest * job.h
     is_new = int(not (state.colliders.reach[body] >= travelled))
     if is_new == 1:
@@ -122,9 +123,9 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
 
 @ti.func
 def has_drifted(state: ti.template(), body, speed, h, since):
-    """Collide a single body that the kick has moved. If the colliders near it are unknown, undo the move.
+    """Collide a body that the kick has moved. If the colliders near the body are unknown, undo the move.
 
-    Returns: 1 if the body has moved.
+    Returns: 1 if the move was not undone.
     """
     is_known = can_drift_at_once(state, body, speed * h)
     if is_known == 1:

@@ -1,4 +1,4 @@
-"""Find the cause of a frozen body by repeating its last step, element by element."""
+"""Find the element that made a body fail, by repeating the last step of the body."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
@@ -25,7 +25,7 @@ def find_failed_element(
 
     Args:
         found: receives the tetrahedron (block times `LANES` plus lane) or edge that failed first, and the
-            substep; unchanged if nothing fails.
+            substep. It stays unchanged if nothing fails.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

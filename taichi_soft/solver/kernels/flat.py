@@ -5,9 +5,9 @@ adds its forces in a fixed order, so the result does not depend on the number of
 
 On a CPU, all substeps run inside one kernel call: one task per thread, synchronised by a spinning barrier.
 Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at the same time,
-because Taichi's pool has exactly as many threads. But if another program occupies a core, every barrier can
-wait for the operating system, so only very large bodies use this schedule by default. A GPU has no such
-barrier; there, each substep is a separate launch.
+because Taichi's pool has exactly as many threads as there are tasks. But if another program occupies a core,
+every barrier can wait for the operating system, so only very large bodies use this schedule by default. A GPU
+has no such barrier, so on a GPU each substep is a separate launch.
 """
 
 from taichi_soft.bodies.kernels.particles import (
@@ -29,7 +29,8 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clea
 from taichi_soft.solver.kernels.kick import MAX_VELOCITY_CHANGE
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
-_FAILING, _DONE = 5, 6  # larger than any body status: retry the step; step complete
+# Larger than any body status: a _FAILING body must retry the step, a _DONE body has completed the step.
+_FAILING, _DONE = 5, 6
 
 
 @ti.func
@@ -70,9 +71,9 @@ def _edge_phase(state: ti.template(), program: ti.template(), e):
 
 @ti.func
 def gathered_force(state: ti.template(), p):
-    """Return the internal force on one particle [N]: the forces of its corners, then of its edges."""
+    """Return the internal force on one particle [N]: the sum of its corner forces and its edge forces."""
     total = ti.Vector.zero(state.real, 4)
-    corners = state.particle_corners[p]  # no rows if the body's law acts on edges
+    corners = state.particle_corners[p]  # empty if the body's law acts on edges
     for k in range(corners[0], corners[1]):
         total += state.corner_force[state.corner_slot[k]]
     force = total.xyz
@@ -93,7 +94,7 @@ def _felt_time(state: ti.template(), program: ti.template(), body, h, s):
 
 @ti.func
 def _moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
-    """Return the motion of one particle after a substep under its internal force [N]. A pinned particle keeps
+    """Compute the motion of one particle in a substep under its internal force [N]. A pinned particle keeps
     its velocity.
 
     Returns: new position [m] and velocity [m/s], and acceleration [m/s^2].
@@ -130,7 +131,7 @@ def _is_damped_now(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def _gather_phase(state: ti.template(), p, h, s, substeps):
-    """For bodies that are damped in this substep, write the forces to the field that damping reads."""
+    """If a particle's body is damped in this substep, write its force to the field that damping reads."""
     if _is_damped_now(state, state.particle_body[p], h, s, substeps):
         state.particle_force[p] = widened(gathered_force(state, p))
 
@@ -195,8 +196,9 @@ def _flow_phase(state: ti.template(), block, dt):
 
 @ti.func
 def _end_attempt(state: ti.template(), body, h, is_braked, is_last):
-    """End an attempt of a body. A failed body retries the step, or is frozen after the last attempt. Returns:
-    1 if it failed.
+    """End an attempt of a body. A failed body retries the step, or is frozen after the last attempt.
+
+    Returns: 1 if the body failed.
     """
     failed = 0
     state.body_jolted[body] = 0
@@ -224,7 +226,7 @@ def _wait_for_workers(state: ti.template(), worker_count: ti.template()):
     """Wait until all workers have called this function as often as this worker."""
     arrived = ti.atomic_add(state.barrier[0], 1) + 1
     target = (arrived + worker_count - 1) // worker_count * worker_count
-    # A maximum with -1 changes nothing, but the compiler cannot turn it into a plain load.
+    # An atomic maximum with -1 changes nothing, but the compiler cannot turn it into a plain load.
     while ti.atomic_max(state.barrier[0], -1) < target:
         pass
 
@@ -352,7 +354,7 @@ def end_flat(
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """End an attempt at a step, and restore failed bodies. Returns: their number."""
+    """End an attempt at a step, and restore failed bodies. Returns: the number of failed bodies."""
     failed = 0
     for p in range(particle_count):
         _check_phase(state, p, int(attempt == attempts - 1))

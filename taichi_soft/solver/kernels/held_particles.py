@@ -1,13 +1,13 @@
 """Constrain particles to the floor or colliders in the solve of implicit Euler, with Coulomb friction.
 
-Contact after the solve could remove only the momentum of the particles that touch. A body would sink into
-itself until its solve moves these particles down fast enough, and would follow a conveyor belt only as fast
-as its lowest particles pull it. So the solve constrains each stopped particle: along the normal, it has the
-velocity of the surface. A sticking particle has the surface velocity in all directions; a sliding particle
-receives an impulse of friction. While impulses violate Coulomb's law, the system is solved again, starting
-from the last solution. Each time, particles that would be pulled are released, particles that stick beyond
-the friction limit begin to slide, and particles stick if friction would
-reverse their sliding.
+If contact acted after the solve, it could remove only the momentum of the touching particles. The rest of the
+body would sink onto these particles, and a conveyor belt would accelerate the body only as fast as its lowest
+particles pull the rest. So the solve constrains each touching particle. Along the normal, the particle has
+the velocity of the surface. A sticking particle has the surface velocity in all directions; a sliding
+particle receives an impulse of friction. While impulses violate Coulomb's law, the system is solved again,
+starting from the last solution. Before each new solve, particles that would be pulled are released, particles
+that stick beyond the friction limit begin to slide, and particles stick if friction would reverse their
+sliding.
 
 Groups of fields: reads colliders.
 """
@@ -17,18 +17,17 @@ from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 MAX_IMPULSE = 1e24
-"""Impulse [N s] above which the solve of a body torn to pieces has overflowed. Such an impulse counts as
-zero."""
+"""Largest valid impulse [N s]. Larger impulses, from the overflow of a solve, count as zero."""
 
 MAX_SOLVES = 6
 """Largest number of solves in one substep to find the particles that stick, slide and leave."""
 
 TOLERANCE = 0.003
-"""Largest accepted violation of Coulomb's law, over the sum of impulses."""
+"""Largest accepted violation of Coulomb's law, relative to the sum of impulses."""
 
 MAX_REVERSAL = 0.1
-"""Largest relative change of a sliding velocity by which friction that was too strong is undone. Larger
-changes would prevent bodies from coming to rest."""
+"""Largest relative increase of a sliding velocity that corrects too strong friction. Larger increases would
+prevent bodies from coming to rest."""
 
 
 @ti.func
@@ -98,8 +97,8 @@ def _impulse_of(state: ti.template(), p):
 def _measure_errors(state: ti.template(), body):
     """Measure how far impulses violate Coulomb's law.
 
-    Returns: sums over all particles [N s]: impulses; impulses that pull; for sticking particles, the excess
-    over the friction limit; for sliding particles, the errors of friction.
+    Returns: four sums over all particles [N s]: all impulses; impulses that pull; excess of sticking
+    particles over the friction limit; errors of the friction on sliding particles.
     """
     total, pulling = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     beyond, wrong = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
@@ -147,7 +146,7 @@ def _update_constraints(state: ti.template(), body, releases):
 def solve_held(state: ti.template(), body, held_count, h):
     """Solve the system of a body with `held_count` constrained particles.
 
-    `solution` receives the changes of velocity, and `image` their product with the system [N s].
+    `solution` receives the changes of velocity [m/s], and `image` the system times these changes [N s].
 
     Returns: the remaining residual over the load.
     """

@@ -1,4 +1,5 @@
-"""Kick of implicit Euler: constrain particles to colliders, solve, and apply impulses to the colliders.
+"""Kick of implicit Euler: constrain particles to colliders, solve for velocities, and apply impulses to the
+colliders.
 
 Groups of fields: reads colliders.
 """
@@ -19,8 +20,8 @@ from taichi_soft.solver.kernels.implicit_solve import add_pin_reactions, record_
 def _surface_velocity(colliders: ti.template(), c, x, since, h):
     """Return the mean velocity of a collider's surface at `x` in a substep [m/s].
 
-    For a rotating collider, the mean velocity points along the chord of the path. Along the tangent,
-    particles on the collider would spiral outwards.
+    For a rotating collider, the mean velocity points along the chord of the path. With a velocity along the
+    tangent, particles on the collider would spiral outwards.
 
     Returns: the velocity, and the vector from the collider's position to `x` [m].
     """
@@ -31,8 +32,9 @@ def _surface_velocity(colliders: ti.template(), c, x, since, h):
 
 @ti.func
 def _surface_below(colliders: ti.template(), c, x, since):
-    """Return the distance of a point from a collider's skin `since` [s] after the start of the step, and the
-    normal there.
+    """Return the distance of `x` from a collider's thickened surface [m], and the surface normal at `x`.
+
+    `since` is the time after the start of the step [s].
     """
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
     place = x - colliders.position[c] - since * colliders.velocity[c]
@@ -46,7 +48,7 @@ def _surface_below(colliders: ti.template(), c, x, since):
 
 @ti.func
 def _constrain_to_colliders(state: ti.template(), body, h, since):
-    """Constrain the particles that lie on colliders, and release all others.
+    """Constrain the particles that lie on colliders, and release all other particles.
 
     A particle lies on a collider if gravity alone would return it to the collider within the substep.
 

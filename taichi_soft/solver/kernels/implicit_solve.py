@@ -1,9 +1,10 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (f + m g - h K v): the right-hand side contains the forces at the old positions and
-their change along the path. K is projected to be positive semi-definite, and acts only on motion without the
-body's rotation: see `rigid_rotation`. The solve constrains particles that lie on colliders, as long as no
-impulse pulls them: see `held_particles`.
+The system is (M + h D + h^2 K) dv = h (f + m g - h K v), with masses M, damping D and stiffness K. Its
+right-hand side contains the forces f at the old positions and the change of these forces along the path. K is
+projected to be positive semi-definite, and acts only on motion without the body's rotation (see
+`rigid_rotation`). The solve constrains particles that lie on colliders, as long as no impulse pulls them (see
+`held_particles`).
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -23,13 +24,13 @@ from taichi_soft.solver.kernels.held_particles import solve_held
 from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rotation
 
 FARTHEST = 0.5
-"""Largest change of an edge in a substep, over its length. For a larger change, the substep is halved."""
+"""Largest relative change of an edge in a substep. If an edge changes more, the substep is halved."""
 
 MIN_LENGTH = 0.1
-"""Smallest length, over the mean length, with which the change of an edge is compared."""
+"""Smallest reference length for the relative change of an edge, over the mean edge length."""
 
 MAX_PIECES = 32
-"""Largest number of pieces of a substep."""
+"""Largest number of pieces into which a failing substep is divided."""
 
 
 @ti.func
@@ -59,7 +60,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 @ti.func
 def solve_body(state: ti.template(), program: ti.template(), body, h, held_count):
-    """Solve the system of a body with `held_count` constrained particles, see `solve_held`."""
+    """Assemble and solve the system of a body. For `held_count` and the results, see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
     return solve_held(state, body, held_count, h)
@@ -79,16 +80,14 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 @ti.func
 def record_residual(state: ti.template(), body, residual, is_first):
-    """Record the largest residual of the solves of a step, except for a body that becomes non-finite."""
+    """Record the largest residual of a step's solves in `body_residual`. NaN residuals are ignored."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
     state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
 def _scale_motion(state: ti.template(), body, h, share):
-    """Scale the motion of a body in a substep of `h` [s] by `share`, except the mean motion of its
-    particles.
-    """
+    """Scale a body's motion relative to its mean motion by `share`, in a substep of `h` [s]."""
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -105,7 +104,7 @@ def _scale_motion(state: ti.template(), body, h, share):
 
 @ti.func
 def _largest_change(state: ti.template(), body):
-    """Return the largest change of an edge since the positions in `direction`, over its length."""
+    """Return the largest relative change of an edge's vector since the positions in `direction`."""
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
@@ -123,13 +122,13 @@ def _largest_change(state: ti.template(), body):
 
 @ti.func
 def keeps_shape(state: ti.template(), body):
-    """True if no edge has changed by more than `FARTHEST` since the positions in `direction`."""
+    """True if no edge has changed by a larger fraction than `FARTHEST` since the positions in `direction`."""
     return _largest_change(state, body) <= FARTHEST
 
 
 @ti.func
 def slow_down(state: ti.template(), body, h):
-    """Slow a body down if an edge changed by more than `FARTHEST` in a substep of `h` [s]."""
+    """Slow a body down if an edge changed by a larger fraction than `FARTHEST` in a substep of `h` [s]."""
     change = _largest_change(state, body)
     if change > FARTHEST:
         _scale_motion(state, body, h, FARTHEST / change)

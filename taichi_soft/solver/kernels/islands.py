@@ -1,4 +1,4 @@
-"""Islands: groups of bodies that can touch each other in a step or are joined, directly or through others.
+"""Find islands: groups of bodies that can touch in a step or are joined, directly or through other bodies.
 
 One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
 cannot touch others is a separate island.
@@ -15,8 +15,7 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 ISLAND_MARGIN = 0.25
-"""Distance, in mean edges, by which bodies of different islands can come closer than their velocities predict
-without touching."""
+"""Margin around the box of a body, in mean edge lengths, for motion that its velocities do not predict."""
 
 
 @ti.func
@@ -29,7 +28,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             state.body_bounds_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
         if state.body_status[body] == ASLEEP:
-            continue  # its box stays valid
+            continue  # the box of a sleeping body stays valid
         outer = state.touching.body_outer[body]
         p = state.touching.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
@@ -47,7 +46,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
         surface = state.body_surface[body]
-        # The relative motion of the body's parts can change direction within the step.
+        # Extend the box, because parts of a body can change the direction of their motion in the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.body_bounds_lower[body] = lower - reach
@@ -56,8 +55,8 @@ def _find_boxes(state: ti.template(), body_count, dt):
 
 @ti.func
 def _sort_by_lower_x(state: ti.template(), body_count):
-    """Sort bodies by the lower x of their boxes. Insertion sort, because the order hardly changes between
-    steps.
+    """Sort bodies by the lower x of their boxes. An insertion sort is fast, because the order hardly changes
+    between steps.
     """
     for i in range(1, body_count):
         body = state.islands.sweep_order[i]
@@ -113,25 +112,26 @@ def _join_held(state: ti.template()):
 
 @ti.func
 def _is_listed(state: ti.template(), body, end):
-    """1 if a body and its root have a status below `end`. The parent of the body must be its root."""
+    """Return 1 if a body and its root have a status below `end`. `parent` must contain the root."""
     root = state.islands.parent[body]
     return int(state.body_status[body] < end) & int(state.body_status[root] < end)
 
 
 @ti.func
 def _list_islands(state: ti.template(), body_count, end):
-    """List the bodies with a status below `end` by island, islands and bodies in ascending order, by a
-    counting sort.
+    """Write the bodies with a status below `end` to `body`, sorted by island and then by number.
+
+    The algorithm is a counting sort.
     """
     fields, islands = state.islands, 0
     for body in range(body_count):
-        # The parent's number is never larger than the child's, so its own parent is already the root.
+        # A parent's number is never larger than its child's, so the parent of the parent is already the root.
         root = fields.parent[fields.parent[body]]
         fields.parent[body] = root
         if _is_listed(state, body, end):
             if root == body:
                 fields.of_body[body] = islands
-                fields.first[islands] = 0  # number of its bodies so far
+                fields.first[islands] = 0  # number of bodies counted so far
                 islands += 1
             island = fields.of_body[root]
             fields.of_body[body] = island
@@ -139,7 +139,7 @@ def _list_islands(state: ti.template(), body_count, end):
     rows, island = 0, 0
     while island < islands:
         rows += fields.first[island]
-        fields.first[island] = rows  # the row after its last row
+        fields.first[island] = rows  # the row after the island's last row
         island = row_behind(island)
     for i in range(body_count):
         body = body_count - 1 - i
@@ -169,7 +169,7 @@ def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 
 @ti.kernel
 def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Read the island of each body in the last step."""
+    """Write the number of each body's island in the last step to `islands`."""
     ti.loop_config(serialize=True)
     for body in range(islands.shape[0]):
         islands[body] = state.islands.of_body[body]
@@ -177,8 +177,9 @@ def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, n
 
 @ti.kernel
 def list_joined_islands(state: ti.template(), body_count: ti.i32):
-    """List the islands of joints in a world whose bodies do not touch each other. Call this when joints
-    change.
+    """List the islands of joined bodies in a world whose bodies cannot touch each other.
+
+    Call this after joints change.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -14,10 +14,10 @@
     ...                                   has no island left: helper 2   ...
 
 An island of several bodies is a *shared island*. One thread *owns* it. The owner solves joints and contacts
-between its bodies, and starts *jobs*: phases that each body runs separately. *Helpers* are threads that own
-no island, or have finished their own. Owner and helpers take bodies that no thread has taken yet. The owner
-then waits for the bodies that helpers took. It never waits for a thread that has not started: without helpers
-it takes all bodies itself. The result for a body does not depend on the thread.
+between its bodies, and starts *jobs*: phases that run separately for each body. *Helpers* are threads that
+own no island, or have finished their islands. Owner and helpers take bodies that no thread has taken yet. The
+owner then waits for the bodies that helpers took. The owner never waits for a thread that has not started:
+without helpers, the owner takes all bodies. The result for a body does not depend on the thread.
 
 Groups of fields: reads islands; writes jobs.
 """
@@ -30,7 +30,7 @@ OWNER = 0
 """Worker number of the owner of an island. Helpers have larger numbers."""
 
 HELP = -1
-"""Used instead of a phase: run the phase that the owner has started."""
+"""Value of `Job.phase` with which a helper runs the phase that the owner has started."""
 
 
 @ti.func
@@ -63,16 +63,16 @@ def run_job(
     worker: ti.i32,
     job: Job,
 ):
-    """Take bodies of an island until none is left. The owner first starts the job, and at the end waits for
-    all bodies.
+    """Take bodies of an island until none is left. The owner first starts the job, and at the end waits until
+    all bodies are finished.
 
     Each worker begins with its own part of the bodies, and then takes bodies from the parts of other workers.
     So the data of a body stay in the cache of one core.
 
-    The job is stored here and not in a called function, because Taichi assumes that a called function does
-    not read earlier writes, and drops a write that the kernel itself overwrites before reading it. Islands
-    with one body are not shared between threads: writing their jobs would invalidate cache lines of other
-    threads.
+    This function stores the job, because Taichi would drop the write if a called function stored it: Taichi
+    assumes that called functions do not read earlier writes, and drops writes that are overwritten unread.
+    Islands with one body are not shared between threads, because writing their jobs would invalidate cache
+    lines of other threads.
 
     Args:
         do_phase: a function (state, program, island, body, job).
@@ -115,7 +115,7 @@ def run_job(
 
 @ti.func
 def open_shared_islands(state: ti.template(), helpers):
-    """Count the work that can be shared. Call this before the islands are stepped."""
+    """Count the shared islands, and the helpers that can work on them. Call this before the step."""
     islands, members, island = 0, 0, 0
     while island < state.islands.count[None]:
         if is_shared_island(state, island):
@@ -136,8 +136,9 @@ def close_shared_island(state: ti.template(), island):
 
 @ti.func
 def help_others(state: ti.template(), program: ti.template(), do_phase: ti.template(), helper):
-    """Work on shared islands until all are finished. Only the first helpers work, because more would slow
-    them down.
+    """Work on shared islands until all islands are finished.
+
+    Only the first `useful_helpers` helpers work, because more helpers would slow the work down.
     """
     while helper < state.jobs.useful_helpers[None] and _now(state.jobs.unfinished_islands[None]) > 0:
         for island in range(state.islands.count[None]):

@@ -1,6 +1,7 @@
-"""Kick among colliders: compute new velocities from forces. The drift then moves the particles.
+"""Kick: compute new velocities from forces.
 
-In between, joints and contact between bodies change velocities island by island.
+After the kick, joints and contact between bodies change velocities island by island. Then the drift moves the
+particles.
 
 Groups of fields: writes islands.
 """
@@ -15,7 +16,7 @@ from taichi_soft.solver.step_fields import Job
 
 MAX_VELOCITY_CHANGE = 1.0
 """Largest change of a particle's velocity by the forces of one substep, over the speed of sound in its body.
-Stable vibrations stay below it, even those of slivers, because a stable substep is about the time in which
+Stable vibrations stay below this limit, even in slivers, because a stable substep is about the time in which
 sound crosses the smallest tetrahedron."""
 
 TOUCHED_FACTOR = 4.0
@@ -23,8 +24,8 @@ TOUCHED_FACTOR = 4.0
 removes most of the change."""
 
 EXPLODING = 20.0
-"""Path of a particle within one substep, over the mean edge of its body's surface, above which the body
-counts as exploding. Other bodies pass through it until it is frozen or slower."""
+"""A body counts as exploding if a particle moves farther than this in one substep, in mean edge lengths of
+the surface. Other bodies pass through an exploding body until it is frozen or slower."""
 
 
 @ti.func
@@ -67,7 +68,9 @@ def _store_last_block(
 def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
     """Store the speeds of up to `LANES` particles relative to the `common` velocity, for contact.
 
-    Call this before new velocities are stored. Returns: squares of possible impact speeds.
+    Call this before new velocities are stored.
+
+    Returns: for each particle, the square of its possible impact speed.
     """
     speeds, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -90,9 +93,10 @@ def _store_speeds(state: ti.template(), first, count, common, velocities: ti.tem
 
 @ti.func
 def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, job):
-    """Compute new velocities of up to `LANES` particles from `first` on, and positions after `drift_time`.
+    """Compute new velocities and positions of up to `LANES` particles from `first` on.
 
-    Forces are cleared. Rows beyond the last particle are computed too, and ignored.
+    Particles move for the job's `drift_time`. Forces are cleared. Rows beyond the last particle are also
+    computed, but ignored.
 
     Returns: for each particle, the squares of its speed, of its possible impact speed, and of its
     acceleration. The acceleration is reduced for touched particles.
@@ -101,7 +105,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
     velocities = ti.Matrix.zero(state.real, LANES, 3)
     speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    # This loop stores only to local arrays, because the compiler cannot know that fields do not overlap.
+    # Store only to local arrays. The compiler cannot know that fields do not overlap, and would not
+    # vectorise the loop.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
@@ -129,10 +134,10 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 
 @ti.func
 def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
-    """Compute velocities after `kick` [s] of the forces, and positions after the job's `drift_time`.
+    """Compute velocities after forces act for `kick` [s], and positions after the job's `drift_time`.
 
     Returns: the highest speed [m/s]; the highest and the mean possible impact speed, if the body has pairs;
-    and 1 if forces changed no velocity too much.
+    and 1 if forces changed no velocity by too much.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -169,7 +174,7 @@ def _store_body_speeds(
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
     """Compute new velocities of one body after forces have acted for `felt` [s], and store its speeds.
 
-    Returns: 1 if forces changed no velocity too much.
+    Returns: 1 if forces changed no velocity by too much.
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):

@@ -1,14 +1,15 @@
 """Keep the stiffness matrix of implicit Euler from slowing down the rotation of a body.
 
-Internal forces have no torque, but -K v has one, because K is projected and the forces belong to the old
+Internal forces have no torque, but -K v has a torque, because K is projected and the forces belong to the old
 positions. So K acts on velocities without the body's rotation, P v = v - W J W^T M v, and the matrix is P^T K
 P. W maps an angular velocity to velocities, and J is the inverse of the inertia tensor. P^T K P is positive
 semi-definite like K, and has no torque. It differs from K by a matrix of rank 6, so that products need only
 the three columns of K W in addition to K.
 
 A pinned body swings by gravity like a pendulum, with the frequency sqrt(g / r) for the radius of gyration r.
-Without stiffness in the system, a substep h is stable only for r > h^2 g / 4. So the inertia of a radius h^2
-g is added before J is computed. A small additional inertia makes J exist for bodies along a straight line.
+Without stiffness in the system, a substep h is stable only for r > h^2 g / 4. So the inertia of the body's
+mass at the radius h^2 g is added before J is computed. A small additional inertia makes J exist for bodies
+along a straight line.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -16,12 +17,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_edge_products
 
 THIN = 1e-6
-"""Small moment of inertia that is added about every axis, over the trace of the tensor."""
+"""Small moment of inertia that is added about every axis, over the trace of the inertia tensor."""
 
 
 @ti.func
 def _cross_matrix(d):
-    """Return the matrix that multiplies an angular velocity to give its cross product with `d`."""
+    """Return the matrix C with C w = w x d for every angular velocity w."""
     zero = d.x * 0.0
     return ti.Matrix([[zero, d.z, -d.y], [-d.z, zero, d.x], [d.y, -d.x, zero]])
 
@@ -35,7 +36,7 @@ def _arm(state: ti.template(), body, p):
 
 @ti.func
 def project_out_rotation(state: ti.template(), body, h):
-    """Prepare products with P^T K P. The blocks of the body must contain h^2 K."""
+    """Compute the fields that `multiply` needs. The blocks of the body must contain h^2 K."""
     particles, edges = state.body_particles[body], state.body_edges[body]
     first = state.particle_position[particles[0]]
     mass, center = ti.cast(0.0, state.real), ti.Vector.zero(state.real, 3)
@@ -59,14 +60,14 @@ def project_out_rotation(state: ti.template(), body, h):
     added = THIN * inertia.trace() + mass * radius * radius + 1e-30
     for i in ti.static(range(3)):
         inertia[i, i] += added
-    scale = 1.0 / inertia.trace()  # scaled, because its cube would overflow or underflow
+    scale = 1.0 / inertia.trace()  # without it, the determinant could overflow or underflow
     state.body_inverse_inertia[body] = scale * (scale * inertia).inverse()
     state.body_turning[body] = turning
 
 
 @ti.func
 def multiply(state: ti.template(), body, source: ti.template(), target: ti.template()):
-    """Compute target = system times source for the particles of one body, with P^T K P in place of K."""
+    """Write the product of a body's system and `source` to `target`. In the system, P^T K P replaces K."""
     particles = state.body_particles[body]
     spin, torque = ti.Vector.zero(state.real, 3), ti.Vector.zero(state.real, 3)
     for p in range(particles[0], particles[1]):

@@ -1,6 +1,6 @@
-"""Bodies that skip one step. They cost no time in that step, and then continue with their velocities.
+"""Make bodies skip one step. They take no time in that step, and then continue with their velocities.
 
-Skipping bodies are woken and make the step if a moving body comes near: see `wake_island`.
+If a moving body comes near, a skipping body is woken and makes the step (see `wake_island`).
 """
 
 from taichi_soft.bodies.kernels.particles import save_particle
@@ -13,7 +13,7 @@ from taichi_soft.solver.kernels.sleep import store_boxes_of_skipping
 
 @ti.kernel
 def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Make bodies skip the next step, except those on which a force acts in it."""
+    """Make bodies skip the next step, except bodies on which an applied force acts in that step."""
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
         body = bodies[i]
@@ -33,7 +33,8 @@ def begin_skips(state: ti.template(), body_count: ti.i32):
 def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
     """Make the bodies that skipped a step active again.
 
-    Interpolation returns their current positions. Their contacts and the forces of force fields are cleared.
+    Interpolated positions of these bodies are their current positions. The contacts of the bodies, and the
+    forces of force fields on them, are cleared.
 
     Returns: the number of bodies that skipped the step.
     """

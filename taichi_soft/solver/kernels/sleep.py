@@ -14,12 +14,15 @@ CALM_TIME = 0.5
 highest point."""
 
 WAKE_MARGIN = 0.01
-"""Distance from the box of a sleeping body within which an event wakes it [m]."""
+"""Distance from the box of a sleeping body within which an event wakes the body [m]."""
 
 
 @ti.func
 def _wake_in_box(state: ti.template(), body_count, lower, upper):
-    """Wake bodies that sleep or skip the step and whose box is near another box. Returns: their number."""
+    """Wake the bodies that sleep or skip the step near the box from `lower` to `upper`.
+
+    Returns: the number of woken bodies.
+    """
     woken = 0
     for body in range(body_count):
         if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
@@ -32,7 +35,7 @@ def _wake_in_box(state: ti.template(), body_count, lower, upper):
 
 @ti.func
 def wake_by_colliders(state: ti.template(), body_count):
-    """Wake sleeping bodies that a moving collider approaches in this step."""
+    """Wake sleeping and skipping bodies that a moving collider approaches in this step."""
     for c in range(state.colliders.count[None]):
         if state.colliders.kind[c] != NO_COLLIDER and state.colliders.speed[c] > 0.0:
             _wake_in_box(state, body_count, state.colliders.lower[c], state.colliders.upper[c])
@@ -40,7 +43,7 @@ def wake_by_colliders(state: ti.template(), body_count):
 
 @ti.real_func
 def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
-    """Wake all bodies of an island if one of them is awake. Returns: 1 if that is so."""
+    """Wake all bodies of an island if a body of the island is awake. Returns: 1 if the island is awake."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     is_awake = 0
     i = first
@@ -67,8 +70,8 @@ def reset_rest_timer(state: ti.template(), body, speed):
 def reset_rest_timer_of_hull(state: ti.template(), body, dt):
     """Restart the rest timer of a body with a hull if it has moved too far in a step of `dt` [s].
 
-    Velocities are ignored, because carriers of points in contact oscillate from substep to substep without
-    moving away.
+    Velocities are ignored, because particles that carry touching hull points oscillate from substep to
+    substep without moving away.
     """
     if has_hull(state, body):
         displacement = ti.cast(0.0, ti.f32)
@@ -79,7 +82,7 @@ def reset_rest_timer_of_hull(state: ti.template(), body, dt):
 
 @ti.func
 def store_box(state: ti.template(), body):
-    """Store the box around a body that does not move, and around its hull."""
+    """Store the box around a body and its hull, for a body that does not move."""
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
     upper = lower
@@ -98,7 +101,7 @@ def store_box(state: ti.template(), body):
 
 @ti.real_func
 def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
-    """Store the boxes around bodies that skip the next step. They may have moved since `skip_bodies`."""
+    """Store the boxes around bodies that skip the next step. Bodies can have moved since `skip_bodies`."""
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
             store_box(state, body)
@@ -122,8 +125,9 @@ def _put_to_sleep(state: ti.template(), body):
 
 @ti.real_func
 def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
-    """Add a step of `dt` [s] to the rest timers of an island. If all have run long enough, put the island to
-    sleep.
+    """Add a step of `dt` [s] to the rest timers of an island.
+
+    If all timers exceed `CALM_TIME`, put the island to sleep.
 
     Returns: 1 if the island is still awake.
     """
@@ -147,7 +151,7 @@ def update_sleep(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
 
 @ti.kernel
 def wake_body(state: ti.template(), body: ti.i32):
-    """Wake one body, or all if `body` is -1, and restart the rest timers."""
+    """Wake one body, or all bodies if `body` is -1, and restart the rest timers."""
     ti.loop_config(serialize=True)
     for b in range(state.capacity.bodies):
         if body == b or body == -1:
@@ -160,7 +164,12 @@ def wake_body(state: ti.template(), body: ti.i32):
 def wake_near(
     state: ti.template(), body_count: ti.i32, box: ti.types.ndarray(dtype=ti.f32, ndim=1)
 ) -> ti.i32:
-    """Wake bodies that sleep near a box, given by lower and upper corner [m], (6,). Returns: their number."""
+    """Wake the bodies that sleep or skip the step near a box.
+
+    Args:
+        box: lower and upper corner of the box [m], (6,).
+    Returns: the number of woken bodies.
+    """
     woken = 0
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -13,7 +13,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Place a body in its slot, with the same state as if the world began with it.
+    """Place a body in its slot, with the state that it would have at the start of a world.
 
     Args:
         rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's
@@ -62,5 +62,5 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
 def despawn_body(state: ti.template(), body: ti.i32):
     """Empty a slot. The positions of its particles stay finite, but no code moves or reads them."""
     if ti.static(state.capacity.contact.colliders > 0):
-        clear_contacts(state, body)  # otherwise colliders would receive its last impulse in every step
+        clear_contacts(state, body)  # otherwise colliders would receive the last impulse in every step
     state.body_status[body] = ABSENT

@@ -39,18 +39,18 @@ from taichi_soft.solver.kernels.substep import (
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
-"""Returned instead of a number of bodies if no body is awake, so that another step would change nothing."""
+"""Result of `step_islands` if no body is awake, so that another step would change nothing."""
 
 UNFINISHED = -2
-"""Returned instead of a number of bodies if the step needs more calls."""
+"""Result of `step_islands` if the step needs more calls."""
 
 DONE = -1
-"""Used instead of the number of an attempt after the step is complete."""
+"""Value of `Progress.attempt` after the step of an island is complete."""
 
 
 @ti.func
 def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h, most, goes_on):
-    """Run one fixed step of an island, or its next `most` substeps.
+    """Run one fixed step of an island, but at most `most` substeps in this call.
 
     Returns: number of failed bodies, or UNFINISHED; and 1 if the island is awake.
     """
@@ -86,7 +86,7 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
 
 @ti.func
 def _begin(state: ti.template(), program: ti.template(), island):
-    """Wake the bodies that an awake body can touch, and save the state of all bodies."""
+    """If a body of the island is awake, wake its other bodies, and save the state of all bodies."""
     is_awake = wake_island(state, island)
     if is_awake == 1:
         each_body(state, program, island, Job(phase=BEGIN))
@@ -100,7 +100,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
         body = state.islands.body[state.islands.first[island]]
-        # Includes the speed gained by gravity, so that near colliders are listed only once per step.
+        # Add the speed gained by gravity, so that near colliders are listed only once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
@@ -110,7 +110,10 @@ def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run
 def _make_substeps(
     state: ti.template(), program: ti.template(), island, end, count, h, is_last, run: ti.template()
 ):
-    """Run substeps up to `end`, of `count` in an attempt, until one of them turns out to be too long."""
+    """Run the substeps of an attempt up to `end`. Stop after a substep that turns out to be too long.
+
+    The attempt has `count` substeps of `h` [s].
+    """
     while run.s < end and (run.is_stable | is_last) == 1:
         s = run.s
         now = Moment(s=s, substeps=count, is_last=is_last, h=h, since=s * h, left=h * (count - s))
@@ -120,10 +123,10 @@ def _make_substeps(
 
 @ti.func
 def _mean_velocity(state: ti.template(), island):
-    """Return the mean velocity of the particles of an island [m/s]. Motion that all bodies share brings no
-    two closer.
+    """Return the mean velocity of the particles of an island [m/s].
 
-    The velocity is zero if a body of the island does not move.
+    Motion that all bodies share brings no two bodies closer to each other. The velocity is zero if a body of
+    the island does not move.
     """
     total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
     for i in range(state.islands.first[island], state.islands.first[island + 1]):
@@ -177,7 +180,7 @@ def step_islands(
     most: ti.i32,
     goes_on: ti.i32,
 ) -> ti.i32:
-    """Run one fixed step of every active body, or its next `most` substeps.
+    """Run one fixed step of every active body, but at most `most` substeps of each island in this call.
 
     Args:
         helpers: number of threads that can help other threads with their islands.

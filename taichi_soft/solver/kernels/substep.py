@@ -8,8 +8,8 @@
                            contact: broad phase, narrow phase, solver
     each body              drift: new positions
 
-Contact changes velocities before particles move. Joints correct the effect of contact on them in the next
-substep. A single body drifts in the same pass as its kick, and collides afterwards.
+Contact changes velocities before particles move. In the next substep, joints correct the effect of
+contact on them. A body alone in its island drifts in the same pass as its kick, and collides afterwards.
 
 Groups of fields: reads colliders, soft; writes islands.
 """
@@ -44,13 +44,13 @@ BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
 substep."""
 
 NONE, OUTDATED, VALID = range(3)
-"""State of the candidates of an island: NONE, because the last step cleared them; OUTDATED, from a failed
-attempt; VALID."""
+"""State of an island's contact candidates: NONE at the start of a step, OUTDATED after a failed attempt,
+VALID after a search."""
 
 MAX_IMPULSE_STEP = 0.1
-"""Distance per substep, in mean edges, above which impacts are passed on within the substep, so that a struck
-body can strike the next one. Below it, a body can enter the next one by that distance, and contact moves it
-out again."""
+"""Displacement of a struck body in a substep, in mean edge lengths, above which it can strike the next body
+in the same substep. After a smaller displacement, it can penetrate the next body by that distance, and
+contact moves it out again."""
 
 
 @ti.func
@@ -107,7 +107,7 @@ def do_phase(state: ti.template(), program: ti.template(), island, body, job):
 
 @ti.real_func
 def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """Run a phase of contact. This is a separate function, because LLVM vectorises the gaps only there."""
+    """Run a phase of contact. LLVM vectorises the computation of gaps only in a separate function."""
     if job.phase == BOXES:
         begin_search(state, body, job.impact_speed, job.h, job.left, job.forgets)
     if job.phase == BROAD_PHASE:
@@ -142,7 +142,7 @@ def each_body(state: ti.template(), program: ti.template(), island, job):
 
 @ti.func
 def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
-    """Kick the bodies of an island. Returns: the time for which they have already drifted [s]."""
+    """Kick the bodies of an island. Returns: the time for which the bodies have also drifted [s]."""
     body = state.islands.body[state.islands.first[island]]
     is_free = is_alone(state, program, island)
     if is_free == 1:
@@ -173,7 +173,7 @@ def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run:
 
 @ti.func
 def is_alone(state: ti.template(), program: ti.template(), island):
-    """1 if an island is one body that can touch only colliders, and whose kick can move it."""
+    """Return 1 if an island is one body that can touch only colliders, and the kick can move the body."""
     body = state.islands.body[state.islands.first[island]]
     bodies = state.islands.first[island + 1] - state.islands.first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
@@ -207,7 +207,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """1 if the bodies of an island are at their new positions, because the kick has moved a single body."""
+    """Collide the body of an island, if the kick has moved it. Returns: 1 if the body has drifted."""
     has_moved = 0
     body = state.islands.body[state.islands.first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:

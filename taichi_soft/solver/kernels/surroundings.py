@@ -1,4 +1,4 @@
-"""Write the numbers that apply to all bodies of a world to their fields."""
+"""Write the settings that apply to all bodies of a world."""
 
 from taichi_soft.core.runtime import ti
 
@@ -7,7 +7,7 @@ from taichi_soft.core.runtime import ti
 def write_surroundings(state: ti.template(), numbers: ti.types.ndarray(dtype=ti.f64, ndim=1)):
     """Write gravity, floor, and settings of retries and implicit Euler with one kernel.
 
-    Taichi would compile one kernel per number that Python writes.
+    If Python wrote each number separately, Taichi would compile one kernel per number.
     Args:
         numbers: gravity [m/s^2]; height [m], restitution and friction of the floor; tolerance and largest
             number of iterations of implicit Euler; number of retries, (9,).

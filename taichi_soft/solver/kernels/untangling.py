@@ -1,13 +1,15 @@
 """Restore bodies with inverted tetrahedra.
 
 Forces alone restore nearly all inverted tetrahedra. Every `PATIENCE` steps a body is checked for flat or
-inverted tetrahedra. If there are any, its vibrations are damped until a check finds none. A body that is
-folded by its own weight can have a few inverted tetrahedra for ever, because their forces balance. Such a
-body is reported after `REPORTED_AFTER` steps and left as it is. A body with too many inverted tetrahedra has
-lost its shape. Within a third of a second, its particles are moved to the best fit of the rest shape.
+inverted tetrahedra. If a check finds any, the vibrations of the body are damped until a check finds none. A
+body that is folded by its own weight can keep a few inverted tetrahedra for ever, because their forces
+balance. Such a body is reported after `REPORTED_AFTER` steps and left as it is. A body with too many inverted
+tetrahedra has lost its shape. Within a third of a second, its particles are moved to the best fit of the rest
+shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-can be too long for these bodies, so that parts of them would vibrate for ever. They get more substeps.
+can be too long for these bodies, so that parts of the bodies would vibrate for ever. Such
+bodies get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -32,15 +34,15 @@ FAILED_FRACTION = 0.1
 
 RESTORING_STEPS, CALMING = 20, 0.8
 """Number of steps in which a failed body moves to its rest shape, and fraction of its vibration that remains
-after each of them. This also restores bodies that are twisted by two turns without an inverted tetrahedron.
-"""
+after each of these steps. The damping also restores bodies that are twisted by two turns without an inverted
+tetrahedron."""
 
 FADING = 20.0
 """Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Without damping, inverted
-slivers would excite each other, light ones for seconds."""
+slivers would excite each other, light slivers for seconds."""
 
 STEP_MARGIN = 0.9
-"""Square of the substep for a deformed body, over its estimated stability limit."""
+"""Square of the ratio of a deformed body's substep to the estimated stability limit of the substep."""
 
 MAX_REFINEMENT = 4.0
 """Largest number of substeps over the number at rest. If even shorter substeps are needed, the step is
@@ -50,12 +52,12 @@ RELAXING = 0.8
 """Fraction of the additional substeps that remains after each check, once the shape no longer needs them."""
 
 FLAT = 1e-5
-"""Volume over the volume at rest, below which a tetrahedron counts as inverted."""
+"""Volume relative to the volume at rest, below which a tetrahedron counts as inverted."""
 
 
 @ti.func
 def _is_inverted(state: ti.template(), positions: ti.template(), block, lane):
-    """1 if a tetrahedron is flat or inverted."""
+    """Return 1 if a tetrahedron is flat or inverted."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
     inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the padding of the last block
@@ -77,8 +79,9 @@ def _stiffness_of(state: ti.template(), block, lane):
     """Return the square of a tetrahedron's highest frequency due to its resistance to a change of volume
     [1/s^2].
 
-    In stable neo-Hookean material that force is (lambda + 5/6 mu) (J - a) dV/dx, so its stiffness grows with
-    the square of dV/dx, a third of an area vector. A stretched face therefore makes it stiffer at any volume.
+    In stable neo-Hookean material, the force that resists a change of volume is (lambda + 5/6 mu) (J - a)
+    dV/dx, where dV/dx is a third of an area vector. The stiffness of this force grows with the square of
+    dV/dx, so a stretched face makes the tetrahedron stiffer at any volume.
     Returns: the current value, and the value at rest.
     """
     ps = particles_of(state, block, lane)
@@ -94,7 +97,7 @@ def _stiffness_of(state: ti.template(), block, lane):
     a, b, c = inverse
     r1, r2, r3 = ti.Vector([a.x, b.x, c.x]), ti.Vector([a.y, b.y, c.y]), ti.Vector([a.z, b.z, c.z])
     r = (-(r1 + r2 + r3), r1, r2, r3)
-    determinant6 = ti.abs(determinant(inverse))  # relative to 1 / (6 V0)
+    determinant6 = ti.abs(determinant(inverse))  # 1 / (6 V0)
     row = block * 2 * LANES + lane
     modulus = state.tet_lame[row] + state.tet_lame[row + LANES] * 5.0 / 6.0
     now, rest = a.x * 0.0, a.x * 0.0
@@ -121,9 +124,7 @@ def _refinement_of(state: ti.template(), body):
 
 @ti.func
 def _needs_rest_shape(state: ti.template(), body):
-    """True if many tetrahedra were inverted before a step that was retried, or when the caller placed the
-    body.
-    """
+    """True if many tetrahedra were inverted before a retried step, or in the shape that the caller set."""
     is_wrecked = False
     if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
         blocks = state.body_blocks[body]
@@ -136,7 +137,7 @@ def _needs_rest_shape(state: ti.template(), body):
 def _best_fit(state: ti.template(), body):
     """Fit the rest shape to the current positions of a body.
 
-    Returns: centre at rest, current centre [m], and rotation as rows.
+    Returns: centre at rest, current centre [m], and rotation as three rows.
     """
     particles = state.body_particles[body]
     x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
@@ -162,12 +163,11 @@ def _best_fit(state: ti.template(), body):
 
 @ti.func
 def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all particles of a failed body a part of the path to the best fit; in the last step, the whole
-    path.
+    """Move the particles of a failed body by 1 / `steps_left` of the path to the best fit of the rest shape.
 
-    Pinned particles do not move, and the floor stops the others. If there are colliders, which can block the
-    path, particles instead get the velocity with which they arrive in the next step of `seconds`. It accounts
-    for the damping at the beginning of that step.
+    Pinned particles do not move, and the floor stops other particles. If colliders can block the path,
+    particles instead get the velocity with which they arrive in the next step of `seconds`. This velocity
+    accounts for the damping at the beginning of that step.
     """
     rest, now, rows = _best_fit(state, body)
     particles = state.body_particles[body]
@@ -189,7 +189,7 @@ def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, step
 
 @ti.func
 def _recovers(state: ti.template(), program: ti.template(), body):
-    """1 if the law of a body restores inverted tetrahedra."""
+    """Return 1 if the law of a body restores inverted tetrahedra."""
     recovers = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
@@ -199,7 +199,7 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _stiffens(state: ti.template(), program: ti.template(), body):
-    """1 if a body with this law can need more substeps, see `_refinement_of`."""
+    """Return 1 if the law of a body can require more substeps, see `_refinement_of`."""
     stiffens = 0
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.has_energy and model.flips == Flips.RECOVER):
@@ -209,12 +209,11 @@ def _stiffens(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def kept_while_inverted(state: ti.template(), body, h, is_first):
-    """Return the fraction of its vibration that a body with inverted tetrahedra keeps in a substep of `h`
-    [s].
+    """Return the fraction of a body's vibration that remains after a substep of `h` [s]; 1 without damping.
 
-    The body is damped in every substep. If it were damped only at the beginning of steps, vibrations with
-    twice the step's period would always be damped at their turning points. A failed body is damped only in
-    the first substep of each step.
+    A body with inverted tetrahedra is damped in every substep. If it were damped only at the beginning of
+    steps, vibrations with twice the step's period would always be damped at their turning points. A failed
+    body is damped only in the first substep of each step.
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
@@ -226,8 +225,9 @@ def kept_while_inverted(state: ti.template(), body, h, is_first):
 
 @ti.real_func
 def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32) -> ti.i32:
-    """Check a body at the end of a step of `seconds`, and restore it, if its law restores inverted
-    tetrahedra.
+    """Check a body at the end of a step of `seconds`, and restore it if necessary.
+
+    Bodies whose law does not restore inverted tetrahedra are not checked.
 
     Returns: 1 if the body must be reported, because it has had inverted tetrahedra for too long.
     """
@@ -235,7 +235,7 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
         age = ti.max(before, -RESTORING_STEPS - 1) + 1
-        if before >= 0 or before == PLACED:  # complete a restoration that has begun
+        if before >= 0 or before == PLACED:  # otherwise, a restoration has begun and continues
             if _needs_rest_shape(state, body):
                 age = -RESTORING_STEPS
             elif before == PLACED:

@@ -8,8 +8,8 @@ conserves, for each mode of frequency w,
     v^2 + w^2 (1 - h^2 w^2 / 4) x^2.
 
 A smaller v reduces this quantity, for every stable step and any interval of damping. For velocities half a
-step later, the conserved quantity also contains h w^2 x v: damping these every third substep, for example,
-would excite modes with a period of three substeps.
+step later, the conserved quantity also contains h w^2 x v. Damping these velocities every third substep,
+for example, would excite modes with a period of three substeps.
 
 Groups of fields: reads islands.
 """
@@ -25,9 +25,9 @@ from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
 MAX_FADING = 0.43
 """Largest exponent of damping in one substep: the fraction d = exp(-0.43) = 0.65 remains. For particles in
-contact, the kick is not part of the damped vibration, so a mode of stiffness k and mass 1 becomes d v + h a.
-That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A failed body is damped
-more strongly, once per step."""
+contact, the kick is not part of the damped vibration, so the velocity v of a mode with stiffness k and mass 1
+becomes d v + h a. The substep is stable for h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step.
+A failed body is damped more strongly, once per step."""
 
 MOVING, SLOW, RESTING = range(3)
 """Rest states of a body, by its overall speed: see `calming`."""
@@ -49,7 +49,7 @@ A line has no inertia about itself."""
 
 @ti.func
 def _solve_symmetric(rows: ti.template(), b):
-    """Solve rows x = b for x. The matrix must be symmetric, and scaled to a trace of 1."""
+    """Return the solution x of A x = b. `rows` are the rows of A, which is symmetric with a trace of 1."""
     a0, a1, a2 = rows
     c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
     det = a0.dot(c0)
@@ -103,8 +103,8 @@ def _column_sums(rows: ti.template()):
 
 @ti.func
 def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
-    """Return the rigid motion of a body after its forces have acted for `kick` [s]. `h` and `is_held`: see
-    `felt_velocity`.
+    """Return the rigid motion of a body after its forces have acted for `kick` [s]. For `h` and `is_held`,
+    see `felt_velocity`.
 
     Returns: centre relative to x0 [m], velocity relative to v0 [m/s], and angular velocity [rad/s].
     """
@@ -118,8 +118,8 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
             p = first + lane
-            # Rows beyond the last particle belong to another body. If that is non-finite, multiplying by 0
-            # gives NaN.
+            # Rows beyond the last particle belong to another body. They are replaced, because 0 times a
+            # non-finite number is NaN.
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
@@ -153,7 +153,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
 
 @ti.func
 def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
-    """Scale the vibration that a body has after its forces have acted for `kick` [s] by `keep`.
+    """Scale a body's vibration by `keep`. The vibration is measured after forces have acted for `kick` [s].
 
     `h` is the length of the substep [s].
     """
@@ -213,14 +213,14 @@ def _limited(beside, most):
     """Return a velocity relative to the rigid motion, limited to `most` [m/s]."""
     speed = beside.norm()
     slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
-    if not speed < 1e18:  # the square of the speed overflows, so its direction is unknown
+    if not speed < 1e18:  # the square of the speed overflows, so the direction is unknown
         slower = beside * 0.0
     return slower
 
 
 @ti.func
 def kept_vibration(state: ti.template(), body, h, s, substeps):
-    """Return the fraction of its vibration that a body keeps in substep `s` of `substeps`, of `h` [s] each.
+    """Return the fraction of a body's vibration that remains after substep `s` of `substeps` of `h` [s] each.
 
     The fraction is below 1 only every few substeps, but many times in a period of the first mode. The
     intervals vary, because a mode that is always damped at its turning points would last for ever.
@@ -254,7 +254,8 @@ def time_to_positions(program: ti.template(), kick, h):
 def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
     """Damp the vibration of a body in substep `s` of `substeps` of `h` [s] each.
 
-    Call this before the body's forces act for `kick` [s]. It damps the velocities in the middle of that kick.
+    Call this before the body's forces act for `kick` [s]. The damping acts on the velocities in the middle of
+    that kick.
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
@@ -277,9 +278,9 @@ def _limit_body(state: ti.template(), program: ti.template(), body: ti.i32, kick
 
 @ti.func
 def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """Damp a body on CPUs: as `damp_vibration`, and more strongly if the body has inverted tetrahedra.
+    """Damp a body on a CPU as `damp_vibration` does, and more strongly if it has inverted tetrahedra.
 
-    Each part is called only once. So LLVM inlines it, and its rounding does not depend on the rest of the
+    Each part is called only once, so that LLVM inlines it and its rounding does not depend on the rest of the
     program.
     """
     keep = kept_vibration(state, body, h, s, substeps)
