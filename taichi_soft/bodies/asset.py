@@ -66,7 +66,7 @@ value gives about 12 dampings per period."""
 
 MAX_BOX_DIFFERENCE = 0.25
 """Largest distance between corresponding sides of two bounding boxes, of a level of detail and of the finest
-level. It is relative to the longest side of the finest level's box."""
+level. The distance is relative to the longest side of the finest level's box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +96,9 @@ class SoftBodyAsset:
         skin: surface to draw instead of the surface of the tetrahedra: a file, a trimesh.Trimesh or a Scene,
             as for `read_surfaces`. See `Body.render_meshes`.
         hull: contact surface. None: the surface of the tetrahedra. A number from 12 to 20,000: that many
-            points of the skin, connected by triangles. True: the same with an automatic number. Or pass a
-            surface, as for `read_surfaces`. See docs/artists-mesh.md. Needs tetrahedra; not possible with
-            spare vertices or self-contact.
+            points of the skin, connected by triangles. True: an automatic number of points. A surface, as for
+            `read_surfaces`: this surface. See docs/artists-mesh.md. Needs tetrahedra; not possible with spare
+            vertices or self-contact.
         coarser: levels of detail for `Body.set_level`: assets of the same body, each with fewer tetrahedra
             than the asset before. `with_coarser` makes such assets. Not possible with spare vertices or
             plasticity.

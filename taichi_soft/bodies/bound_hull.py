@@ -1,6 +1,6 @@
 """Hull of a body, bound to the tetrahedra of its cage. A hull has those surface points that make contact.
 
-A point x has a weight w_i for each vertex x_i of a tetrahedron, and moves with them: x = sum_i w_i x_i. An
+A point x has a weight w_i for each vertex x_i of a tetrahedron, so that x = sum_i w_i x_i at any time. An
 impulse P at the point acts on each vertex as w_i P, so the point has the inverse mass sum_i w_i^2 / m_i.
 Momentum and angular momentum are conserved, because the impulses w_i P at x_i are equivalent to P at x.
 

@@ -3,8 +3,8 @@
 A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. The Young's modulus of
 each tetrahedron is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995). The
 sensitivity of a mode is the derivative of its squared frequency by the logarithm of a tetrahedron's modulus.
-For a mode u with u^T M u = 1, it is the contribution of the tetrahedron to u^T K u. Many sets of moduli give
-the target frequencies; the update chooses the set with the smallest change.
+For a mode u with u^T M u = 1, the sensitivity is the contribution of the tetrahedron to u^T K u. Many sets of
+moduli give the target frequencies; the update chooses the set with the smallest change.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
     material = coarse.material
     assert isinstance(material, Material)
     density = material.density * mass / coarse.masses.sum()
-    factors = np.zeros(len(coarse.mesh.tets))  # for each tetrahedron, logarithm of the modulus's factor
+    factors = np.zeros(len(coarse.mesh.tets))  # logarithm of each tetrahedron's factor of `young`
     best, smallest_error = coarse.material, np.inf
     for _ in range(MAX_UPDATES):
         young = material.young * np.exp(factors)

@@ -27,12 +27,12 @@ class BodyCapacity:
     bodies: int
     triangles: int
     outer: int
-    parallel: bool  # True: with the forces of all corners and edges, for the flat schedule
+    parallel: bool  # True adds fields for the forces of all corners and edges, for the flat schedule
     rings: int = 0  # number of rows of edge rings; 0 if no edges carry elastic forces
-    implicit: bool = False  # True: with the linear system of implicit integration
-    anisotropic: bool = False  # True: with 21 elastic constants per tetrahedron
-    plastic: bool = False  # True: with the original rest shapes of plastic bodies
-    double: bool = False  # True: float64 instead of float32, to evaluate forces without motion
+    implicit: bool = False  # True adds fields for the linear system of implicit integration
+    anisotropic: bool = False  # True adds fields for 21 elastic constants per tetrahedron
+    plastic: bool = False  # True adds fields for the original rest shapes of plastic bodies
+    double: bool = False  # True uses float64 instead of float32, to evaluate forces without motion
 
     @classmethod
     def of(

@@ -132,7 +132,7 @@ class BodyDescription:
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
-    """Return the vertices of the surface. A `ParticleMesh` has no inside, so all its vertices count."""
+    """Return the vertices of the surface. A `ParticleMesh` has no inside: all its vertices."""
     if isinstance(mesh, TetMesh):
         return mesh.surface_vertices
     return np.arange(len(mesh.vertices), dtype=np.int32)
@@ -150,7 +150,7 @@ def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
     See thesis chapter 6. A vertex of a `CageMesh` has the mass of the solid that it carries.
     """
     masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
-    if isinstance(mesh, CageMesh):  # volume carried, times the mean density of the adjacent tetrahedra
+    if isinstance(mesh, CageMesh):  # mean density of the adjacent tetrahedra times carried volume
         masses *= mesh.vertex_volumes / lumped(mesh.tets, mesh.volumes * mesh.fill, len(mesh.vertices))
     return masses.astype(np.float64)
 

@@ -120,8 +120,9 @@ class BodyFields(FieldGroup):
     edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum of the adjacent tetrahedra
     tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
 
-    # Fields for implicit integration. The system has 3 x 3 blocks. Diagonal blocks are stored by particle.
-    # Off-diagonal blocks are stored by edge, in the row of its first end and the column of its second end.
+    # Fields for implicit integration. The linear system has 3 x 3 blocks. Diagonal blocks are stored by
+    # particle. Off-diagonal blocks are stored by edge, for the row of its first and the column of its second
+    # end.
     particle_block = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_block_inverse = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass plus inertia of grabs
@@ -138,14 +139,14 @@ class BodyFields(FieldGroup):
     residual = declare(PARTICLE, REAL, 3, when="implicit")
     direction = declare(PARTICLE, REAL, 3, when="implicit")
     image = declare(PARTICLE, REAL, 3, when="implicit")
-    # `particle_contact` is 1 + the index of the collider that constrains the particle, or 0. `prev_contact`
-    # is the value before the step.
+    # `particle_contact` is 1 + the index of the collider that constrains the particle, or 0 if no collider
+    # does. `prev_contact` is the value before the step.
     particle_contact = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(COLLIDER, 1), native=True, when="implicit"
     )
     prev_contact = declare(PARTICLE, ti.i32, when="implicit")
     # Constraint of a particle in contact, see `held_particles`. `particle_hold` is the normal, and STICKS or
-    # SLIDES. The other fields are the velocity of the surface, and the friction on a sliding particle.
+    # SLIDES. `hold_velocity` is the velocity of the surface. `hold_friction` acts on a sliding particle.
     particle_hold = declare(PARTICLE, REAL, 4, when="implicit")
     hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
     hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
@@ -180,7 +181,7 @@ class BodyFields(FieldGroup):
     body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
     body_model = declare(BODY, ti.i32, start=LOADED)
     body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
-    # Length of the last substep of leapfrog. Velocities are half a substep behind positions.
+    # Duration of the last substep of leapfrog. Velocities are half a substep behind positions.
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
@@ -207,7 +208,7 @@ class BodyFields(FieldGroup):
     # Longest time between two dampings of vibrations.
     body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True)
     body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
-    # Counter of steps with inverted tetrahedra; negative during a restoration, see `untangling`.
+    # Number of steps with inverted tetrahedra. It is negative during a restoration, see `untangling`.
     body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if the substeps of a step were too long
     # Number of substeps that the present shape needs, relative to the number at rest.
@@ -313,7 +314,7 @@ class BodyFields(FieldGroup):
     def tet_constants(self, body: BodyArrays) -> list[tuple[Any, NDArray[np.float64]]]:
         """Return the fields with constants of tetrahedra, and the rows of one body in each field, (m, k).
 
-        Loading, `set_material` and cuts use this list, which is complete.
+        The list is complete. Loading, `set_material` and cuts use it.
         """
         found = [(self.tet_lame, body.lame), (self.tet_damping, body.tet_damping[:, None])]
         if self.capacity.anisotropic:
@@ -365,7 +366,7 @@ def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
-    """Concatenate the rows of all bodies. The rows of a body are padded with zeros to its range.
+    """Concatenate the rows of all bodies. Zeros pad the rows of each body to the length of its range.
 
     Args:
         counted_from: kind of rows of the body to which the result of `rows_of` refers. These numbers are

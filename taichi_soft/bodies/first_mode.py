@@ -116,8 +116,9 @@ def _applied(vibration: Vibration, u: Floats) -> Floats:
 
 
 def _ritz(directions: Floats, images: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """Find the slowest `count` vibrations in the span of `directions`, (3n, k). `images` is K `directions`.
+    """Find the slowest `count` vibrations in the span of `directions`, (3n, k).
 
+    Args: images: K times `directions`.
     Returns: the vibrations (3n, count), K times the vibrations, and the squared frequencies (count,).
     """
     lengths = np.linalg.norm(directions, axis=0)

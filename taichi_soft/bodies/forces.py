@@ -98,7 +98,7 @@ def force_gradient(
 
 
 class StaticBody:
-    """A body in separate fields that does not move. It evaluates forces like a world."""
+    """A body that does not move, in separate fields. It evaluates forces like a world."""
 
     def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
         """Write the body to fields of float64 if `double`, else of float32. Start Taichi if necessary."""

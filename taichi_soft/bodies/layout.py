@@ -182,7 +182,10 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
 
 
 def arrange(description: BodyDescription) -> BodyArrays:
-    """Return the arrays of a body. Particles are in the order of a space-filling curve for the cache."""
+    """Return the arrays of a body, with particles in the order of a space-filling curve.
+
+    In this order, neighbours share cache lines.
+    """
     mesh = description.mesh
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
@@ -275,7 +278,7 @@ def _directed_edges(edges: Ints, particle_count: int) -> Ints:
 
 
 def _edge_blocks(first_ends: Ints) -> Ints:
-    """Divide the edges into blocks of at most `LANES`. Return the first row and the length of blocks, (c, 2).
+    """Divide the edges into blocks of at most `LANES`. Return first row and length of each block, (c, 2).
 
     A block has two halves. All edges of a half have the same first end. Rows are ordered by first end. A half
     that is not full ends its block, so that the rows of a block are contiguous.

@@ -10,7 +10,7 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 
 _UNLIMITED = 1e30
-"""Number for the absence of a limit. Kernels must not use infinity."""
+"""Number used instead of infinity, because kernels must not use infinity."""
 
 
 @serialised("yield_stress", "yield_strain", "creep", "maximum")

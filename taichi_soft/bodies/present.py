@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def lame_of(body: SoftBody) -> Floats:
-    """Return the present lambda and mu of Lame of each tetrahedron, (m, 2) [Pa].
+    """Return the present Lame constants lambda and mu of each tetrahedron, (m, 2) [Pa].
 
     They are zero if the material is anisotropic.
     """

@@ -77,7 +77,7 @@ class Built(Protocol):
         """Return the present bounding box of a body and its skin, as two opposite corners [m]."""
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """Return vertex positions, (n, 3) [m], interpolated from the previous step (0) to the last (1)."""
+        """Return vertex positions, (n, 3) [m], interpolated by `alpha` between the last two steps."""
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
         """Return the velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
@@ -117,7 +117,8 @@ class Context:
     slots: Pools[SoftBody]
     layout: Scene
     renew_substeps: Callable[[], None]  # must be called after a body's mesh or material has changed
-    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]  # for an asset's next free slot
+    # Makes the handle of a body for the next free slot of an asset.
+    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]
     slices: list[Slice] = field(default_factory=list)
     fields: Built | None = None  # set by `World.build`
 
@@ -203,7 +204,7 @@ class Slice:
         return {}
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Check the rows of the slice's fields. Raises: ValueError if they do not fit `read`."""
+        """Check the slice's rows of fields. Raises: ValueError if they are invalid or contradict `read`."""
 
     def clear(self) -> None:
         """Prepare the slice for a restore. The fields of the world are overwritten afterwards."""
@@ -327,7 +328,7 @@ class SoftBody(Handle):
 
     @property
     def vertex_origins(self) -> Ints:
-        """Vertex of the asset's mesh of which each vertex is a copy, (n,). Cuts copy vertices."""
+        """For each vertex, its original in the asset's mesh, (n,). Cuts copy vertices."""
         part = self._record.part
         return np.arange(self.vertex_count) if part is None else part.vertices
 

@@ -32,8 +32,8 @@ from taichi_soft.meshing import BodyMesh, TetMesh
 Floats = NDArray[np.float64]
 
 MARGIN = 0.9
-"""Recommended substep, relative to the limit for small motion. Compression makes elements stiffer than at
-rest."""
+"""Recommended substep, relative to the limit for small motion. The margin is necessary, because compression
+makes elements stiffer than at rest."""
 
 _MAX_ITERATIONS = 120
 _MIN_ITERATIONS = 30
@@ -140,8 +140,8 @@ def _damped_limit(vibration: Vibration, undamped: float, u: Floats, start: Float
     """Find the step h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
 
     If K is symmetric, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is not below this step for any direction u.
-    If h is multiplied by t, the eigenvalue grows at most by the factor t for t < 1, and t^2 for t > 1. The
-    last correction uses this bound.
+    If h is multiplied by t, the eigenvalue is multiplied by at most t for t < 1, and at most t^2 for t > 1.
+    The last correction uses this bound.
     """
     h, value = undamped, np.inf
     for _ in range(_DAMPING_PASSES):
@@ -168,7 +168,7 @@ def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tupl
     """Return an upper bound of an operator's largest eigenvalue, and its eigenvector, by Arnoldi's method.
 
     For symmetric operators, this is Lanczos' method. Operators of laws along edges can be asymmetric. The
-    bound is then a bound of the largest magnitude of all eigenvalues.
+    result is then the largest magnitude of an eigenvalue.
     """
     shape, basis = start.shape, np.zeros((_MAX_ITERATIONS + 1, start.size))
     small = np.zeros((_MAX_ITERATIONS + 1, _MAX_ITERATIONS))

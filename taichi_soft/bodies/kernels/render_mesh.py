@@ -8,8 +8,8 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Largest number of vertices in the ring around a render vertex, in any block and in the first blocks. `RING`
-is enough for eight triangles; `SMALL_RING` is enough for six triangles, which most render vertices have."""
+"""Largest number of vertices in a ring around a render vertex, in any block and in the first blocks. Most
+render vertices have six triangles, which need seven vertices. Eight triangles need nine vertices."""
 
 STRIDE = (1 + RING) * LANES
 """Number of entries of a block in the table of `render_table`."""
