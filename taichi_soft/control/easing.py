@@ -46,7 +46,7 @@ LIFT = 1e-4
 """A change is immediate if it adds less energy than lifting the body by this height [m]."""
 
 LARGEST_RATIO = 1e12
-"""Upper limit of the ratio of new to initial stiffness. The initial stiffness can be zero."""
+"""Upper limit of the ratio of new to initial stiffness, for elements with an initial stiffness of zero."""
 
 
 @dataclass(eq=False)

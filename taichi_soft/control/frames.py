@@ -207,8 +207,8 @@ class Frame(Handle):
 
         The previous positions for interpolation and the targets of pins jump too. Bodies joined to the
         attached bodies do not move. Targets of grabs do not move either. An earlier `move_to` is discarded.
-        Parts that are then below the floor or inside a collider are pushed out. If the distance is large, the
-        body fails.
+        Parts that are then below the floor or inside a collider are pushed out. A body fails if its parts are
+        pushed far.
         Args:
             position: new position of the origin, (3,) [m].
             rotation: new rotation, as a matrix (3, 3) or quaternion (x, y, z, w); None: unchanged.

@@ -45,8 +45,8 @@ LARGEST_LIMIT = 1e12
 class Drive:
     """Settings of a motor."""
 
-    turns: bool  # True: rotates about the axis, False: pushes along it
-    is_fixed: bool  # True: the axis keeps its direction, False: it rotates with the particles
+    turns: bool  # True: rotates about the axis, False: pushes along the axis
+    is_fixed: bool  # True: the axis keeps its direction, False: the axis rotates with the particles
     axis: NDArray[np.float64]  # unit vector, (3,); in world axes if fixed, else in the rest shape
     point: NDArray[np.float64] | None  # point on the axis, (3,) [m]; None: centre of the particles
     speed: float  # target speed [rad/s] or [m/s]

@@ -23,7 +23,7 @@ def _count_within(patch: ti.template(), distance):
 def _distance_of_last(patch: ti.template(), radius):
     """Find by bisection the smallest distance within which there are more vertices than a patch can have.
 
-    The bisection uses the bits of the floats, because they have the same order as non-negative floats.
+    The bisection uses the bits of the floats. As integers, they have the same order as non-negative floats.
     """
     lowest, highest = ti.cast(0, ti.i64), ti.bit_cast(radius, ti.i64)
     while lowest < highest:

@@ -157,7 +157,7 @@ def solve_joints(
             for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
-                # Ignore joints to a body that failed, so that it cannot damage others.
+                # Ignore joints to a failed body, so that this body cannot damage other bodies.
                 is_exploding = (
                     state.islands.is_exploding[body] + state.islands.is_exploding[ti.max(ends[1] - 1, 0)]
                 )
@@ -253,7 +253,7 @@ def write_joint(
 
 @ti.kernel
 def end_joint(state: ti.template(), j: ti.i32):
-    """Remove a joint, and move later rows forward into its rows."""
+    """Remove a joint, and move later rows forward to fill the gap."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)

@@ -41,8 +41,8 @@ class MotorRow:
     body: ti.i32  # index plus 1, 0 if unused
     first: ti.i32  # first row in `MotorFields.particle`
     end: ti.i32  # row after the motor's last row
-    turns: ti.i32  # 1: rotates particles about its axis, 0: pushes them along it
-    is_fixed: ti.i32  # 1: the axis keeps its direction, 0: it rotates with the particles
+    turns: ti.i32  # 1: rotates particles about the axis, 0: pushes particles along the axis
+    is_fixed: ti.i32  # 1: the axis keeps its direction, 0: the axis rotates with the particles
     has_point: ti.i32  # 1: the axis passes through `point`, 0: through the centre of the particles
     axis: ti.math.vec3  # unit vector; in world axes if fixed, else in the rest shape
     point: ti.math.vec3  # point on the axis [m]

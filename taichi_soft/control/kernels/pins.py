@@ -58,11 +58,11 @@ def write_targets(
     targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Write targets of pinned particles: their positions at the end of the next step [m].
+    """Write the targets of pinned particles, which are their positions at the end of the next step [m].
 
+    If one of the particles is not pinned, nothing is changed.
     Args:
-        found: (1,), receives -1, or the index in `particles` of the first particle that is not pinned; in
-            that case, nothing is changed.
+        found: (1,), receives the index in `particles` of the first particle that is not pinned, or -1.
     """
     loose = -1
     ti.loop_config(serialize=True)
@@ -181,7 +181,7 @@ def aim_pinned(
 
 @ti.func
 def _aim(state: ti.template(), p, dt, frames: ti.template()):
-    """Set the velocity of one pinned particle. Return 1 if it needs another call after the step, else 0."""
+    """Set the velocity of one pinned particle. Return 1 if the particle needs a call after the step."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
     if aim >= WITH_FRAME:
