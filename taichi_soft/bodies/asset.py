@@ -219,7 +219,7 @@ class SoftBodyAsset:
         """Return a copy of the asset with a level of detail for each of these meshes.
 
         The materials of the levels are calibrated so that mass and lowest frequencies are the same as for the
-        finest level. This takes seconds for each level.
+        finest level. The calibration takes seconds for each level.
         Args:
             meshes: rest shapes, each with fewer tetrahedra than the mesh before.
         Raises: MeshError for a mesh that is not coarser; MaterialError unless the material is a `Material`

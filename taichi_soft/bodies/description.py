@@ -132,7 +132,7 @@ class BodyDescription:
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
-    """Return the vertices of the surface. A `ParticleMesh` has no inside: all its vertices."""
+    """Return the vertices of the surface, or all vertices of a `ParticleMesh`, which has no inside."""
     if isinstance(mesh, TetMesh):
         return mesh.surface_vertices
     return np.arange(len(mesh.vertices), dtype=np.int32)

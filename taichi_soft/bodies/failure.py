@@ -25,4 +25,4 @@ class FailedStep:
     time: float  # [s], time before the step
     substeps: int  # number of substeps of the last retry
     h: float  # [s], length of a substep
-    is_braked: bool  # True if vibrations were braked in the step
+    is_braked: bool  # True if vibrations were strongly damped in the step

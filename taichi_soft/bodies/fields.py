@@ -80,12 +80,13 @@ class BodyFields(FieldGroup):
     particle_reaction = declare(PARTICLE, REAL, 3, unit="N s", keep=PARTICLE, native=True)
     prev_reaction = declare(PARTICLE, REAL, 3, unit="N s")
 
-    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if in contact in last substep
+    # 1 if the particle was in contact in the last substep.
+    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)
     # Speed before contact, relative to the mean velocity of the island.
     particle_speed = declare(PARTICLE, REAL, unit="m/s")
 
     tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
-    tet_rest_inverse = declare(  # column by column; changes only if the body is plastic
+    tet_rest_inverse = declare(  # by columns; constant unless the body is plastic
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
     )
     tet_original_inverse = declare(  # before any plastic flow
@@ -185,7 +186,7 @@ class BodyFields(FieldGroup):
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
-    # Bounding box at the last query that used it.
+    # Bounding box at the time of the last query that used the box.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
     body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
@@ -207,7 +208,7 @@ class BodyFields(FieldGroup):
     body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True)
     # Longest time between two dampings of vibrations.
     body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True)
-    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
+    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 in the last retry of a step, for strong damping
     # Number of steps with inverted tetrahedra. It is negative during a restoration, see `untangling`.
     body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if the substeps of a step were too long
@@ -249,8 +250,8 @@ class BodyFields(FieldGroup):
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, except those for which `loader` already has rows.
 
-        `models[i]` is the index of body i's force model. `kinds[i]` contains its `body_edge`, `body_stride`,
-        `body_sound_speed`, `body_fading` and `body_fading_interval`.
+        `models[i]` is the index of the force model of body i. `kinds[i]` contains the values of `body_edge`,
+        `body_stride`, `body_sound_speed`, `body_fading` and `body_fading_interval` for body i.
 
         All bodies are absent until `spawn_body` places them. Until then, their particles are at the positions
         of their meshes.

@@ -24,7 +24,7 @@ _CHUNK = 4
 _MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
 """The search ends when the relative change of the squared frequency over `_WINDOW` iterations is below
-`_CHANGE`. In some bodies, such as long ones, a single iteration changes it little long before convergence."""
+`_CHANGE`. In long bodies, a single iteration can change the frequency little long before convergence."""
 
 _ROUND_OFF = 1e-9
 """Length of a direction, relative to the longest direction, below which it is discarded as round-off.
@@ -108,7 +108,7 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
-    """Return K times the columns of u, (3n, k), a few columns at a time so that they stay in the cache."""
+    """Return K times u, (3n, k). A few columns are multiplied at a time, so that they stay in the cache."""
     parts = [u[:, k : k + _CHUNK] for k in range(0, u.shape[1], _CHUNK)]
     return np.hstack(
         [vibration.apply(part.reshape(-1, 3, part.shape[1])).reshape(part.shape) for part in parts]

@@ -181,9 +181,9 @@ def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArr
     double = positions.dtype == np.float64
     cached = _cached.get(double)
     if cached is not None:
-        last_body = cached.body  # compared by its parts, because each call makes a new description
+        last_body = cached.body  # the parts are compared, because each call makes a new object
         if (last_body.mesh, last_body.material, last_body.model) != (body.mesh, body.material, body.model):
-            del _cached[double], cached  # frees its fields for the next body
+            del _cached[double], cached  # frees the fields of the last body
     if double not in _cached:
         _cached[double] = StaticBody(body, double=double)
     return _cached[double].forces(positions, velocities)

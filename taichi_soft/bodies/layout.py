@@ -176,7 +176,7 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices
-    # Every block is full, except those with the last edges of a particle.
+    # Every block is full, except blocks with the last edges of a particle.
     blocks = (edges + (LANES - 1) * particles) // LANES
     return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
@@ -269,7 +269,7 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
 
 
 def _directed_edges(edges: Ints, particle_count: int) -> Ints:
-    """Orient the edges so that, for most particles, `HALF` divides the number of edges that start there."""
+    """Orient the edges so that, for most particles, `HALF` divides the number of edges from the particle."""
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
     owner = edge_owners(in_order, particle_count, HALF)

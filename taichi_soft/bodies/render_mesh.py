@@ -87,7 +87,8 @@ class RenderMesh:
     def body_vertices(self) -> Ints32:
         """Vertex of the body that each render vertex copies, int32 (k,).
 
-        Use it to turn values per body vertex into an attribute: `body.vertex_stress()[mesh.body_vertices]`.
+        Use this array to convert values per body vertex to values per render vertex:
+        `body.vertex_stress()[mesh.body_vertices]`.
         """
         return self._body_vertices
 

@@ -17,8 +17,8 @@ LATTICE_STEP = 0.33
 """Stable step of a lattice that fills space, relative to the time cell / sqrt(young / density)."""
 
 WARNING_RATIO = 4.0
-"""A warning is logged if the stable step of a lattice is more than this factor longer than the mesh's step.
-A lattice whose outer vertices are moved onto a surface can itself need steps half as long."""
+"""A warning is logged if the stable step of a lattice is longer than the mesh's step by a larger factor. A
+lattice whose outer vertices are moved onto a surface can need steps half as long as a plain lattice."""
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 """Material for the comparison of a mesh with a lattice. The choice is arbitrary."""

@@ -90,7 +90,7 @@ class Pools(Generic[Kind]):
         self._occupants = None
 
     def enter_at(self, body: Kind) -> None:
-        """Put a body into the free slot `body.index`, even if it is not the next one."""
+        """Put a body into the free slot `body.index`, even if another slot is next."""
         free = self._free[body.asset]
         free.remove(body.index)
         heapq.heapify(free)

@@ -47,7 +47,7 @@ class Built(Protocol):
     program: Any
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call `kernel(state, *arguments)`, which changes the body in a slot, or all bodies for -1."""
+        """Call `kernel(state, *arguments)`, which changes one body, or all bodies if `slot` is -1."""
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call `kernel(state, *arguments)`, which can reject the change.
@@ -56,7 +56,7 @@ class Built(Protocol):
         """
 
     def mark_modified(self, slot: int) -> None:
-        """Wake the body in a slot, or all bodies for -1, after a change of its state."""
+        """Wake the body in a slot, or all bodies if `slot` is -1, after a change of its state."""
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call `kernel(state, first, *arguments)`, which only reads; `first` is the body's first particle."""
@@ -68,7 +68,7 @@ class Built(Protocol):
         """Record that the fields have changed."""
 
     def wake(self, slot: int) -> None:
-        """Wake the body in a slot, or all bodies for -1."""
+        """Wake the body in a slot, or all bodies if `slot` is -1."""
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
         """Wake sleeping bodies within range of a box, given by two opposite corners [m]."""
@@ -149,7 +149,7 @@ class Slice:
 
     def __init__(self, context: Context) -> None:
         """Create an empty slice."""
-        self._context_ref = weakref.ref(context)  # handles keep their slice alive, but not the world
+        self._context_ref = weakref.ref(context)  # weak, so that handles do not keep the world alive
 
     @property
     def context(self) -> Context:
@@ -219,7 +219,7 @@ class BodyRecord:
 
     description: BodyDescription  # description with the present mesh and material
     first_step: int  # step in which the body was added
-    present: BodyArrays | None = None  # with intermediate constants while the material changes gradually
+    present: BodyArrays | None = None  # arrays during a gradual change of material; else None
     removed_in: int | None = None  # step in which the body was removed
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # computed at the first request

@@ -46,14 +46,14 @@ which shortens the step by 1 %."""
 _DAMPING_PASSES = 8
 
 SLIVER_ANGLE = 15.0
-"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular one has 70.5."""
+"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular tetrahedron has 70.5."""
 
 
 @dataclass(frozen=True)
 class StableStep:
     """Largest stable substep of one body, and the reason for it."""
 
-    limit: float  # [s], for small motion: at most 15 % below the true limit, never above
+    limit: float  # [s], limit for small motion; 0 to 15 % below the true limit
     stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s], period of the fastest vibration
     stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges

@@ -27,7 +27,7 @@ def highest_speed(state: ti.template(), body):
 
 @ti.func
 def restore_particle(state: ti.template(), p):
-    """Restore a particle's state from before the step."""
+    """Restore the state of a particle that `save_particle` saved."""
     state.particle_position[p] = state.prev_position[p]
     state.particle_velocity[p] = state.prev_velocity[p]
 

@@ -1,7 +1,7 @@
 """Vertices and normals of one body for a renderer.
 
 Render vertices are grouped in blocks of `LANES`. The computation of a block does not depend on its position,
-so the bits are the same for any number of threads.
+so the results are bitwise identical for any number of threads.
 """
 
 from taichi_soft.core.constants import LANES
