@@ -61,12 +61,12 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 DAMPING_INTERVAL = 0.5
-"""Longest interval between two dampings of vibrations, times the angular frequency of the first mode: about
-12 dampings per period."""
+"""Longest time between two dampings of vibrations, multiplied by the angular frequency of the first mode. The
+value gives about 12 dampings per period."""
 
 MAX_BOX_DIFFERENCE = 0.25
-"""Largest distance between sides of the bounding boxes of a level of detail and the finest level, relative to
-the longest side of the finest level's box."""
+"""Largest distance between corresponding sides of two bounding boxes, of a level of detail and of the finest
+level. The distance is relative to the longest side of the finest level's box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,27 +79,29 @@ class SoftBodyAsset:
         law: one of `LAWS`. Laws on tetrahedra: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff",
             "neo_hookean". Laws along edges: "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
             "best_fitting_plane", "split_ring_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
-            None: "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial`, with `strain`, or
-            with `flips` other than "recover"; else "neo_hookean".
+            None: "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial`, or if you pass
+            `strain`, or `flips` other than "recover"; else "neo_hookean".
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
-        flips: "tolerant" (as in the thesis, a mirrored tetrahedron is at rest too), "recover" or "off"; None:
-            the law's default. A law with an energy accepts only its own value.
+        flips: "tolerant" (a mirrored tetrahedron is also at rest, as in the thesis), "recover" or "off";
+            None: the law's default. A law that derives from an energy accepts only its default.
         damping_model: "edge" (eq. 3.9) or "tet_mean" (rejected in section 6.4, because it stops rotation).
         pinned: vertices that stay in place.
         contact: contact properties of the surface, used in a world with colliders or soft contact.
         spare_vertices: number of vertices that cuts and tears can add; 0 for a body that is never cut. Needs
             a law on tetrahedra. A cut through a body of n vertices adds about n^(2/3).
-        plasticity: permanent deformation; None for none. Needs a law on tetrahedra and a `Material`.
+        plasticity: permanent deformation; None for an elastic body. Needs a law on tetrahedra and a
+            `Material`.
         tearing: strength above which the body tears; None for no tearing. Needs spare vertices and a
             `Material`.
         skin: surface to draw instead of the surface of the tetrahedra: a file, a trimesh.Trimesh or a Scene,
             as for `read_surfaces`. See `Body.render_meshes`.
-        hull: contact surface. None: the surface of the tetrahedra. A number (12 to 20,000): that many points
-            of the skin, with triangles between them; True chooses the number. A surface, as for
-            `read_surfaces`: its vertices and triangles. See docs/artists-mesh.md. Needs tetrahedra; not
-            possible with spare vertices or self-contact.
+        hull: contact surface. None: the surface of the tetrahedra. A number from 12 to 20,000: that many
+            points of the skin, connected by triangles. True: an automatic number of points. A surface, as for
+            `read_surfaces`: this surface. See docs/artists-mesh.md. Needs tetrahedra; not possible with spare
+            vertices or self-contact.
         coarser: levels of detail for `Body.set_level`: assets of the same body, each with fewer tetrahedra
-            than the one before, as `with_coarser` makes them. Not possible with spare vertices or plasticity.
+            than the asset before. `with_coarser` makes such assets. Not possible with spare vertices or
+            plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
     Example:
         crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
@@ -217,9 +219,9 @@ class SoftBodyAsset:
         """Return a copy of the asset with a level of detail for each of these meshes.
 
         The materials of the levels are calibrated so that mass and lowest frequencies are the same as for the
-        finest level. This takes seconds for each level.
+        finest level. The calibration takes seconds for each level.
         Args:
-            meshes: rest shapes, each with fewer tetrahedra than the one before.
+            meshes: rest shapes, each with fewer tetrahedra than the mesh before.
         Raises: MeshError for a mesh that is not coarser; MaterialError unless the material is a `Material`
             with one number for each constant; OptionError for spare vertices, tearing, plasticity or a law
             along edges.
@@ -314,12 +316,13 @@ class SoftBodyAsset:
                 sixteenth of a cell, which the cage would otherwise omit: 0 to 3; None: 1. Each halving also
                 halves the substep. Parts that are still omitted are drawn, but neither bend nor collide. The
                 log reports halvings and omitted parts, with the `cell_size` that keeps the parts.
-            up: axis that points up in the file, "y" or "z"; None: "y" for .glb, .gltf and .obj, and "z" for
-                all others, as most programs write.
+            up: axis that points up in the file, "y" or "z". None: the usual axis of the file type, "y" for
+                .glb, .gltf and .obj, and "z" for the other types.
             center: True moves the centre of the bounding box to the origin. Files in geographic coordinates,
                 kilometres away from the origin, need this because positions are 32-bit numbers.
             scale: length of the file's unit [m]: 0.001 for millimetres.
-            options: further arguments of `SoftBodyAsset`. A `skin` is drawn instead of the surface.
+            options: further arguments of `SoftBodyAsset`. If you pass `skin`, it is drawn instead of the
+                surface.
         The logger `taichi_soft` reports assumptions about the file, repairs and omissions.
         Raises: MeshError, with a suggested fix, for a surface that cannot be read or encloses nothing, and
             for a process that crashes or takes too long; OptionError for cells out of range, with the memory
@@ -358,7 +361,7 @@ class SoftBodyAsset:
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:
-        """Surfaces of the skin, bound to the tetrahedra."""
+        """Surfaces of the skin, bound to the tetrahedra; empty if the asset has no skin."""
         if not self.skin:
             return ()
         assert isinstance(self.mesh, TetMesh)
@@ -366,7 +369,7 @@ class SoftBodyAsset:
 
     @cached_property
     def bound_hull(self) -> BoundHull | None:
-        """The hull, bound to the tetrahedra."""
+        """Hull, bound to the tetrahedra; None if the asset has no hull."""
         if self.hull is None:
             return None
         assert isinstance(self.mesh, TetMesh)
@@ -374,7 +377,7 @@ class SoftBodyAsset:
 
     @cached_property
     def arrays(self) -> BodyArrays:
-        """The body in kernel order; slow to compute, so it is cached."""
+        """Arrays of the body in kernel order. They are cached, because they are slow to compute."""
         arrays, hull = arrange(self.description), self.bound_hull
         if hull is None:
             return arrays
@@ -382,7 +385,9 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Positions of the points that can touch colliders, (k, 3) [m]: of the hull, else of the surface.
+        """Return the positions of the points that can touch colliders, (k, 3) [m].
+
+        These points are the points of the hull, or, if there is no hull, the vertices of the surface.
 
         Args:
             x: positions of the vertices, (n, 3) [m].
@@ -401,22 +406,22 @@ class SoftBodyAsset:
     def first_frequency(self) -> float:
         """Angular frequency of the slowest vibration of the free body [rad/s], at most 20 % too high.
 
-        0 for ropes and cloth, which bend freely.
+        The frequency is 0 for ropes and cloth, because they bend freely.
         """
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
-        """Estimate of `first_frequency` [rad/s], faster to compute; 0 for pairwise laws too."""
+        """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges."""
         return guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
-        """Decay rate of vibrations [1/s] of a body of this asset, and longest interval between dampings [s].
+        """Return the decay rate of a body's vibrations [1/s], and the longest time between two dampings [s].
 
-        The body can be cut or have another material: the frequency of its first mode is then scaled by the
-        square root of its mean stiffness over its mean density.
+        The body can be cut or have another material. If the material differs, the frequency of the first mode
+        is scaled by the square root of mean stiffness over mean density.
         Args:
-            body: description of that body.
+            body: description of a body of this asset.
         """
         material = body.material
         if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
@@ -427,8 +432,9 @@ class SoftBodyAsset:
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
 
     def kind_row(self, *, is_implicit: bool) -> tuple[float, ...]:
-        """Row of `BodyFields.load` for a body of this asset: `body_edge`, `body_stride`, `body_sound_speed`
-        and `vibration_row`.
+        """Return the row of a body of this asset in the argument `kinds` of `BodyFields.load`.
+
+        The row contains `body_edge`, `body_stride`, `body_sound_speed` and `vibration_row`.
 
         Args:
             is_implicit: True for implicit Euler, which has no largest stable substep: the stride is then 0.
@@ -439,10 +445,10 @@ class SoftBodyAsset:
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
-        """Friction, thickness [m] and mean edge [m] of the contact surface.
+        """Friction, thickness [m] and mean edge length [m] of the contact surface.
 
-        The contact surface is the hull if there is one, else the surface. Without triangles, the mean is over
-        all edges.
+        The contact surface is the hull, or, if there is no hull, the surface of the mesh. If the mesh has no
+        triangles, the mean is over all edges.
         """
         corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
         ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
@@ -476,7 +482,7 @@ class SoftBodyAsset:
         angular_velocity: ArrayLike,
         floor: float | None,
     ) -> Floats32:
-        """Position, velocity, inverse mass and mass of each vertex of a body placed in a world, (n, 8).
+        """Return position, velocity, inverse mass and mass of each vertex of a body in a world, (n, 8).
 
         Args:
             position, rotation, velocity, angular_velocity: as for `World.spawn`.

@@ -1,8 +1,8 @@
-"""Hull of a body, bound to the tetrahedra of its cage: points of the artist's surface that make contact.
+"""Hull of a body, bound to the tetrahedra of its cage. A hull has those surface points that make contact.
 
-A point has weights w in the four vertices of a tetrahedron, x = sum_i w_i x_i, and moves with them. An
-impulse P at the point is w_i P at each vertex, so its inverse mass is sum_i w_i^2 / m_i. Momentum and angular
-momentum are conserved, because the impulses w_i P at x_i are equivalent to P at x.
+A point x has a weight w_i for each vertex x_i of a tetrahedron, so that x = sum_i w_i x_i at any time. An
+impulse P at the point acts on each vertex as w_i P, so the point has the inverse mass sum_i w_i^2 / m_i.
+Momentum and angular momentum are conserved, because the impulses w_i P at x_i are equivalent to P at x.
 
 A point outside the cage follows the nearest tetrahedron, extrapolated beyond its faces.
 """
@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
 
 MIN_WEIGHT = -2.0
-"""Smallest weight. It confines a point to its tetrahedron enlarged ninefold about the centre. An impact on a
-point farther out would move the nearest vertices by many times the displacement of the point."""
+"""Smallest weight. This limit confines a point to its tetrahedron, enlarged ninefold about the centre. An
+impact on a point farther out would move the nearest vertices by many times the displacement of the point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class BoundHull:
 
     @property
     def mean_edge(self) -> float:
-        """Mean edge of the triangles [m]."""
+        """Mean edge length of the triangles [m]."""
         ends = self.points[self.triangles]
         return float(np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=2).mean())
 
@@ -53,7 +53,7 @@ def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
     offset = barycentric(hull.points, corners) - nearest
-    # Fraction of the offset from the mesh that `MIN_WEIGHT` allows.
+    # Largest fraction of the offset from the mesh with no weight below `MIN_WEIGHT`.
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(offset < 0.0, (MIN_WEIGHT - nearest) / offset, np.inf).min(axis=1)
     clamped_count = int((allowed < 1.0).sum())

@@ -1,10 +1,10 @@
 """Calibrate the material of a coarser mesh to the mass and frequencies of a finer mesh.
 
 A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. The Young's modulus of
-each tetrahedron is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995): for a
-mode u with u^T M u = 1, the contribution of tetrahedron t to u^T K u is the sensitivity of the squared
-frequency to the logarithm of its modulus. Of all moduli that give the target frequencies, the update chooses
-those with the smallest change.
+each tetrahedron is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995). The
+sensitivity of a mode is the derivative of its squared frequency by the logarithm of a tetrahedron's modulus.
+For a mode u with u^T M u = 1, the sensitivity is the contribution of the tetrahedron to u^T K u. Many sets of
+moduli give the target frequencies; the update chooses the set with the smallest change.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
 
 MODES = 4
-"""Number of modes whose frequencies must agree: the slowest ones dominate the visible wobble."""
+"""Number of slowest modes whose frequencies must agree. These modes dominate the visible wobble."""
 
 MODE_TOLERANCE = 2e-3
 """Relative change of the squared frequencies below which the modes count as converged."""
@@ -40,17 +40,18 @@ WARNING_ERROR = 0.05
 MAX_UPDATES = 6
 
 RCOND = 0.1
-"""Singular values of the sensitivities below this fraction of the largest are ignored. They belong to modes
-that no modulus can separate, such as the two bending modes of a round bar."""
+"""Singular values of the sensitivities below this fraction of the largest value are ignored. Such values
+belong to modes that no modulus can separate, for example the two bending modes of a round bar."""
 
 MAX_CHANGE = 3.0
-"""Largest ratio between a modulus and the median of all moduli: more would make a visibly different body."""
+"""Largest ratio between a modulus and the median of all moduli. A larger ratio would visibly change the
+body."""
 
 
 def calibrated(fine: BodyDescription, coarser: Sequence[BodyDescription]) -> list[Material]:
     """Return the materials that give coarser bodies the mass and the lowest frequencies of `fine`.
 
-    Args: fine, coarser: bodies of one material that has one number for each constant.
+    Args: fine, coarser: bodies of the same material, which has one number for each constant.
     Returns: for each coarser body, a material with a Young's modulus for each tetrahedron.
     """
     target, _ = lowest_modes(fine, MODES, MODE_TOLERANCE)
@@ -62,7 +63,7 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
     material = coarse.material
     assert isinstance(material, Material)
     density = material.density * mass / coarse.masses.sum()
-    factors = np.zeros(len(coarse.mesh.tets))  # logarithms of the factors of the modulus
+    factors = np.zeros(len(coarse.mesh.tets))  # logarithm of each tetrahedron's factor of `young`
     best, smallest_error = coarse.material, np.inf
     for _ in range(MAX_UPDATES):
         young = material.young * np.exp(factors)
@@ -76,7 +77,8 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
         if error < TOLERANCE:
             break
         sensitivities = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
-        # The common factor is separate, because the least-squares solution would distribute it unevenly.
+        # The factor common to all modes is applied to all tetrahedra alike, because the least-squares
+        # solution would distribute it unevenly.
         common = gaps.mean()
         factors += common + np.linalg.pinv(sensitivities, rcond=RCOND) @ (gaps - common)
         median = np.median(factors)

@@ -8,7 +8,7 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.field_table import BLOCK, BODY, EDGE, OUTER, PARTICLE, RING, TRIANGLE, WORLD
 
 ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
-"""Attributes of a `BodyCapacity` that can be larger than needed without any effect."""
+"""Attributes of a `BodyCapacity` that can be larger than a world needs."""
 
 
 LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
@@ -19,7 +19,7 @@ Room = TypeVar("Room", bound="BodyCapacity")
 
 @dataclass(frozen=True)
 class BodyCapacity:
-    """Capacity of a state, rounded up to powers of two so that similar worlds share compiled kernels."""
+    """Capacity of the fields of a world, in powers of two so that similar worlds share compiled kernels."""
 
     particles: int
     edges: int
@@ -27,12 +27,12 @@ class BodyCapacity:
     bodies: int
     triangles: int
     outer: int
-    parallel: bool  # room for the forces of all corners and edges, for the flat schedule
-    rings: int = 0  # rows of edge rings; 0 if no edges carry elastic forces
-    implicit: bool = False  # room for the linear system of implicit integration
-    anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
-    plastic: bool = False  # room for the original rest shapes of plastic bodies
-    double: bool = False  # float64 instead of float32, to evaluate forces without motion
+    parallel: bool  # True adds fields for the forces of all corners and edges, for the flat schedule
+    rings: int = 0  # number of rows of edge rings; 0 if no edges carry elastic forces
+    implicit: bool = False  # True adds fields for the linear system of implicit integration
+    anisotropic: bool = False  # True adds fields for 21 elastic constants per tetrahedron
+    plastic: bool = False  # True adds fields for the original rest shapes of plastic bodies
+    double: bool = False  # True uses float64 instead of float32, to evaluate forces without motion
 
     @classmethod
     def of(
@@ -47,8 +47,8 @@ class BodyCapacity:
     ) -> Room:
         """Return the capacity for `scene`, with `LANES` spare particles and triangles.
 
-        Vector code reads these beyond the last body.
-        Args: others: values that a subclass adds, by name.
+        Vector code reads the spare rows beyond the last body.
+        Args: others: values of the attributes that a subclass adds.
         """
         return cls(
             room_for(scene.particle_count + LANES, "particles"),
@@ -83,7 +83,7 @@ class BodyCapacity:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of rows for each group of fields, by the names that `declare` uses."""
+        """Number of rows of each group of fields, by the group's name in `declare`."""
         return {
             WORLD: 1,
             PARTICLE: self.particles,
@@ -96,7 +96,10 @@ class BodyCapacity:
         }
 
     def has_room_for(self, other: "BodyCapacity") -> bool:
-        """True if a state of this capacity has all fields of a state of capacity `other`, none shorter."""
+        """True if fields of this capacity can hold a world of capacity `other`.
+
+        Both capacities must have the same optional fields, and no field of this capacity may be shorter.
+        """
         widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
         return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
 

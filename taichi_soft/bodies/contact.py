@@ -9,7 +9,7 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.serialisation import serialised
 
 DEFAULT_THICKNESS = 0.02
-"""Default thickness relative to the mean edge of the surface: too thin to be visible."""
+"""Default thickness, relative to the mean edge length of the surface. A layer this thin is invisible."""
 
 
 @serialised("friction", "thickness", "itself", "group", "mask")
@@ -18,13 +18,14 @@ class Contact:
     """Contact properties of a body's surface.
 
     Args:
-        friction: Coulomb coefficient, 0 or more. Between two bodies, the geometric mean of their coefficients
-            applies; between a body and a collider, the collider's coefficient.
-        thickness: thickness of a layer on the surface [m]. The distance kept between two bodies is the mean
-            of their thicknesses. None: 2 % of the mean edge of the surface.
-        itself: True for self-contact, between parts of the body that are more than 1.5 edges apart at rest.
-        group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each shares a
-            bit with the group of the other.
+        friction: Coulomb coefficient, 0 or more. Contact of two bodies uses the geometric mean of their
+            coefficients. Contact with a collider uses the collider's coefficient.
+        thickness: thickness of a layer on the surface [m]. Contact keeps two bodies apart by the mean of
+            their thicknesses. None: 2 % of the mean edge length of the surface.
+        itself: True for self-contact. It acts between parts of the body that are more than 1.5 edge lengths
+            apart at rest.
+        group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each object has
+            a bit in common with the group of the other object.
     Raises: OptionError for a value out of range.
     """
 

@@ -1,4 +1,4 @@
-"""State of an asset's mesh after cuts, as the few numbers from which everything else can be rebuilt."""
+"""Mesh of a body after cuts, stored as the numbers from which the body's arrays can be rebuilt."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """A subset of the tetrahedra of an asset's mesh, and copies of its vertices."""
+    """A subset of the tetrahedra of an asset's mesh, with vertices that cuts have copied."""
 
-    vertices: Ints  # (n,), vertex of the asset's mesh for each vertex, which is the same or a copy
+    vertices: Ints  # (n,), original of each vertex in the asset's mesh
     order: NDArray[np.int32]  # (n,), order of the vertices in the kernels
-    tets: Ints  # (m,), tetrahedra of the asset's mesh
+    tets: Ints  # (m,), index of each tetrahedron in the asset's mesh
     corners: NDArray[np.int32]  # (m, 4), vertices of each tetrahedron
 
     @cached_property
     def rows(self) -> NDArray[np.int32]:
-        """All four arrays concatenated, (2 n + 5 m,)."""
+        """Concatenation of the four arrays of the mesh, (2 n + 5 m,)."""
         parts = (self.vertices, self.order, self.tets, self.corners.ravel())
         return np.concatenate(parts).astype(np.int32)
 

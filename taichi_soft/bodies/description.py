@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SHORTEST_EDGE = 1e-6
-"""Shortest edge [m]: volumes of smaller tetrahedra exceed float32's range."""
+"""Shortest edge that a mesh can have [m]. The volumes of smaller tetrahedra are outside float32's range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +55,17 @@ class BodyDescription:
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
 
     def per_tet(self, name: str) -> Floats:
-        """Return a constant of the material for each tetrahedron, times its solid fraction, (m,)."""
+        """Return a constant of the material, multiplied by the solid fraction of each tetrahedron, (m,).
+
+        The result is empty for a `SpringMaterial`.
+        """
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
         assert isinstance(self.mesh, TetMesh)
         return self.material.per_tet(name, len(self.mesh.tets)) * self.mesh.fill
 
     def stiffness_matrices(self) -> Floats:
-        """Stiffness C of Hooke's law for each tetrahedron, times its solid fraction, (m, 6, 6) [Pa]."""
+        """Return Hooke's stiffness C of each tetrahedron, times its solid fraction, (m, 6, 6) [Pa]."""
         assert isinstance(self.mesh, TetMesh)
         assert isinstance(self.material, Material | AnisotropicMaterial)
         return self.material.stiffness_matrices(len(self.mesh.tets)) * self.mesh.fill[:, None, None]
@@ -76,8 +79,9 @@ class BodyDescription:
     def sound_speed(self) -> float:
         """Speed of the fastest waves at rest [m/s].
 
-        The largest sqrt((lambda + 2 mu) / density) of the tetrahedra. For springs between given particles,
-        the largest a sqrt(k / m), with the length a and the smaller mass m of the two ends.
+        The speed is the largest sqrt((lambda + 2 mu) / density) of the tetrahedra. For a `SpringMaterial`, it
+        is the largest a sqrt(k / m) of the edges, where a is the length of an edge, k its spring constant and
+        m the smaller mass of its two ends.
         """
         mesh, material = self.mesh, self.material
         if isinstance(material, SpringMaterial):
@@ -106,7 +110,10 @@ class BodyDescription:
 
     @property
     def stiffness(self) -> Floats:
-        """The 21 constants of each tetrahedron of an anisotropic material, (m, 21) [Pa]; zero for others."""
+        """The 21 constants of an anisotropic material in each tetrahedron, (m, 21) [Pa].
+
+        They are zero for other materials.
+        """
         count = len(self.mesh.tets)
         if not isinstance(self.material, AnisotropicMaterial):
             return np.zeros((count, 21))
@@ -125,25 +132,25 @@ class BodyDescription:
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
-    """Vertices of the surface; all vertices of a `ParticleMesh`, which has no inside."""
+    """Return the vertices of the surface, or all vertices of a `ParticleMesh`, which has no inside."""
     if isinstance(mesh, TetMesh):
         return mesh.surface_vertices
     return np.arange(len(mesh.vertices), dtype=np.int32)
 
 
 def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
-    """Damping of each edge: the mean over the tetrahedra that share it, (k,) [N s/m]."""
+    """Return the damping constant of each edge, (k,) [N s/m]: the mean over the tetrahedra at the edge."""
     total = np.bincount(mesh.tet_edges.ravel(), np.repeat(tet_damping, 6), minlength=len(mesh.edges))
     return total / mesh.edge_valence
 
 
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
-    """Masses of the vertices, (n,) [kg]: a quarter of each adjacent tetrahedron's mass (thesis chapter 6).
+    """Return the masses of the vertices, (n,) [kg]: a quarter of the mass of each adjacent tetrahedron.
 
-    A vertex of a `CageMesh` has the mass of the solid that it carries.
+    See thesis chapter 6. A vertex of a `CageMesh` has the mass of the solid that it carries.
     """
     masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
-    if isinstance(mesh, CageMesh):  # with the mean density of the adjacent tetrahedra
+    if isinstance(mesh, CageMesh):  # mean density of the adjacent tetrahedra times carried volume
         masses *= mesh.vertex_volumes / lumped(mesh.tets, mesh.volumes * mesh.fill, len(mesh.vertices))
     return masses.astype(np.float64)
 
@@ -154,7 +161,7 @@ def rest_inverses(mesh: BodyMesh) -> Floats:
 
 
 def require_size(mesh: BodyMesh) -> None:
-    """Check the lengths of edges. Raises: MeshError below `SHORTEST_EDGE`."""
+    """Check that no edge of a mesh is shorter than `SHORTEST_EDGE`. Raises: MeshError."""
     shortest = float(mesh.edge_lengths.min())
     if shortest < SHORTEST_EDGE:
         raise MeshError(

@@ -12,17 +12,17 @@ class Failure:
     body: int  # slot of the body
     tetrahedron: int | None  # first tetrahedron that failed, in the caller's order; None if unknown
     step: int  # step of the world, counted from 0, that was undone for this body
-    substep: int | None  # substep in that step, or in its last retry; None if unknown
-    time: float  # [s], time of the last valid state, in which the body now rests
-    edge: tuple[int, int] | None = None  # first edge that failed, for forces along edges
+    substep: int | None  # substep in which the last try of that step failed; None if unknown
+    time: float  # [s], time of the last valid state, in which the body is frozen
+    edge: tuple[int, int] | None = None  # first edge that failed, for a law along edges
 
 
 @dataclass(frozen=True)
 class FailedStep:
-    """The fixed step in which a body became non-finite."""
+    """Data of the fixed step in which a body became non-finite."""
 
     step: int
     time: float  # [s], time before the step
     substeps: int  # number of substeps of the last retry
     h: float  # [s], length of a substep
-    is_braked: bool  # True if vibrations were braked in the step
+    is_braked: bool  # True if vibrations were strongly damped in the step

@@ -1,8 +1,8 @@
 """Taichi fields of the particles, edges and tetrahedra of bodies.
 
-Fields exist as long as the process: Taichi compiles kernels per set of fields, and destroying a field stalls
-a running game. A closed world therefore returns its fields. The next world that fits into them reuses them
-and their compiled kernels.
+Fields exist as long as the process, because Taichi compiles kernels for each set of fields, and because
+destroying a field stalls a running game. A closed world therefore returns its fields. The next world that
+fits into these fields reuses them, with their compiled kernels.
 """
 
 import gc
@@ -45,17 +45,17 @@ class BodyFields(FieldGroup):
     """Particles, edges, tetrahedra and bodies: one field for each quantity.
 
     Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
-    with K entries is at (b K + k) LANES + l. The arrays are flat because Taichi 1.7 confuses stores at a
-    constant index with loads at a computed one in fields of several dimensions.
+    with K entries is at (b K + k) LANES + l. The arrays are flat, because in fields of several dimensions
+    Taichi 1.7 confuses stores at a constant index with loads at a computed index.
     """
 
     particle_position = declare(
         PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=POSITION_LIMIT, native=True
     )
-    particle_velocity = declare(  # see body_velocity_lag
+    particle_velocity = declare(  # earlier than the position by half of `body_velocity_lag`
         PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
     )
-    # Zero between steps. Four components, because the CPU loads and stores four floats at once.
+    # Zero between steps. A force has four components, because the CPU loads and stores four floats at once.
     particle_force = declare(PARTICLE, REAL, 4, unit="N", start=0)
     particle_mass = declare(PARTICLE, REAL, unit="kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True)
     particle_inv_mass = declare(  # 0 if pinned
@@ -67,24 +67,26 @@ class BodyFields(FieldGroup):
     prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
     prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
     rest_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED)
-    # Kind of target of a pinned particle, see `control.kernels.pins`; position of the target, in the axes of
-    # the world or of a frame.
+    # `particle_aim` is the kind of motion of a pinned particle, see `control.kernels.pins`. `particle_target`
+    # is the position of its target, in the axes of the world or of a frame.
     particle_aim = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(FRAME, WITH_FRAME), native=True
     )
     particle_target = declare(PARTICLE, REAL, 3, unit="m", keep=PARTICLE, most=FINITE, native=True)
-    # External force. It acts if the body is `PUSHED`.
+    # External force. It acts in the next step if `body_drives` has the bit `PUSHED`.
     particle_push = declare(PARTICLE, REAL, 3, unit="N", keep=PARTICLE, most=FINITE)
-    # Impulse on the pin in the last step; its value before the step, for retries.
+    # `particle_reaction` is the impulse of a pinned particle on its pin in the last step. `prev_reaction` is
+    # the value before the step, for retries.
     particle_reaction = declare(PARTICLE, REAL, 3, unit="N s", keep=PARTICLE, native=True)
     prev_reaction = declare(PARTICLE, REAL, 3, unit="N s")
 
-    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)  # 1 if touched in the last substep
+    # 1 if the particle was in contact in the last substep.
+    particle_touches = declare(PARTICLE, ti.i32, start=0, keep=PARTICLE)
     # Speed before contact, relative to the mean velocity of the island.
     particle_speed = declare(PARTICLE, REAL, unit="m/s")
 
     tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
-    tet_rest_inverse = declare(  # column by column; changes only if the body is plastic
+    tet_rest_inverse = declare(  # by columns; constant unless the body is plastic
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
     )
     tet_original_inverse = declare(  # before any plastic flow
@@ -95,10 +97,11 @@ class BodyFields(FieldGroup):
     tet_stiffness = declare(  # upper triangle row by row
         BLOCK, REAL, unit="Pa", each=21 * LANES, start=LOADED, when="anisotropic"
     )
-    tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)  # towards the mean velocity
+    # Damping of the corners' velocities relative to their mean.
+    tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)
 
     edge_vertices = declare(EDGE, ti.i32, 2, start=LOADED, layout=ti.Layout.SOA)
-    edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row, and number of edges, of each block
+    edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row and number of edges of each block
     edge_damping = declare(EDGE, REAL, unit="N s/m", start=LOADED)
     edge_bond = declare(  # see `laws.bonds.Bonds`
         EDGE, REAL, 4, start=LOADED, when="rings", layout=ti.Layout.SOA
@@ -115,19 +118,20 @@ class BodyFields(FieldGroup):
         BLOCK, REAL, unit="Pa", each=LANES, start=LOADED, when="rings"
     )
     tet_pressure = declare(BLOCK, REAL, unit="Pa", each=LANES, when="rings")  # E nu dV / V0
-    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum over the tetrahedra around it
+    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum of the adjacent tetrahedra
     tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
 
-    # Implicit integration. 3 x 3 blocks of the system: diagonal blocks by particle, off-diagonal blocks by
-    # edge, in the row of the first end and the column of the second.
+    # Fields for implicit integration. The linear system has 3 x 3 blocks. Diagonal blocks are stored by
+    # particle. Off-diagonal blocks are stored by edge, for the row of its first and the column of its second
+    # end.
     particle_block = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_block_inverse = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass plus inertia of grabs
     edge_block = declare(EDGE, REAL, (3, 3), when="implicit")
     edge_normal = declare(EDGE, REAL, 3, when="solves_bonds")  # from the last evaluation of forces
     edge_compared = declare(EDGE, REAL, 3, unit="m", when="solves_bonds")
-    # Written by `rigid_rotation`: K W by particle, W^T K W, inverse inertia, and centre of mass relative to
-    # the first particle.
+    # Terms of `rigid_rotation`, where W maps an angular velocity to velocities: K W of each particle,
+    # W^T K W, the inverse inertia tensor, and the centre of mass relative to the first particle.
     particle_turning = declare(PARTICLE, REAL, (3, 3), when="implicit")
     body_turning = declare(BODY, REAL, (3, 3), when="implicit")
     body_inverse_inertia = declare(BODY, REAL, (3, 3), unit="1/(kg m^2)", when="implicit")
@@ -136,21 +140,22 @@ class BodyFields(FieldGroup):
     residual = declare(PARTICLE, REAL, 3, when="implicit")
     direction = declare(PARTICLE, REAL, 3, when="implicit")
     image = declare(PARTICLE, REAL, 3, when="implicit")
-    # Index plus 1 of the collider that constrains the particle, 0 if none; its value before the step.
+    # `particle_contact` is 1 + the index of the collider that constrains the particle, or 0 if no collider
+    # does. `prev_contact` is the value before the step.
     particle_contact = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(COLLIDER, 1), native=True, when="implicit"
     )
     prev_contact = declare(PARTICLE, ti.i32, when="implicit")
-    # Constraint of a particle, see `held_particles`: normal, and STICKS or SLIDES; velocity of the surface;
-    # friction while it slides.
+    # Constraint of a particle in contact, see `held_particles`. `particle_hold` is the normal, and STICKS or
+    # SLIDES. `hold_velocity` is the velocity of the surface. `hold_friction` acts on a sliding particle.
     particle_hold = declare(PARTICLE, REAL, 4, when="implicit")
     hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
     hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
-    # Largest residual of a solve in the last step, over the load.
+    # Largest residual of the solves in the last step, relative to the load.
     body_residual = declare(BODY, REAL, start=0, keep=BODY, inherited=True, when="implicit")
     solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, maximum number of iterations
 
-    # Only for the schedule `flat`.
+    # The following fields are only for the schedule `flat`.
     corner_force = declare(  # corner by corner in each block
         BLOCK, REAL, 4, unit="N", each=4 * LANES, when="parallel"
     )
@@ -160,7 +165,7 @@ class BodyFields(FieldGroup):
         BLOCK, ti.i32, each=4 * LANES, start=LOADED, when="parallel"
     )
     particle_edges = declare(PARTICLE, ti.i32, 2, start=LOADED, when="parallel")  # range in incident_edge
-    incident_edge = declare(  # e as first end, -1 - e as second
+    incident_edge = declare(  # e if the particle is the first end of edge e, -1 - e if it is the second end
         EDGE, ti.i32, each=2, start=LOADED, when="parallel"
     )
     barrier = declare(1, ti.i32, when="parallel")
@@ -177,22 +182,22 @@ class BodyFields(FieldGroup):
     body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
     body_model = declare(BODY, ti.i32, start=LOADED)
     body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
-    # Last substep of leapfrog: velocities are half of it behind positions.
+    # Duration of the last substep of leapfrog. Velocities are half a substep behind positions.
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
-    # Bounding box at the last query that used it.
+    # Bounding box at the time of the last query that used the box.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
     body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
     # Overlap with other bodies, in a world with soft contact: CLEAR, JUST_PLACED or OVERLAPPING.
     body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
-    # Bounding box: of the path in a step, of the surface at a search for contacts, or of a sleeping body.
+    # Bounding box of the path in a step, of the surface during a search for contacts, or of a sleeping body.
     body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
     body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
     # Rest timer: time since a particle was faster than `sleep_speed`.
     body_calm_time = declare(BODY, REAL, unit="s", start=0, keep=BODY)
-    # Bits, see `bodies.status`.
+    # Bits that show what acts on the body, see `bodies.status`.
     body_drives = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True)
     body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE, native=True)
     # Damping rate of velocities in the world frame.
@@ -203,11 +208,11 @@ class BodyFields(FieldGroup):
     body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True)
     # Longest time between two dampings of vibrations.
     body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True)
-    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 during the last retry of a step
-    # Steps with inverted tetrahedra, see `untangling`.
+    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 in the last retry of a step, for strong damping
+    # Number of steps with inverted tetrahedra. It is negative during a restoration, see `untangling`.
     body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
-    body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was too coarse
-    # Number of substeps that the present shape needs, over the number at rest.
+    body_jolted = declare(BODY, ti.i32, start=0)  # 1 if the substeps of a step were too long
+    # Number of substeps that the present shape needs, relative to the number at rest.
     body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
     body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge length of the surface
     # Distance that sound travels in the longest stable substep at rest.
@@ -217,7 +222,7 @@ class BodyFields(FieldGroup):
     retries = declare(WORLD, ti.i32)
     block_model = declare(BLOCK, ti.i32, start=LOADED)
 
-    # Bodies below this speed fall asleep; 0 turns sleep off.
+    # Speed below which bodies fall asleep; 0 disables sleep.
     sleep_speed = declare(WORLD, REAL, unit="m/s", start=LOADED)
     gravity = declare(WORLD, REAL, 3, unit="m/s^2", native=True)
     wind = declare(  # velocity [m/s], density times drag coefficient [kg/m^3]
@@ -233,7 +238,8 @@ class BodyFields(FieldGroup):
         self.real = ti.f64 if capacity.double else ti.f32
         super().__init__(capacity, self.real)
         fields = [(each, field) for _, each, field in self.declared()]
-        # `spawn_body` resets the first ones in a slot. A piece of a cut body gets the others from the body.
+        # `spawn_body` resets the fields of `body_starts` in a slot. When a body is cut, its pieces get its
+        # values of the fields in `inherited`.
         self.body_starts = [
             (field, each.start)
             for each, field in fields
@@ -244,8 +250,8 @@ class BodyFields(FieldGroup):
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, except those for which `loader` already has rows.
 
-        `models[i]` is the index of body i's force model. `kinds[i]` contains its `body_edge`, `body_stride`,
-        `body_sound_speed`, `body_fading` and `body_fading_interval`.
+        `models[i]` is the index of the force model of body i. `kinds[i]` contains the values of `body_edge`,
+        `body_stride`, `body_sound_speed`, `body_fading` and `body_fading_interval` for body i.
 
         All bodies are absent until `spawn_body` places them. Until then, their particles are at the positions
         of their meshes.
@@ -280,7 +286,7 @@ class BodyFields(FieldGroup):
             self._load_bonds(scene)
         if self.capacity.rings or self.capacity.implicit:
             names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
-            # Padding lanes of a last block act on the body's first edge without pressure.
+            # Padding lanes in the last block of a body add zero pressure to its first edge.
             rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
             fill(self.tet_edges, np.concatenate(rows))
         if self.capacity.parallel:
@@ -307,9 +313,9 @@ class BodyFields(FieldGroup):
         self.loader.write()
 
     def tet_constants(self, body: BodyArrays) -> list[tuple[Any, NDArray[np.float64]]]:
-        """Fields with constants of tetrahedra, and the rows of one body in each, (m, k).
+        """Return the fields with constants of tetrahedra, and the rows of one body in each field, (m, k).
 
-        All constants of materials are listed here: for loading, `set_material` and cuts.
+        The list is complete. Loading, `set_material` and cuts use it.
         """
         found = [(self.tet_lame, body.lame), (self.tet_damping, body.tet_damping[:, None])]
         if self.capacity.anisotropic:
@@ -353,16 +359,20 @@ class BodyFields(FieldGroup):
 
 
 def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Append `LANES` rows of zeros to a body's edges: spare edges from its first particle to itself."""
+    """Append `LANES` rows of zeros to the rows of a body's edges.
+
+    These spare edges connect the first particle of the body with itself.
+    """
     return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
 
 
 def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
-    """Rows of all bodies, each at the start of its range and padded with zeros.
+    """Concatenate the rows of all bodies. Zeros pad the rows of each body to the length of its range.
 
     Args:
-        counted_from: kind of rows that the numbers refer to. They become rows of the world.
-        columns: number of leading columns with such numbers; None for all columns.
+        counted_from: kind of rows of the body to which the result of `rows_of` refers. These numbers are
+            converted to rows of the world.
+        columns: number of leading columns to convert; None for all columns.
     """
     parts = []
     for body, place, span in zip(scene.bodies, scene.ranges, _spans(scene, kind), strict=True):
@@ -375,13 +385,13 @@ def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=
 
 
 def _spans(scene: Scene, kind: str) -> NDArray[np.int64]:
-    """Number of rows of a kind reserved for each body, used or not."""
+    """Return the number of rows of a kind that are reserved for each body, (bodies,)."""
     starts = [getattr(place, kind)[0] for place in (*scene.ranges, scene.ends)]
     return np.diff(starts)
 
 
 def _used(scene: Scene, kind: str, rows_of) -> NDArray[np.int64]:  # type: ignore[no-untyped-def]
-    """Range of the rows that each body uses, (bodies, 2)."""
+    """Return the range of the rows of a kind that each body uses, (bodies, 2)."""
     starts = np.array([getattr(place, kind)[0] for place in scene.ranges])
     return np.stack([starts, starts + [len(rows_of(body)) for body in scene.bodies]], axis=1)
 
@@ -398,9 +408,10 @@ def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generi
 def _tet_blocks(
     bodies: list[BodyArrays], ranges: list[Ranges]
 ) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
-    """Vertices of all blocks; and for each corner with a force its particle and its row in corner_force.
+    """Return the vertices of all blocks, and the particle and the row in `corner_force` of each corner.
 
-    Padding lanes of a last block name the body's first particle four times: no shape, no force.
+    Only corners on which a tetrahedron exerts a force are returned, (c, 2). Padding lanes in the last block
+    of a body name its first particle four times, so they have no volume and no force.
     """
     blocks, corners = [], []
     for body, place in zip(bodies, ranges, strict=True):
@@ -424,14 +435,14 @@ Kind = TypeVar("Kind", bound=BodyFields)
 
 @in_turn
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
-    """Return free fields of a kind that fit a capacity, or make new ones.
+    """Return free fields of a kind that can hold a capacity, or make new fields.
 
-    Fields for which `program` is compiled are preferred, then the smallest. The garbage of closed worlds is
-    collected first if that can free such fields.
+    The function prefers fields with compiled kernels for `program`, and then the smallest fields. If the
+    garbage of closed worlds can contain such fields, it is collected first.
     """
     fields = _best(kind, capacity, program)
     if (fields is None or program not in fields.programs) and len(_free) < len(_made):
-        gc.collect()  # closed worlds can be kept by a cycle, such as a traceback
+        gc.collect()  # a reference cycle, for example through a traceback, can keep closed worlds
         fields = _best(kind, capacity, program)
     if fields is None:
         fields = make_fields(partial(kind, capacity))
@@ -443,16 +454,16 @@ def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
 
 
 def _best(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind | None:
-    """The best free fields that fit, or None."""
+    """Return the best free fields that can hold a capacity, or None: see `acquire`."""
     fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
     return min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms), default=None)
 
 
 def made_fields() -> list[BodyFields]:
-    """All fields that this process has made, used or free, in order."""
+    """Return all fields that this process has made, used and free, in the order of creation."""
     return list(_made)
 
 
 def release(fields: BodyFields) -> None:
-    """Return the fields of a closed world."""
+    """Make the fields of a closed world available to new worlds."""
     _free.append(fields)

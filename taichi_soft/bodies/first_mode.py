@@ -1,4 +1,4 @@
-"""Slowest vibration of a free body. The damping ratio of a material refers to its frequency."""
+"""Slowest vibration of a free body. The damping ratio of a material refers to this vibration's frequency."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from taichi_soft.core.residue import rounded
 Floats = NDArray[np.float64]
 
 _EXTRA_MODES = 3
-"""Number of modes computed beyond those requested: round bodies have several modes of one frequency."""
+"""Number of modes computed in addition to the requested modes: round bodies have several modes of equal
+frequency."""
 
 _CHUNK = 4
-"""Columns per product with the stiffness matrix: more do not fit into the processor's cache."""
+"""Number of columns that are multiplied by the stiffness matrix at once. More do not fit into the cache."""
 
 _MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
 """The search ends when the relative change of the squared frequency over `_WINDOW` iterations is below
-`_CHANGE`. A single iteration can change little long before convergence, as in long bodies and letters."""
+`_CHANGE`. In long bodies, a single iteration can change the frequency little long before convergence."""
 
 _ROUND_OFF = 1e-9
-"""Length of a direction, relative to the longest, below which it is discarded as round-off. If normalised, it
-would contain rigid motion. Bodies of few tetrahedra soon have no other directions."""
+"""Length of a direction, relative to the longest direction, below which it is discarded as round-off.
+Normalised round-off would contain rigid motion. Bodies of few tetrahedra soon have no new directions."""
 
 MAX_PARTS = 30
 """Largest number of separate components whose rigid motions are removed. A body with more components
@@ -35,17 +36,17 @@ counts as undamped."""
 
 
 def first_frequency(body: BodyDescription) -> float:
-    """Angular frequency of the slowest vibration of a free body [rad/s], at most 20 % too high.
+    """Return the angular frequency of the slowest vibration of a free body [rad/s], at most 20 % too high.
 
-    0 if the body cannot vibrate.
+    The frequency is 0 if the body cannot vibrate.
     """
     return first_mode(body)[0]
 
 
 def guessed_frequency(body: BodyDescription) -> float:
-    """Upper bound of the first angular frequency [rad/s], by Ritz's method with polynomials: fast.
+    """Return a fast upper bound of the first angular frequency [rad/s], by Ritz's method with polynomials.
 
-    0 for pairwise laws.
+    The bound is 0 for pairwise laws.
     """
     if body.bonds is not None:
         return 0.0
@@ -57,9 +58,10 @@ def guessed_frequency(body: BodyDescription) -> float:
 
 
 def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:
-    """Slowest vibration of a free body: angular frequency [rad/s], and shape (n, 3) with largest entry 1.
+    """Return the slowest vibration of a free body: angular frequency [rad/s], and shape (n, 3).
 
-    Both are 0 if the body cannot vibrate. The frequency is an upper bound.
+    The largest entry of the shape is 1. Frequency and shape are 0 if the body cannot vibrate. The frequency
+    is an upper bound.
     Args: change: relative change of the squared frequency in 10 iterations at which the search ends.
     """
     frequencies, shapes = lowest_modes(body, 1, change)
@@ -69,11 +71,12 @@ def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, F
 
 
 def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floats, Floats]:
-    """Slowest vibrations of a free body: angular frequencies [rad/s], ascending, and shapes (k, n, 3).
+    """Return the slowest vibrations of a free body: ascending angular frequencies [rad/s], shapes (k, n, 3).
 
-    The squares of a shape, weighted by mass, sum to 1. The result has fewer than `count` vibrations if the
-    body has no more. Ritz's method with polynomials of up to third order gives a first guess. The locally
-    optimal block conjugate gradient method refines it (Knyazev 2001). The frequencies are upper bounds.
+    The squared entries of a shape, weighted by mass, sum to 1. If the body has fewer than `count` vibrations,
+    all of them are returned. Ritz's method with polynomials of up to third order gives a first guess. The
+    locally optimal block conjugate gradient method refines this guess (Knyazev 2001). The frequencies are
+    upper bounds.
     Args: change: relative change of the sum of squared frequencies in 10 iterations at which the search ends.
     """
     vibration = vibration_of(body)
@@ -105,7 +108,7 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
-    """Return K times the columns of u, (3n, k), a few columns at a time so that they stay in the cache."""
+    """Return K times u, (3n, k). A few columns are multiplied at a time, so that they stay in the cache."""
     parts = [u[:, k : k + _CHUNK] for k in range(0, u.shape[1], _CHUNK)]
     return np.hstack(
         [vibration.apply(part.reshape(-1, 3, part.shape[1])).reshape(part.shape) for part in parts]
@@ -113,9 +116,10 @@ def _applied(vibration: Vibration, u: Floats) -> Floats:
 
 
 def _ritz(directions: Floats, images: Floats, count: int) -> tuple[Floats, Floats, Floats]:
-    """Find the slowest `count` vibrations in the span of directions (3n, k); `images` are K times these.
+    """Find the slowest `count` vibrations in the span of `directions`, (3n, k).
 
-    Returns: the vibrations, their images and their squared frequencies.
+    Args: images: K times `directions`.
+    Returns: the vibrations (3n, count), K times the vibrations, and the squared frequencies (count,).
     """
     lengths = np.linalg.norm(directions, axis=0)
     is_valid = lengths > _ROUND_OFF * lengths.max()
@@ -134,7 +138,10 @@ def _orthonormal(directions: Floats) -> Floats:
 
 
 def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
-    """Orthonormal rigid motions, and deformations of first to third order, times the root of the masses."""
+    """Return orthonormal rigid motions (3n, k), and deformations of first to third order (3n, d).
+
+    The columns are displacements times the square root of the masses.
+    """
     x, one, root = _centred(body.mesh.vertices, body.masses), np.ones(len(body.masses)), np.sqrt(body.masses)
     first = [one, *x.T]
     second = [x[:, a] * x[:, b] for a in range(3) for b in range(a, 3)]
@@ -150,10 +157,10 @@ def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
 
 
 def _rigid_motions(body: BodyDescription) -> Floats:
-    """Orthonormal rigid motions (3n, k), times the root of the masses.
+    """Return orthonormal rigid motions, times the square root of the masses, (3n, k).
 
-    Components that share no vertices move independently. The result contains six motions for
-    each of the `MAX_PARTS` largest components.
+    Components that share no vertices move independently. The result contains six motions for each of the
+    `MAX_PARTS` largest components.
     """
     tets = body.mesh.tets
     part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))
@@ -174,13 +181,13 @@ def _rigid_motions(body: BodyDescription) -> Floats:
 
 
 def _centred(x: Floats, mass: Floats) -> Floats:
-    """Positions (n, 3) relative to their centre of mass, in units of the largest coordinate."""
+    """Return positions (n, 3) relative to their centre of mass, divided by the largest coordinate."""
     x = x - mass @ x / mass.sum()
     return np.asarray(x / (np.abs(x).max() + 1e-300))
 
 
 def _displacements(amounts: Sequence[tuple[int, Floats]]) -> Floats:
-    """Displacements (3n, k), one column for each pair of an axis and the amounts (n,) along it."""
+    """Return displacements (3n, k), one column for each pair of an axis and amounts (n,) along this axis."""
     columns = np.zeros((len(amounts[0][1]), 3, len(amounts)))
     for k, (axis, amount) in enumerate(amounts):
         columns[:, axis, k] = amount

@@ -48,12 +48,12 @@ def internal_forces(
 ) -> NDArray[Any]:
     """Return the elastic and damping forces on every vertex of a deformed mesh [N].
 
-    The functions of a running world compute them, in the requested precision.
+    The computation uses the functions of a running world, in the requested precision.
     Args:
         mesh: mesh at rest.
         material: constants of the body.
         positions: deformed vertices, (n, 3) [m], in the mesh's order.
-        velocities: velocities of the vertices, (n, 3) [m/s]; None: without damping forces.
+        velocities: velocities of the vertices, (n, 3) [m/s]; None: zero, so that there is no damping.
         law, strain, flips, damping_model: as for `World.add_body`.
         dtype: float64 or float32, the precision of the computation.
     Returns: forces, (n, 3) of `dtype`.
@@ -78,13 +78,14 @@ def force_gradient(
 ) -> NDArray[np.float64]:
     """Return the derivative of the elastic forces on a deformed mesh by its vertices, in float64.
 
-    It is exact, except for the laws of chapter 4. For these, the normals of the planes stay fixed (thesis
-    4.2), with an error of 0.1 to 0.6 by the sum of squares. "cmpm2", "best_fitting_plane" and
-    "split_ring_plane" use the matrix that "cmpm" would have for an edge with the same normal.
+    The derivative is exact, except for the laws of chapter 4. For these laws, it ignores that the normals of
+    the planes change (thesis 4.2). The relative error is then 0.1 to 0.6 (Frobenius norm). "cmpm2",
+    "best_fitting_plane" and "split_ring_plane" use the matrix that "cmpm" has for an edge with the same
+    normal.
     Args:
         mesh, material, positions, law, strain, flips: as for `internal_forces`.
         projected: True for the symmetric, negative semi-definite matrix that implicit Euler uses.
-    Returns: df/dx, (n, 3, n, 3) [N/m], as a dense array, for meshes of a few hundred vertices.
+    Returns: df/dx, (n, 3, n, 3) [N/m]. The array is dense, so use it for at most a few hundred vertices.
     Raises: as for `internal_forces`.
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
@@ -97,10 +98,10 @@ def force_gradient(
 
 
 class StaticBody:
-    """One body in its own fields, which evaluates forces as a world does, without motion."""
+    """A body that does not move, in separate fields. It evaluates forces like a world."""
 
     def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
-        """Put the body into fields of float64 if `double`, else float32. Start Taichi if necessary."""
+        """Write the body to fields of float64 if `double`, else of float32. Start Taichi if necessary."""
         init()
         self.body = body
         self._rows = arrange(body)
@@ -114,14 +115,14 @@ class StaticBody:
         self._state.load(scene, [0])
 
     def forces(self, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
-        """Internal forces at these positions and velocities, (n, 3) [N], in the mesh's order."""
+        """Return the internal forces at `positions` and `velocities`, (n, 3) [N], in the mesh's order."""
         write_motion(self._state, 0, positions, velocities)
         rows = np.empty_like(positions)
         compute_body_forces(self._state, self._program, 0, rows)
         return np.asarray(rows[self._rows.rank])
 
     def exact_stiffness(self) -> Floats:
-        """-df/dx at the last positions of `forces`, (n, 3, n, 3) [N/m], in the mesh's order."""
+        """Return -df/dx at the positions of the last call of `forces`, (n, 3, n, 3) [N/m], in mesh order."""
         n, body = len(self._rows.mass), self._rows
         total = np.zeros((n, n, 3, 3))
         if not self.body.model.has_bonds:
@@ -140,9 +141,10 @@ class StaticBody:
         return self._in_mesh_order(total)
 
     def system_stiffness(self) -> Floats:
-        """-df/dx at the last positions of `forces` as implicit Euler uses it, projected, (n, 3, n, 3) [N/m].
+        """Return the projected -df/dx of implicit Euler, (n, 3, n, 3) [N/m], in mesh order.
 
-        It is assembled from the blocks of particles and edges, in the mesh's order.
+        The derivative is at the positions of the last call of `forces`. It is assembled from the blocks of
+        particles and edges.
         """
         n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
         compute_system_stiffness(self._state, self._program)
@@ -159,7 +161,10 @@ class StaticBody:
 
 
 def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> None:
-    """Add the matrix of each element, (m, 3 c, 3 c), to the blocks (n, n, 3, 3) of its c owners, (m, c)."""
+    """Add matrices of elements, (m, 3 c, 3 c), to the 3 x 3 blocks of `total`, (n, n, 3, 3).
+
+    Args: owners: the c vertices of each element, (m, c).
+    """
     corners = owners.shape[1]
     blocks = elements.reshape(-1, corners, 3, corners, 3)
     for i in range(corners):
@@ -176,9 +181,9 @@ def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArr
     double = positions.dtype == np.float64
     cached = _cached.get(double)
     if cached is not None:
-        last_body = cached.body  # compared by its parts, because each call makes a new description
+        last_body = cached.body  # the parts are compared, because each call makes a new object
         if (last_body.mesh, last_body.material, last_body.model) != (body.mesh, body.material, body.model):
-            del _cached[double], cached  # frees its fields for the next body
+            del _cached[double], cached  # frees the fields of the last body
     if double not in _cached:
         _cached[double] = StaticBody(body, double=double)
     return _cached[double].forces(positions, velocities)

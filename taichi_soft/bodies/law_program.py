@@ -1,4 +1,4 @@
-"""Compile-time parameters of the kernels for one body."""
+"""Compile-time parameters of the kernels that compute forces."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from taichi_soft.elements.laws import ElementModel
 
 @dataclass(frozen=True)
 class Program:
-    """The laws of a world: choices that shape the compiled code, without numbers."""
+    """Force laws of a world. The compiled code depends on the laws, but not on constants of materials."""
 
-    models: tuple[ElementModel, ...]  # each body refers to one by its index
+    models: tuple[ElementModel, ...]  # `BodyFields.body_model` is an index into this tuple
 
     @property
     def reads_expansion(self) -> bool:
-        """True if edges of any body read the expansion of their tetrahedra."""
+        """True if a law of the world uses the expansion of the tetrahedra around an edge."""
         return any(model.reads_expansion for model in self.models)

@@ -29,7 +29,7 @@ class BondArrays:
     """The bonds of one body, in kernel order."""
 
     constants: Floats  # (k, 4), see `Bonds`
-    ring: Ints  # (k, 2) range of rows of each edge in the arrays below
+    ring: Ints  # (k, 2) range of rows of each edge in `members` and `weights`
     members: Ints  # (r, 4) particles or tetrahedra of this body
     weights: Floats  # (r, 4)
     expansion_modulus: Floats | None  # (m,) [Pa], if the members are tetrahedra
@@ -37,7 +37,7 @@ class BondArrays:
 
 @dataclass(frozen=True)
 class HullArrays:
-    """Hull that replaces a body's own surface in contact: see `bodies.bound_hull`."""
+    """Hull that makes contact instead of a body's surface: see `bodies.bound_hull`."""
 
     vertices: Ints  # (h, 4) particles of this body that carry each point
     weights: Floats  # (h, 4)
@@ -66,12 +66,15 @@ class BodyArrays:
     bonds: BondArrays | None  # None unless the law is pairwise
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
-    outer: Ints  # particles that can make contact: on the surface, or all if the body has no inside
-    hull: HullArrays | None = None  # makes contact in place of `outer`
+    outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
+    hull: HullArrays | None = None  # hull that makes contact instead of `outer`
 
     @property
     def expansion_modulus(self) -> Floats:
-        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero if the law has none."""
+        """Pressure of each tetrahedron on its edges per relative change of volume, (m,) [Pa].
+
+        The pressure is zero if the law has no expansion.
+        """
         if self.bonds is None or self.bonds.expansion_modulus is None:
             return np.zeros(len(self.tet_vertices))
         return self.bonds.expansion_modulus
@@ -94,14 +97,14 @@ class Ranges:
 class Scene:
     """All bodies of a world in sequence.
 
-    `LANES` spare rows follow the edges of each body: kernels read the last block of edges in full, and must
-    not read another body, which another thread can be moving.
+    `LANES` spare rows follow the edges of each body. Kernels read the last block of edges in full, and this
+    block must not contain edges of another body, which another thread may move at the same time.
     """
 
     bodies: list[BodyArrays] = field(default_factory=list)
     ranges: list[Ranges] = field(default_factory=list)
     particle_count: int = 0
-    edge_count: int = 0  # with the spare rows
+    edge_count: int = 0  # including the spare rows
     edge_block_count: int = 0
     block_count: int = 0
     ring_count: int = 0
@@ -127,7 +130,7 @@ class Scene:
         )
 
     def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
-        """Assign the next free rows to `body`, with room for `spare_vertices` copies of its vertices."""
+        """Assign the next free rows to `body`, with spare rows for `spare_vertices` copies of vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
@@ -157,11 +160,11 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
 
     Returns: numbers of particles, edges, blocks of edges, triangles and outer particles.
 
-    The points of a hull follow the particles of the body. Triangles and points of a hull have their own rows,
+    The points of a hull follow the particles of the body. Triangles and points of a hull have separate rows,
     numbered like the rows of the surface.
 
-    For each of its vertices, a cut has about three edges, and two triangles on either side. A small
-    cut that ends inside the body can have twice as many (Euler's formula).
+    A cut has about three edges per vertex, and two triangles per vertex on each side. A small cut that ends
+    inside the body can have twice as many edges and triangles (Euler's formula).
     """
     if spare_vertices == 0:
         exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
@@ -173,18 +176,21 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices
-    # Every block is full, except those with the last edges of a particle.
+    # Every block is full, except blocks with the last edges of a particle.
     blocks = (edges + (LANES - 1) * particles) // LANES
     return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
 
 def arrange(description: BodyDescription) -> BodyArrays:
-    """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
+    """Return the arrays of a body, with particles in the order of a space-filling curve.
+
+    In this order, neighbours share cache lines.
+    """
     mesh = description.mesh
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
     edges = renumbered(order)[mesh.edges]
-    if description.model.has_simple_edges:  # edges without direction; others point from i to j
+    if description.model.has_simple_edges:  # these edges have no direction; other edges point from i to j
         edges = _directed_edges(np.sort(edges, axis=1), len(order))
     return _in_order(description, order, tets, edges)
 
@@ -196,19 +202,21 @@ def arrange_part(
     tets: NDArray[np.int64],
     order: Ints | None = None,
 ) -> BodyArrays:
-    """Arrange the remainder of a cut body in the order before the cut; copies follow their originals.
+    """Return the arrays of the rest of a cut body, in the order before the cut.
+
+    Copies of vertices follow their originals.
 
     Args:
         description: description of the body after the cut.
         before: arrays of the body before the cut.
         vertices, tets: original of each vertex and each tetrahedron in the body before the cut.
-        order: order of the vertices; None: copies of one vertex in the order of their numbers.
+        order: order of the vertices. None: copies of the same vertex are ordered by their indices.
     """
     mesh, rank = description.mesh, before.rank[vertices]
     if order is None:
         order = np.argsort(rank, kind="stable").astype(np.int32)
     ends = rank[mesh.edges].astype(np.int64)
-    # An edge keeps its first end.
+    # The first end of an edge stays the first end after the cut.
     count = len(before.rank)
     old_keys = np.sort(before.edge_vertices, axis=1).astype(np.int64) @ [count, 1]
     by_key = np.argsort(old_keys)
@@ -220,7 +228,7 @@ def arrange_part(
 
 
 def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints) -> BodyArrays:
-    """Arrange a body with given orders of particles and tetrahedra, and given directions of edges."""
+    """Return the arrays of a body for an order of particles, an order of tetrahedra and directed edges."""
     mesh, new_index = description.mesh, renumbered(order)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
     return BodyArrays(
@@ -261,7 +269,7 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
 
 
 def _directed_edges(edges: Ints, particle_count: int) -> Ints:
-    """Orient the edges so that, for most particles, `HALF` divides the number of edges that start there."""
+    """Orient the edges so that, for most particles, `HALF` divides the number of edges from the particle."""
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
     owner = edge_owners(in_order, particle_count, HALF)
@@ -270,7 +278,7 @@ def _directed_edges(edges: Ints, particle_count: int) -> Ints:
 
 
 def _edge_blocks(first_ends: Ints) -> Ints:
-    """Divide the edges into blocks of at most `LANES`. Return first row and number of edges of each, (c, 2).
+    """Divide the edges into blocks of at most `LANES`. Return first row and length of each block, (c, 2).
 
     A block has two halves. All edges of a half have the same first end. Rows are ordered by first end. A half
     that is not full ends its block, so that the rows of a block are contiguous.
@@ -278,13 +286,14 @@ def _edge_blocks(first_ends: Ints) -> Ints:
     starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
     counts = np.diff(np.r_[starts, len(first_ends)])
     halves = -(-counts // HALF)
-    number = np.arange(halves.sum()) - np.repeat(np.cumsum(halves) - halves, halves)  # within its first end
+    # Number of each half, counted from 0 for each first end.
+    number = np.arange(halves.sum()) - np.repeat(np.cumsum(halves) - halves, halves)
     rows = np.repeat(starts, halves) + number * HALF
     sizes = np.minimum(np.repeat(counts, halves) - number * HALF, HALF)
     ends_block = np.r_[True, sizes[:-1] < HALF][: len(sizes)]
     since = np.arange(len(sizes)) - np.maximum.accumulate(np.where(ends_block, np.arange(len(sizes)), 0))
     leads = since % 2 == 0
-    follows = np.r_[~leads[1:], False][: len(sizes)]  # whether the next half belongs to the same block
+    follows = np.r_[~leads[1:], False][: len(sizes)]  # True if the next half belongs to the same block
     both = sizes + np.where(follows, np.r_[sizes[1:], 0][: len(sizes)], 0)
     return np.stack([rows[leads], both[leads]], axis=1).astype(np.int32)
 
@@ -307,7 +316,7 @@ def _arrange_bonds(
     start = np.cumsum(count) - count
     ends = np.cumsum(count[edge_order])
     ring = np.stack([ends - count[edge_order], ends], axis=1)
-    # Row i of the new order comes from row i of the same edge in the old order.
+    # The rows of an edge keep their order.
     rows = np.repeat(start[edge_order] - ring[:, 0], count[edge_order]) + np.arange(len(bonds.ring_edge))
     members = bonds.ring_members[rows]
     renumbered_members = (
@@ -324,7 +333,7 @@ def _arrange_bonds(
 
 
 def blocks_of(rows: NDArray[np.generic], width: int, fill: float) -> NDArray[np.generic]:
-    """Return rows (m, width) as (blocks, width, LANES), flattened and padded with `fill`."""
+    """Return rows (m, width) in the layout (blocks, width, LANES), flat and padded with `fill`."""
     block_count = -(-len(rows) // LANES)
     padded = np.full((block_count * LANES, width), fill, dtype=rows.dtype)
     padded[: len(rows)] = rows.reshape(len(rows), width)

@@ -1,4 +1,4 @@
-"""Measures of a body's state, computed in float64 from its float32 fields."""
+"""Quantities derived from a body's state. They are computed in float64 from float32 fields."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def require_tets(body: SoftBody) -> None:
 
 
 def positions_of(body: SoftBody) -> Floats:
-    """Positions of the vertices of a body, (n, 3) [m], in float64."""
+    """Return the positions of the vertices of a body, (n, 3) [m], in float64."""
     return body.positions().astype(np.float64)
 
 
 def velocities_of(body: SoftBody) -> Floats:
-    """Velocities of the vertices of a body, (n, 3) [m/s], in float64."""
+    """Return the velocities of the vertices of a body, (n, 3) [m/s], in float64."""
     return body.velocities().astype(np.float64)
 
 
@@ -42,7 +42,7 @@ def tet_volumes(body: SoftBody) -> Floats:
 
 
 def _edge_vectors(body: SoftBody) -> Floats:
-    """Vectors from the first vertex of each tetrahedron to its other vertices, as rows, (m, 3, 3) [m]."""
+    """Return vectors from the first to the other vertices of each tetrahedron, as rows, (m, 3, 3) [m]."""
     corners = positions_of(body)[body.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
@@ -70,7 +70,7 @@ def gravitational_energy(body: SoftBody) -> float:
 
 
 def tet_mesh(body: SoftBody) -> TetMesh:
-    """Return the mesh of a body with tetrahedra."""
+    """Return the mesh of a body that consists of tetrahedra."""
     assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused earlier"
     return body.mesh
 
@@ -91,9 +91,10 @@ def elastic_energy(body: SoftBody) -> float:
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
-    """Green strain 1/2 (F^T F - I) and its stress by Hooke's law [Pa], in the rest axes, (m, 3, 3) each.
+    """Return Green's strain 1/2 (F^T F - I) and the stress of Hooke's law [Pa], (m, 3, 3) each.
 
-    Both are independent of the body's law: see `Body.elastic_energy`.
+    The tensors are in the axes of the rest shape. They are independent of the body's force law: see
+    `Body.elastic_energy`.
     """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
@@ -153,12 +154,12 @@ def tet_strain(body: SoftBody) -> Floats:
 
 
 def _deviator_norms(tensors: Floats) -> Floats:
-    """Norm sqrt(e:e) of the deviator e of each tensor (m, 3, 3), (m,)."""
+    """Return the norm sqrt(e:e) of the deviator e of each of the `tensors`, (m,)."""
     deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
     return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
 
 
 def vertex_means(body: SoftBody, values: Floats) -> Floats:
-    """Mean of `values` (m,) over the tetrahedra around each vertex, weighted by volume, (n,)."""
+    """Return the mean of `values` (m,) over the tetrahedra around each vertex, weighted by volume, (n,)."""
     mesh, n = tet_mesh(body), body.vertex_count
     return np.asarray(lumped(mesh.tets, values * mesh.volumes, n) / lumped(mesh.tets, mesh.volumes, n))

@@ -10,7 +10,7 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 
 _UNLIMITED = 1e30
-"""Number that means no limit: kernels must not use infinity."""
+"""Number used instead of infinity, because kernels must not use infinity."""
 
 
 @serialised("yield_stress", "yield_strain", "creep", "maximum")
@@ -24,11 +24,12 @@ class Plasticity:
     each fixed step, so an impact that begins and ends within one step leaves no dent.
 
     Args:
-        yield_stress: von Mises stress [Pa] below which the deformation is elastic. For every law it is
-            computed by Hooke's law from the linear strain.
-        yield_strain: yield point as a strain, as in `Body.tet_strain`, instead of `yield_stress`. They are
+        yield_stress: von Mises stress [Pa] below which the deformation is elastic. For every law, the stress
+            is computed by Hooke's law from the linear strain.
+        yield_strain: yield point as a strain, as in `Body.tet_strain`, instead of `yield_stress`. The two are
             related by yield_stress = 3 G yield_strain, with the shear modulus G.
-        creep: rate of flow [1/s]: within 1/creep the excess strain falls to 1/e. Infinity: within one step.
+        creep: rate of flow [1/s]. The excess strain falls to 1/e in a time of 1/creep. Infinity: the excess
+            strain flows within one step.
         maximum: largest equivalent logarithmic plastic strain: a tetrahedron can become e^maximum times as
             long permanently. Elongated tetrahedra need shorter substeps, which `World.stable_substeps` does
             not consider.
@@ -57,7 +58,7 @@ class Plasticity:
 
     @property
     def row(self) -> tuple[float, float, float, float]:
-        """Yield stress [Pa], yield strain, creep [1/s], maximum. The yield point not given is zero."""
+        """Yield stress [Pa], yield strain, creep [1/s] and maximum. A yield point that is None becomes 0."""
         return self.yield_stress or 0.0, self.yield_strain or 0.0, min(self.creep, _UNLIMITED), self.maximum
 
 

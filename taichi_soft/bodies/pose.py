@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _REGULARISATION = 1e-10
-"""Weight that prefers the smallest rotation. It matters only if the shape leaves the rotation open: a
-straight rope about its axis, or a body shrunk to a point."""
+"""Weight that prefers the smallest rotation. The weight has an effect only if the shape does not determine
+the rotation: for a straight rope about its axis, or for a body shrunk to a point."""
 
 
 @dataclass(frozen=True, eq=False)

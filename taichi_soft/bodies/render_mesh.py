@@ -21,15 +21,15 @@ Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
 MIN_PARALLEL_VERTICES = 4000
-"""Smallest number of render vertices that several threads compute: waking them costs as much as a few
-thousand vertices."""
+"""Smallest number of render vertices for which several threads are used. Waking the threads takes as long as
+computing a few thousand vertices."""
 
 
 class RenderMesh:
     """The surface of one body for a renderer, read-only. Created by `Body.render_mesh`.
 
-    It contains only vertices on the surface, with one copy for each side of a sharp edge. It never changes. A
-    cut gives the body other vertices, so its render mesh is then outdated and you must make a new one.
+    The mesh contains only vertices on the surface, with one copy for each side of a sharp edge. It never
+    changes. A cut changes the vertices of the body, so the mesh is then outdated and you must make a new one.
     Example:
         skin = body.render_mesh(crease=40)  # skin.triangles is the index buffer
         vertices = np.empty((skin.vertex_count, 3), np.float32)
@@ -44,7 +44,7 @@ class RenderMesh:
         Args:
             body: body to draw.
             vertices: vertex of the body that each render vertex copies, (k,).
-            triangles: render vertices, (m, 3).
+            triangles: render vertices of each triangle, (m, 3).
         """
         self._describe(body, vertices, triangles)
         self._table = render_table(vertices, triangles)
@@ -80,14 +80,15 @@ class RenderMesh:
 
     @property
     def triangles(self) -> Ints32:
-        """The index buffer: render vertices, int32 (m, 3), counterclockwise seen from outside."""
+        """Index buffer: render vertices of each triangle, int32 (m, 3), counterclockwise from outside."""
         return self._triangles
 
     @property
     def body_vertices(self) -> Ints32:
         """Vertex of the body that each render vertex copies, int32 (k,).
 
-        Use it to turn values per body vertex into an attribute: `body.vertex_stress()[mesh.body_vertices]`.
+        Use this array to convert values per body vertex to values per render vertex:
+        `body.vertex_stress()[mesh.body_vertices]`.
         """
         return self._body_vertices
 
@@ -98,7 +99,7 @@ class RenderMesh:
 
     @property
     def is_outdated(self) -> bool:
-        """True if the body was cut, torn, restored or given another level since: then make a new mesh."""
+        """True after a cut, a tear, a restore or a change of level of the body. Then make a new mesh."""
         return self._topology_version != self._body.topology_version
 
 
@@ -113,7 +114,7 @@ def surface_render_mesh(body: SoftBody, crease: float | None) -> RenderMesh:
 
 
 def require_current(mesh: RenderMesh) -> None:
-    """Check that a mesh is not outdated. Raises: StateError if its body was removed or has other vertices."""
+    """Check that a mesh is not outdated. Raises: StateError if it is, or if its body was removed."""
     body = mesh.body
     require_alive(body)
     if mesh.is_outdated:
@@ -132,7 +133,7 @@ def read_render_mesh(
 
 
 def warm_up(state: Any, assets: Iterable[SoftBodyAsset]) -> None:
-    """Compile the kernels of `read_render_mesh` for few vertices, and for many if `assets` need them."""
+    """Compile the serial kernel of `read_render_mesh`, and the parallel kernel if an asset can need it."""
     # One triangle, whose three corners are the first vertex of the first body.
     table = render_table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))
     positions, normals = np.empty((2, 3, 3), dtype=np.float32)
@@ -154,16 +155,19 @@ def _write(
 
 
 def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
-    """Return the table for the kernel: one array, because each kernel argument costs as much as 100 vertices.
+    """Return the table for `write_render_mesh`.
 
-    The table contains, in this order: the blocks; the body's vertex of each render vertex; the index in the
-    table at which the further triangles of each block begin, and the end of the last ones; the number of
-    blocks that have only small rings; the further triangles.
+    The table is one array, because each argument of a kernel takes as long as 100 vertices. It contains:
+    1. the blocks;
+    2. the vertex of the body that each render vertex copies;
+    3. for each block, the index in the table of its first further triangle, and the end of the table;
+    4. the number of blocks that have only small rings;
+    5. the further triangles.
 
-    A block has `LANES` render vertices, followed by `RING` rows with the rings around them. Triangles (v, a,
-    b) and (v, b, c) form the ring a, b, c, which is padded with v. Further triangles do not fit into a ring:
-    each consists of the lane of its vertex, and its two other vertices. The last block is padded with copies
-    of the last vertex, its ring and its further triangles.
+    A block has `LANES` render vertices, followed by `RING` rows with the rings around these vertices.
+    Triangles (v, a, b) and (v, b, c) form the ring a, b, c, which is padded with v. A further triangle does
+    not fit into the ring of its first vertex. It is stored as the lane of this vertex and the two other
+    vertices. The last block is padded with copies of the last vertex, its ring and its further triangles.
     """
     count = len(vertices)
     rings, further = _rings(count, triangles)
@@ -187,10 +191,11 @@ def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32
 
 
 def _rings(count: int, triangles: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find the ring around each render vertex, (k, RING), and the triangles in no ring, (f, 3), ascending.
+    """Find the ring around each render vertex, (k, RING), and the triangles that do not fit, (f, 3).
 
-    A triangle in no ring begins with the vertex whose ring lacks it. A ring begins at a border of the surface
-    if the vertex lies on a border. It ends when it is full or no triangle continues it.
+    A triangle that does not fit into the ring of one of its vertices begins with this vertex. These triangles
+    are sorted by first vertex. If a vertex lies on a border of the surface, its ring begins at the border. A
+    ring ends when it is full or no triangle continues it.
     """
     rotations = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
     own, one, other = rotations[np.argsort(triangles.ravel(), kind="stable")].T

@@ -14,21 +14,22 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh
 
 MAX_SAG = 0.2
-"""Largest ratio density * g * height / E: tetrahedra of softer bodies invert when the body stands or lands.
-Found by dropping four shapes of 1 m with three Poisson's ratios up to 0.45 from 2 m."""
+"""Largest ratio density * g * height / E. In softer bodies, tetrahedra invert when the body stands or lands.
+The value comes from drops of four shapes of 1 m, with three Poisson's ratios up to 0.45, from 2 m."""
 
 
 def sag(asset: SoftBodyAsset, gravity: float) -> float:
-    """Ratio density * g * height / E of a body, with `gravity` in m/s^2.
+    """Return the ratio density * g * height / E of a body, with g = `gravity` [m/s^2].
 
-    It is zero for bodies without tetrahedra, for anisotropic materials, and if all vertices are pinned. The
-    height is the smallest extent of the mesh along its axes, so the orientation of the body has no effect.
+    The ratio is zero for bodies without tetrahedra, for anisotropic materials, and if all vertices are
+    pinned. The height is the smallest extent of the mesh along x, y or z, so the orientation of the body in
+    the world has no effect.
     """
     mesh, material = asset.mesh, asset.description.material
     is_pinned = len(asset.description.pinned) == len(mesh.vertices)
     if is_pinned or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
         return 0.0
-    solid = mesh.volumes * mesh.fill  # the solid has the material's own constants, at any fill
+    solid = mesh.volumes * mesh.fill  # the constants of the solid do not depend on the fill
     weights = solid / solid.sum()
     softness = weights @ (mesh.fill / asset.description.per_tet("young"))
     density = weights @ (asset.description.per_tet("density") / mesh.fill)
@@ -42,7 +43,7 @@ def _rounded_up(number: float) -> float:
 
 
 def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64]) -> None:
-    """Warn if a body is too soft for its weight, and suggest a modulus. Called before a world is built."""
+    """Warn if a body is too soft for its weight, and suggest a modulus. Call it before building a world."""
     acceleration = float(np.linalg.norm(gravity))
     worst = max(assets, key=lambda asset: sag(asset, acceleration))
     found = sag(worst, acceleration)

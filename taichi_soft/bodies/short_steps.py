@@ -1,4 +1,4 @@
-"""Warn of meshes whose slivers and small tetrahedra need much shorter substeps than a lattice."""
+"""Warn of meshes that need much shorter substeps than a lattice, because of slivers and small tetrahedra."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LATTICE_STEP = 0.33
 """Stable step of a lattice that fills space, relative to the time cell / sqrt(young / density)."""
 
 WARNING_RATIO = 4.0
-"""Ratio of a lattice's stable step to a mesh's above which a warning is logged. A lattice whose outer
-vertices are moved onto a surface can itself need steps half as long."""
+"""A warning is logged if the stable step of a lattice is longer than the mesh's step by a larger factor. A
+lattice whose outer vertices are moved onto a surface can need steps half as long as a plain lattice."""
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
-"""Material for the comparison of meshes; the choice is arbitrary."""
+"""Material for the comparison of a mesh with a lattice. The choice is arbitrary."""
 
 
 def warn_of_short_steps(mesh: TetMesh, cell_size: float, method: str) -> None:

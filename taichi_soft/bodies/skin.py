@@ -1,17 +1,17 @@
 """Skin: an artist's mesh that is bound to the tetrahedra of a body once, and follows them in every frame.
 
-A skin vertex has weights s_i in the four vertices i of a tetrahedron. Each vertex i has a deformation
-gradient F_i, the mean over the tetrahedra around it. The position of the skin vertex is
+A skin vertex has a weight s_i for each of the four vertices i of a tetrahedron. Each vertex i has a
+deformation gradient F_i, the mean over the tetrahedra around the vertex. The position of the skin vertex is
 
     x = sum_i s_i (x_i + F_i (q - X_i) / 2)
 
 where q is the position of the skin vertex at rest. The sum of s_i x_i alone is linear in each tetrahedron and
-has creases at the faces. With half of the gradients' term, the sum is exact for every deformation of second
-order if the F_i are exact. Normals are transformed by the mean of the F_i. This mean is continuous, so faces
-are not visible in the shading.
+has creases at the faces. The second term, with the factor 1/2, makes the sum exact for every deformation of
+second order if the F_i are exact. Normals are transformed by the mean sum_i s_i F_i. This mean is continuous,
+so faces are not visible in the shading.
 
-A skin vertex X outside the cage is bound to the nearest point p of the cage, and its offset from p follows
-the mean of the F_i: the same sum with q = 2 X - p.
+A skin vertex X outside the cage is bound to the nearest point p of the cage. The mean of the F_i transforms
+its offset X - p. The result is the same sum with q = 2 X - p.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class Skin:
     """Binding of a surface to the tetrahedra of a mesh, shared by all bodies of an asset."""
 
     surface: Surface
-    tets: Ints32  # (k,), tetrahedron of the mesh that contains each vertex, or the nearest one
-    weights: Floats  # (k, 4), weights in that tetrahedron's vertices
+    tets: Ints32  # (k,), tetrahedron of the mesh that contains each vertex, or the nearest tetrahedron
+    weights: Floats  # (k, 4), weights of that tetrahedron's vertices
     ints: Ints32  # see `write_skin`
-    floats: Floats32
+    floats: Floats32  # see `write_skin`
 
     @property
     def vertex_count(self) -> int:
@@ -50,7 +50,7 @@ class Skin:
 
 
 def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
-    """Bind surfaces to a mesh at rest, and return the bindings."""
+    """Bind each surface to a mesh at rest, and return the bindings."""
     locator = Locator(mesh)
     neighbours, begins, slope_rows = gradient_rows(mesh)
     skins = []
@@ -68,11 +68,11 @@ def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
 
 
 def gradient_rows(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Compute the rows from which the deformation gradient of each vertex follows.
+    """Compute rows from which a kernel computes the deformation gradient F of each vertex.
 
     F of vertex i is the sum over its neighbours j of the outer product of x_j - x_i and the row of j.
-    Returns: neighbours of all vertices, (e,); index of the first neighbour of each vertex, and e, (n + 1,);
-        row of each neighbour, (e, 3) [1/m].
+    Returns: neighbours of all vertices, (e,); index of the first neighbour of each vertex, followed by e,
+        (n + 1,); row of each neighbour, (e, 3) [1/m].
     """
     inverses, n = edge_inverses(mesh.vertices[mesh.tets]), len(mesh.vertices)
     gradients = np.concatenate([-inverses.sum(axis=1, keepdims=True), inverses], axis=1)

@@ -17,15 +17,15 @@ from taichi_soft.meshing import TetMesh
 Floats32 = NDArray[np.float32]
 
 MIN_PARALLEL_VERTICES = 2000
-"""Smallest number of vertices that several threads compute: waking them costs as much as a few thousand
-vertices."""
+"""Smallest number of vertices for which several threads are used. Waking the threads takes as long as
+computing a few thousand vertices."""
 
 
 class SkinMesh(RenderMesh):
     """The skin of one body, in the order of the artist's mesh, read-only. Created by `Body.render_meshes`.
 
-    `body_vertices` are the nearest vertices of the body. A skin cannot follow a cut: once the body is cut or
-    torn, the skin mesh is outdated for good.
+    `body_vertices` are the nearest vertices of the body. A skin cannot follow a cut, so after a cut or a tear
+    the skin mesh remains outdated.
     """
 
     def __init__(self, body: SoftBody, number: int) -> None:
@@ -52,7 +52,7 @@ class SkinMesh(RenderMesh):
 
     @property
     def body_vertices(self) -> NDArray[np.int32]:
-        """Vertex of the body with the largest weight in each render vertex, int32 (k,)."""
+        """For each render vertex, the vertex of the body with the largest weight, int32 (k,)."""
         _ = self._present_skin
         return super().body_vertices
 
@@ -68,12 +68,12 @@ class SkinMesh(RenderMesh):
 
     @property
     def visual(self) -> Any:
-        """trimesh's texture coordinates, material and colours; None if the mesh has none of them."""
+        """Visual of trimesh: texture coordinates, material and colours. None if the mesh has no visual."""
         return self._skin.surface.visual
 
     @property
     def is_outdated(self) -> bool:
-        """True if the body is cut or torn, which a skin cannot follow."""
+        """True if the body was cut or torn, because a skin cannot follow a cut."""
         return self._body.is_cut
 
     @property
@@ -88,7 +88,7 @@ class SkinMesh(RenderMesh):
 
 
 def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
-    """Return the skin meshes of a body: an empty tuple if it has no skin, or was cut or torn."""
+    """Return the skin meshes of a body. The tuple is empty if the body has no skin, or was cut or torn."""
     if body.is_cut:
         return ()
     record = record_of(body)
@@ -112,7 +112,7 @@ def first_skin_mesh(body: SoftBody) -> SkinMesh:
 
 
 def warm_up(state: Any) -> None:
-    """Compile the kernel of skins for few vertices and for many, by calling it for a single vertex."""
+    """Compile the serial and the parallel kernel of skins, by calling both for a single vertex."""
     ints, floats = np.zeros(2 + 4 * LANES, np.int32), np.zeros(3 + ROW * LANES, np.float32)
     frames, positions, normals = np.empty(FRAME, dtype=np.float32), *np.empty((2, 3), dtype=np.float32)
     for is_serial in (True, False):

@@ -47,7 +47,7 @@ class Pools(Generic[Kind]):
     def can_touch(self) -> bool:
         """True if bodies, or parts of one body, can touch each other.
 
-        This needs two slots, or an asset with self-contact.
+        This is the case if the world has two slots, or an asset with self-contact.
         """
         return len(self.slots) > 1 or any(
             level.contact.itself for asset in self.kinds for level in asset.levels
@@ -67,11 +67,11 @@ class Pools(Generic[Kind]):
         self.slots.append(None)
 
     def free_slots(self, asset: SoftBodyAsset) -> list[int]:
-        """Free slots of an asset, in the order in which bodies will get them."""
+        """Return the free slots of an asset, in the order in which bodies will get them."""
         return sorted(self._free[asset])
 
     def next_slot(self, asset: SoftBodyAsset) -> int:
-        """Slot that the next body of an asset will get. Raises: StateError if the asset has no free slot."""
+        """Return the slot that the next body of an asset will get. Raises: StateError if none is free."""
         free = self._free.get(asset)
         if free is None:
             raise StateError(f"{asset!r} has no pool in this world: call reserve(asset, count) before build")
@@ -90,7 +90,7 @@ class Pools(Generic[Kind]):
         self._occupants = None
 
     def enter_at(self, body: Kind) -> None:
-        """Put a body into the free slot `body.index`, even if it is not the next one."""
+        """Put a body into the free slot `body.index`, even if another slot is next."""
         free = self._free[body.asset]
         free.remove(body.index)
         heapq.heapify(free)

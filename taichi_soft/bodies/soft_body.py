@@ -1,7 +1,7 @@
 """`SoftBody` and `Context`: a body, and the part of its world that all slices share.
 
-Slices use a `Context` and `SoftBody`, never the world above them. These classes refer to each other, so they
-are in one file.
+Slices use `Context` and `SoftBody`, but never the `World` above them. These two classes refer to each other,
+so they are in one file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Ints = NDArray[np.int64]
 
 
 RowsOf = Callable[[Any], NDArray[Any]]
-"""Function that returns the rows of a field in a snapshot, (rows, width), of integers or float32."""
+"""Function that returns the rows of a field in a snapshot, as integers or float32, (rows, width)."""
 
 SomeSlice = TypeVar("SomeSlice", bound="Slice")
 
@@ -47,28 +47,28 @@ class Built(Protocol):
     program: Any
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call `kernel(state, *arguments)`, which changes the body in a slot, or all bodies for -1."""
+        """Call `kernel(state, *arguments)`, which changes one body, or all bodies if `slot` is -1."""
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call `kernel(state, *arguments)`, which can reject the change. Does not wake bodies.
+        """Call `kernel(state, *arguments)`, which can reject the change.
 
-        Call `mark_modified` after a change.
+        This method does not wake bodies, so call `mark_modified` after a change.
         """
 
     def mark_modified(self, slot: int) -> None:
-        """Wake the body in a slot, or all bodies for -1, after a change of its state."""
+        """Wake the body in a slot, or all bodies if `slot` is -1, after a change of its state."""
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call `kernel(state, first, *arguments)`, which only reads; `first` is the body's first particle."""
 
     def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the rows of some vertices of a body in the fields."""
+        """Return the row in the fields of each of `vertices` of the body in a slot."""
 
     def mark_changed(self) -> None:
         """Record that the fields have changed."""
 
     def wake(self, slot: int) -> None:
-        """Wake the body in a slot, or all bodies for -1."""
+        """Wake the body in a slot, or all bodies if `slot` is -1."""
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
         """Wake sleeping bodies within range of a box, given by two opposite corners [m]."""
@@ -77,16 +77,16 @@ class Built(Protocol):
         """Return the present bounding box of a body and its skin, as two opposite corners [m]."""
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
-        """Positions of the vertices, (n, 3) [m], interpolated by `alpha` between the last two steps."""
+        """Return vertex positions, (n, 3) [m], interpolated by `alpha` between the last two steps."""
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
-        """Velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
+        """Return the velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Vertices of a body that are pinned at present, ascending."""
+        """Return the vertices of a body that are pinned at present, ascending."""
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """Present A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
+        """Return the present A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
         """Check that no collider crushes points of a body's surface, (k, 3) [m]. Raises: OptionError."""
@@ -95,13 +95,13 @@ class Built(Protocol):
         """Record that joints between bodies have changed."""
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """Find the first failure of the body in a slot."""
+        """Return the first failure of the body in a slot, which became non-finite in the step `failed`."""
 
     def on_cut(self, body: SoftBody) -> None:
         """Record that a cut has changed the vertices of a body."""
 
     def on_placed(self, body: SoftBody) -> None:
-        """Request a search, in the next step, for bodies that a placed body overlaps."""
+        """Make the next step search for bodies that overlap a newly placed body."""
 
     def apply_settings(self, settings: Settings) -> None:
         """Apply a change of gravity or of the floor's friction."""
@@ -116,8 +116,9 @@ class Context:
     handles: Handles
     slots: Pools[SoftBody]
     layout: Scene
-    renew_substeps: Callable[[], None]  # called after a body's mesh or material has changed
-    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]  # for a body in the next free slot of an asset
+    renew_substeps: Callable[[], None]  # must be called after a body's mesh or material has changed
+    # Makes the handle of a body for the next free slot of an asset.
+    make_handle: Callable[[Any, SoftBodyAsset], SoftBody]
     slices: list[Slice] = field(default_factory=list)
     fields: Built | None = None  # set by `World.build`
 
@@ -140,15 +141,15 @@ class Context:
 
 
 class Slice:
-    """One optional feature of a world, such as grabs. Only its slice knows its data."""
+    """Base class of an optional feature of a world, such as grabs. Only the slice uses the feature's data."""
 
-    name = ""  # name of its part of a snapshot
+    name = ""  # name of the slice's part of a snapshot
     prevents_cuts = True  # True if a body that the slice constrains cannot be cut or torn
     prevents_levels = True  # True if a body that the slice constrains cannot change its level
 
     def __init__(self, context: Context) -> None:
         """Create an empty slice."""
-        self._context_ref = weakref.ref(context)  # handles keep their slice alive, but not the world
+        self._context_ref = weakref.ref(context)  # weak, so that handles do not keep the world alive
 
     @property
     def context(self) -> Context:
@@ -163,7 +164,7 @@ class Slice:
         return False
 
     def release_body(self, body: SoftBody) -> None:
-        """Release everything that belongs to a body, which leaves the world."""
+        """Release all objects of the slice that belong to a body, before the body leaves the world."""
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Compile the kernels of the slice, by calling them for a body: see `World.warm_up`.
@@ -174,7 +175,7 @@ class Slice:
             step: function that makes a step and undoes it.
         """
 
-    # Snapshots. The world must be built when these methods are called.
+    # Methods for snapshots. The world must be built when they are called.
 
     def entries(self) -> list[list[Any]]:
         """Return the slice's Python data as rows of plain values."""
@@ -185,7 +186,7 @@ class Slice:
         return [row[0] for row in entries]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """Return how many rows `entries` use in each group of the slice's fields that a snapshot stores."""
+        """Return the number of rows that `entries` use in each group of stored fields, by group name."""
         return {}
 
     def read(self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]) -> Any:
@@ -199,14 +200,14 @@ class Slice:
         """
 
     def things(self, read: Any) -> dict[str, int]:
-        """Return the numbers of objects to which fields can refer: see `field_table.Below`."""
+        """Return the number of objects to which fields can refer, by kind: see `field_table.Below`."""
         return {}
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Check the rows of the slice's fields. Raises: ValueError if invalid or inconsistent with `read`."""
+        """Check the slice's rows of fields. Raises: ValueError if they are invalid or contradict `read`."""
 
     def clear(self) -> None:
-        """Prepare the slice for a restore, before its fields are overwritten."""
+        """Prepare the slice for a restore. The fields of the world are overwritten afterwards."""
 
     def restore(self, read: Any) -> None:
         """Restore the handles from `read`, the result of `read()`. Bodies and fields are already restored."""
@@ -214,11 +215,11 @@ class Slice:
 
 @dataclass(eq=False)
 class BodyRecord:
-    """Internal data of a body, behind the handle that users have: see `record_of`."""
+    """Internal data of a body, to which users have no access: see `record_of`."""
 
     description: BodyDescription  # description with the present mesh and material
-    first_step: int
-    present: BodyArrays | None = None  # with intermediate constants while the material changes gradually
+    first_step: int  # step in which the body was added
+    present: BodyArrays | None = None  # arrays during a gradual change of material; else None
     removed_in: int | None = None  # step in which the body was removed
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # computed at the first request
@@ -227,7 +228,7 @@ class BodyRecord:
     skin_meshes: tuple[Any, ...] | None = None  # created at the first request
     level: int = 0  # level of detail; 0 is the finest
     friction: float | None = None  # None: the asset's friction
-    held: NDArray[np.int64] | None = None  # vertices of the finest level that pins represent
+    held: NDArray[np.int64] | None = None  # vertices of the finest level pinned at the last change of level
 
     def set_topology(self, part: CutMesh | None, level: int = 0) -> None:
         """Set the level of detail, and the part of the asset's mesh that cuts have left (None if uncut)."""
@@ -236,11 +237,11 @@ class BodyRecord:
 
 
 class SoftBody(Handle):
-    """Handle of a body, without functions that need the whole world. Users get the subclass `Body`."""
+    """Handle of a body, without methods that need the whole world. Users get the subclass `Body`."""
 
     def __init__(self, context: Context, index: int, asset: SoftBodyAsset) -> None:
         """Use `World.add_body` or `World.spawn` instead."""
-        # Weak: an unreferenced world then frees its state without waiting for the garbage collector.
+        # The reference is weak, so that an unreferenced world frees its state without the garbage collector.
         self._context_ref = weakref.ref(context)
         self._asset = asset
         self._index = index
@@ -281,7 +282,7 @@ class SoftBody(Handle):
 
     @property
     def mesh(self) -> BodyMesh:
-        """Present mesh at rest, which cuts and levels of detail change."""
+        """Present mesh at rest. Cuts and changes of the level of detail replace the mesh."""
         return self._record.description.mesh
 
     @property
@@ -291,7 +292,7 @@ class SoftBody(Handle):
 
     @property
     def friction(self) -> float:
-        """Present Coulomb coefficient of the surface against other bodies."""
+        """Present Coulomb coefficient of the body's surface in contact with other bodies."""
         own = self._record.friction
         return float(self._asset.contact.friction) if own is None else own
 
@@ -327,7 +328,7 @@ class SoftBody(Handle):
 
     @property
     def vertex_origins(self) -> Ints:
-        """Original of each vertex in the asset's mesh, (n,). Cuts copy vertices."""
+        """For each vertex, its original in the asset's mesh, (n,). Cuts copy vertices."""
         part = self._record.part
         return np.arange(self.vertex_count) if part is None else part.vertices
 
@@ -358,8 +359,8 @@ class SoftBody(Handle):
     def failure(self) -> Failure | None:
         """First failure of the body; None while the body is valid.
 
-        The first request computes it, and compiles kernels for a few seconds. `World.warm_up` does not
-        compile these.
+        The first access after a failure computes this record, and compiles kernels for a few seconds.
+        `World.warm_up` does not compile these kernels.
         """
         require_alive(self)
         record = self._record
@@ -368,7 +369,7 @@ class SoftBody(Handle):
         return record.failure
 
     def positions(self, out: Floats32 | None = None) -> Floats32:
-        """Vertex positions after the last step, float32 (n, 3) [m].
+        """Return the vertex positions after the last step, float32 (n, 3) [m].
 
         Args:
             out: C-contiguous float32 array (n, 3) to fill and return; None: a new array.
@@ -377,7 +378,7 @@ class SoftBody(Handle):
         return self._context.built.positions(self, 1.0, out)
 
     def velocities(self) -> Floats32:
-        """Vertex velocities at the time of the positions, float32 (n, 3) [m/s].
+        """Return the vertex velocities at the time of the positions, float32 (n, 3) [m/s].
 
         Leapfrog stores velocities half a substep earlier than positions. This method advances them with the
         present acceleration.
@@ -391,12 +392,12 @@ class SoftBody(Handle):
         return 1.0 if fields is None else float(fields.state.body_gravity_scale[self.index])
 
     def aabb(self) -> tuple[Floats, Floats]:
-        """Smallest and largest coordinates of the vertices, (3,) each [m]."""
+        """Return the smallest and largest coordinates of the vertices, (3,) each [m]."""
         positions = self.positions().astype(np.float64)
         return positions.min(axis=0), positions.max(axis=0)
 
     def center_of_mass(self) -> Floats:
-        """Centre of mass, (3,) [m]."""
+        """Return the centre of mass of the body, (3,) [m]."""
         masses = self.masses
         return np.asarray(weighted_sum(masses, self.positions().astype(np.float64)) / masses.sum())
 
@@ -431,12 +432,12 @@ def require_alive(body: SoftBody) -> None:
 
 
 def slices_against_cuts(body: SoftBody) -> list[str]:
-    """Return the names of the slices that constrain a body and thereby prevent a cut."""
+    """Return the names of the slices that prevent a cut of a body, because they constrain it."""
     return [each.name for each in body._context.slices if each.prevents_cuts and each.holds(body)]
 
 
 def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays) -> Ranges:
-    """Replace the description and arrays of a body. Return its ranges in the fields."""
+    """Replace the description and arrays of a body. Return the body's ranges of rows in the fields."""
     context = body._context
     body._record.description = description
     context.layout.bodies[body.index] = arrays
@@ -445,7 +446,7 @@ def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays)
 
 
 def rest_inverses_of(body: SoftBody) -> Floats:
-    """Present A^-1 of each tetrahedron at rest, (m, 3, 3) [1/m]."""
+    """Return A^-1 of the present rest shape of each tetrahedron, (m, 3, 3) [1/m]."""
     fields = body._context.fields
     if body.asset.plasticity is None or fields is None:
         return body._record.description.rest_inverses

@@ -1,14 +1,15 @@
-"""Largest stable substep, from the vibrations of a body at rest.
+"""Compute the largest stable substep from the vibrations of a body at rest.
 
 Leapfrog with a lagging damper, x'' = -K x - C x' in units where M = 1, is
 
     x_(n+1) - 2 x_n + x_(n-1) = -h^2 K x_n - h C (x_n - x_(n-1)).
 
-With x_n - x_(n-1) = (x_(n+1) - x_(n-1)) / 2 - (x_(n+1) - 2 x_n + x_(n-1)) / 2, the energy
-1/2 d^T (1 - h C / 2 - h^2 K / 4) d + 1/2 s^T h^2 K s, with differences d and means s of successive positions,
-never grows. The step h is therefore stable exactly if the largest eigenvalue of h^2 K + 2 h C is below 4.
-Lazy leapfrog makes the same steps. Lanczos' method approaches that eigenvalue from below. Its error bound is
-added, so that the estimated limit is never above the true one.
+Let d be the difference and s the mean of two successive positions. Because
+x_n - x_(n-1) = (x_(n+1) - x_(n-1)) / 2 - (x_(n+1) - 2 x_n + x_(n-1)) / 2, the energy
+1/2 d^T (1 - h C / 2 - h^2 K / 4) d + 1/2 s^T h^2 K s never grows. The step h is therefore stable exactly if
+the largest eigenvalue of h^2 K + 2 h C is below 4. Lazy leapfrog makes the same steps. Lanczos' method
+approaches that eigenvalue from below. The error bound of the method is added, so that the estimated limit is
+never above the true limit.
 """
 
 from __future__ import annotations
@@ -31,32 +32,33 @@ from taichi_soft.meshing import BodyMesh, TetMesh
 Floats = NDArray[np.float64]
 
 MARGIN = 0.9
-"""Recommended fraction of the limit for small motion: compression makes elements stiffer than at rest."""
+"""Recommended substep, relative to the limit for small motion. The margin is necessary, because compression
+makes elements stiffer than at rest."""
 
 _MAX_ITERATIONS = 120
 _MIN_ITERATIONS = 30
-"""Regular meshes have many nearly equal eigenvalues: fewer iterations can miss the largest one."""
+"""Regular meshes have many nearly equal eigenvalues. With fewer iterations, the largest one can be missed."""
 
 _RESIDUAL = 0.02
-"""Relative residual at which Lanczos' method ends. The eigenvalue is increased by it for safety, which
-shortens the step by 1 %."""
+"""Relative residual at which Lanczos' method ends. For safety, the eigenvalue is increased by this fraction,
+which shortens the step by 1 %."""
 
 _DAMPING_PASSES = 8
 
 SLIVER_ANGLE = 15.0
-"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular one has 70.5."""
+"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular tetrahedron has 70.5."""
 
 
 @dataclass(frozen=True)
 class StableStep:
-    """Largest stable substep of one body, and its cause."""
+    """Largest stable substep of one body, and the reason for it."""
 
-    limit: float  # [s], for small motion: at most 15 % below the true limit, never above
+    limit: float  # [s], limit for small motion; 0 to 15 % below the true limit
     stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s], period of the fastest vibration
-    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for forces along edges
+    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges
     undamped: float = 0.0  # [s], limit without damping
-    slivers: int = 0  # number of flat tetrahedra with limits below half of the first percentile
+    slivers: int = 0  # number of flat tetrahedra whose limit is below half of the first percentile
     without_slivers: float = 0.0  # [s], approximate limit without slivers
     tets: int = 0  # number of tetrahedra of the body
 
@@ -90,7 +92,7 @@ class StableStep:
 
 
 def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> StableStep:
-    """Estimate the largest stable substep for leapfrog and its lazy variant; explicit Euler has none.
+    """Estimate the largest stable substep of leapfrog and lazy leapfrog; explicit Euler has no such substep.
 
     The estimate holds for small motion about the rest shape. A strongly compressed body is stiffer, and a
     flattened tetrahedron has no stable substep at all, so `recommended` leaves a margin. The estimate ignores
@@ -98,7 +100,7 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     Args:
         mesh: rest shape.
         material: constants that fit the mesh.
-        model: made by `element_model`.
+        model: force model, from `element_model`.
     Raises: MeshError, MaterialError or OptionError for arguments that do not fit together.
     """
     if not isinstance(model, ElementModel):
@@ -137,9 +139,9 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
 def _damped_limit(vibration: Vibration, undamped: float, u: Floats, start: Floats) -> float:
     """Find the step h at which the largest eigenvalue of h^2 K + 2 h C is 4, by Newton's method from above.
 
-    For any direction u, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is never below this step if K is symmetric.
-    A step t h has at most t times the eigenvalue of h if t < 1, and at most t^2 times if t > 1. The last
-    correction uses this bound.
+    If K is symmetric, the solution h of h^2 u'Ku + 2 h u'Cu = 4 is not below this step for any direction u.
+    If h is multiplied by t, the eigenvalue is multiplied by at most t for t < 1, and at most t^2 for t > 1.
+    The last correction uses this bound.
     """
     h, value = undamped, np.inf
     for _ in range(_DAMPING_PASSES):
@@ -165,7 +167,7 @@ def _touching_step(vibration: Vibration, u: Floats, h: float) -> float:
 def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tuple[float, Floats]:
     """Return an upper bound of an operator's largest eigenvalue, and its eigenvector, by Arnoldi's method.
 
-    For symmetric operators this is Lanczos' method. Operators of laws along edges can be asymmetric; the
+    For symmetric operators, this is Lanczos' method. Operators of laws along edges can be asymmetric. The
     result is then the largest magnitude of an eigenvalue.
     """
     shape, basis = start.shape, np.zeros((_MAX_ITERATIONS + 1, start.size))

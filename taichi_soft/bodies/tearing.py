@@ -13,13 +13,13 @@ from taichi_soft.core.serialisation import serialised
 class Tearing:
     """Tearing of a body that is pulled beyond its strength (O'Brien and Hodgins 1999).
 
-    After each step, the face between two tetrahedra tears if the largest principal stress of their mean
-    exceeds the strength. The vertices of the face are then split perpendicular to the pull, along faces of
-    the tetrahedra around them. The stress is the Cauchy stress of the body's own law: see `Body.tet_stress`.
-    A body tears until its `spare_vertices` are used up. Detached pieces become bodies while slots are free,
-    the largest first. Other pieces, and fragments of less than 2 % of the body, remain separate parts of the
-    body. Vertices attached to a frame, and their copies, stay attached. A body that is grabbed, joined to
-    another body or driven by a motor does not tear.
+    After each step, the face between two tetrahedra tears if the largest principal stress of the mean of
+    their two stresses exceeds the strength. The vertices of the face are then split along faces of the
+    tetrahedra around them, perpendicular to the direction of that principal stress. The stress is the Cauchy
+    stress of the body's force law: see `Body.tet_stress`. A body tears until its `spare_vertices` are used
+    up. Detached pieces become bodies, the largest first, while slots are free. Other pieces, and fragments of
+    less than 2 % of the body, remain separate parts of the body. Vertices attached to a frame, and their
+    copies, stay attached. A body that is grabbed, joined to another body or driven by a motor does not tear.
 
     Args:
         stress: tensile strength [Pa].

@@ -1,4 +1,4 @@
-"""Rewrite the constants of one body's tetrahedra after a change of material or a cut."""
+"""Write the constants of one body's tetrahedra after a change of material or a cut."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from taichi_soft.core.constants import LANES
 
 
 def write_tet_constants(fields: BodyFields, first_block: int, body: BodyArrays) -> None:
-    """Write the fields of `BodyFields.tet_constants` for one body, from block `first_block` on."""
+    """Write the fields of `BodyFields.tet_constants` for one body. Its first block is `first_block`."""
     if len(body.tet_vertices):
         for field, rows in fields.tet_constants(body):
             write_numbers(field, first_block * LANES * rows.shape[1], constant_blocks(rows))

@@ -17,9 +17,10 @@ Floats = NDArray[np.float64]
 
 
 class Vibration(ABC):
-    """Stiffness K and damping C of a free body at rest, scaled by mass: M^-1/2 K M^-1/2, and C likewise.
+    """Stiffness K and damping C of a free body at rest, for coordinates scaled by the root of the masses.
 
-    Displacements are (n, 3, k): k columns, each times the root of the masses.
+    K is M^-1/2 K' M^-1/2 for the unscaled stiffness K'; C is scaled in the same way. Displacements u are k
+    columns, each multiplied by the root of the masses, (n, 3, k).
     """
 
     def __init__(self, body: BodyDescription) -> None:
@@ -32,12 +33,15 @@ class Vibration(ABC):
         """True if C is not zero."""
 
     def diagonal(self) -> Floats:
-        """Approximate diagonal of K up to a factor, (3 n,) [1/s^2], for use as a preconditioner."""
+        """Return the diagonal of K up to a constant factor, (3 n,), for use as a preconditioner.
+
+        The result can be an approximation.
+        """
         return np.ones(3 * len(self.root_mass))
 
     @abstractmethod
     def apply(self, u: Floats, h: float | None = None) -> Floats:
-        """Return K u [1/s^2]; with `h` [s], (h^2 K + 2 h C) u, which determines if a substep h is stable."""
+        """Return K u. If a substep `h` [s] is given, return (h^2 K + 2 h C) u, see `bodies.stability`."""
 
 
 def vibration_of(body: BodyDescription) -> Vibration:
@@ -83,7 +87,10 @@ class TetVibration(Vibration):
         return np.asarray(total / self.root_mass)
 
     def energies(self, displaced: Floats) -> Floats:
-        """Twice the elastic energy of each tetrahedron, (k, m) [J], for displacements (k, n, 3) [m]."""
+        """Return twice the elastic energy of each tetrahedron, (k, m) [J].
+
+        Args: displaced: k displacements, unscaled, (k, n, 3) [m].
+        """
         corners = displaced[:, self._tets.rows].reshape(len(displaced), -1, 12)
         return np.asarray(np.einsum("kti,tij,ktj->kt", corners, self._matrices, corners, optimize=True))
 
@@ -93,20 +100,20 @@ class TetVibration(Vibration):
         return np.asarray(self._tets.sum(diagonals) / self.root_mass**2).ravel()
 
     def element_bounds(self) -> Floats:
-        """Largest squared frequency w^2 of each tetrahedron on its own, (m,) [1/s^2].
+        """Return the largest squared frequency w^2 of each tetrahedron as a separate body, (m,) [1/s^2].
 
-        No w^2 of the body exceeds the largest of these (Irons and Treharne 1971). A tetrahedron has corner
-        masses r V density / 4, where r is 1 except in cages: their vertices carry more or less than a quarter
-        of the adjacent tetrahedra. The stiffness of a tetrahedron is V b^T C b, where b maps displacements to
-        strain in Voigt's order. The squared frequencies are the eigenvalues of the 6x6 matrix
-        4 / density L^T (b r^-1 b^T) L with L L^T = C.
+        No w^2 of the whole body exceeds the largest of these bounds (Irons and Treharne 1971). A tetrahedron
+        has corner masses r V density / 4. The factor r is 1 except in cages, where a vertex can carry more or
+        less than a quarter of the adjacent tetrahedra. The stiffness of a tetrahedron is V b^T C b, where b
+        maps displacements to strain in Voigt's order. The squared frequencies are the eigenvalues of the 6x6
+        matrix 4 / density L^T (b r^-1 b^T) L with L L^T = C.
         """
         mesh, density = self.body.mesh, self.body.per_tet("density")
         assert isinstance(mesh, TetMesh)
         quarters = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
         ratios = np.repeat((self.body.masses / quarters)[mesh.tets], 3, axis=1)[:, None, :]
-        # Negligible relative to the largest entry, but C stays positive definite in spite of round-off for
-        # Poisson's ratios near -1 and 1/2.
+        # The floor keeps C positive definite in spite of round-off for Poisson's ratios near -1 and 1/2. The
+        # floor is negligible relative to the largest entry.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
         gram = np.swapaxes(root, 1, 2) @ ((self.strains / ratios) @ np.swapaxes(self.strains, 1, 2)) @ root
@@ -114,7 +121,10 @@ class TetVibration(Vibration):
 
 
 class BondVibration(Vibration):
-    """Vibrations for a law along edges. Differences of forces include the rotation of its planes."""
+    """Vibrations for a law along edges.
+
+    K comes from differences of forces, which include the rotation of the planes in the laws of chapter 4.
+    """
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
@@ -123,7 +133,7 @@ class BondVibration(Vibration):
         self._offset = 1e-6 * float(body.mesh.edge_lengths.min())
         self._along, across = body.edge_damping, None
         if not body.model.has_simple_edges:
-            # The planes turn, so each damping constant can act in any direction.
+            # The planes rotate, so each damping constant can act in any direction.
             self._along = across = np.maximum(self._along, body.bonds.constants[:, 3] * body.bonds.is_bond)
         self._dampers = _EdgeDampers(body.mesh, self._along, across)
 
@@ -141,7 +151,7 @@ class BondVibration(Vibration):
         return np.asarray(total / self.root_mass)
 
     def _force_differences(self, displaced: Floats) -> Floats:
-        """K times displacements, by central differences of the forces about the rest shape."""
+        """Return stiffness times displacements, from central differences of forces about the rest shape."""
         rest = self.body.mesh.vertices
         offset = self._offset / (np.abs(displaced).max() + 1e-300)
         zero_velocity = np.zeros_like(rest)
@@ -150,7 +160,10 @@ class BondVibration(Vibration):
 
 
 class _EdgeDampers:
-    """Damping matrix of dampers along edges, and across them if given, (k,) [N s/m] each."""
+    """Damping matrix of dampers at the edges of a mesh.
+
+    The damping constants act along each edge, and optionally across it, (k,) [N s/m] each.
+    """
 
     def __init__(self, mesh: BodyMesh, along: Floats, across: Floats | None = None) -> None:
         ends = mesh.vertices[mesh.edges]
@@ -170,7 +183,7 @@ class _EdgeDampers:
 
 
 class _Owners:
-    """Sums of rows by vertex, such as forces on the corners of tetrahedra."""
+    """Sums of rows that belong to the same vertex, such as forces on the corners of tetrahedra."""
 
     def __init__(self, rows: NDArray[np.int32], count: int) -> None:
         self.rows = rows
@@ -188,7 +201,7 @@ class _Owners:
 
 
 def _strains(rest_inverses: Floats) -> Floats:
-    """Matrix b of each tetrahedron, from corner displacements to strain in Voigt's order, (m, 6, 12)."""
+    """Return the matrix b of each tetrahedron, (m, 6, 12). It maps corner displacements to Voigt strain."""
     gradients = np.concatenate([-rest_inverses.sum(axis=1, keepdims=True), rest_inverses], axis=1)
     b = np.zeros((len(gradients), 6, 4, 3))
     for axis in range(3):

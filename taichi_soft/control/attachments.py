@@ -23,10 +23,10 @@ from taichi_soft.core.types import Schedule
 class Attachment(Handle):
     """Particles of a body attached to a frame. Returned by `Body.attach`.
 
-    If the body is cut or torn, the particles and their copies stay attached; `particles` then contains both.
-    If the body falls apart, `body` becomes the largest piece with attached particles. Other pieces get their
-    own attachments, listed in `Body.attachments`. If the level of detail changes, the nearest vertices are
-    attached instead.
+    If the body is cut or torn, the copies of its particles are also attached, and `particles` contains them.
+    If the body falls apart, `body` becomes the largest piece with attached particles. Other pieces get new
+    attachments, which `Body.attachments` lists. If the level of detail changes, the nearest vertices of the
+    new level are attached instead.
     """
 
     def __init__(
@@ -52,8 +52,8 @@ class Attachment(Handle):
     def force(self) -> NDArray[np.float64]:
         """Mean force of the body on the frame during the last step, (3,) [N].
 
-        The force includes the weight of the attached particles and the force that accelerates them. A frozen
-        body exerts no force of its own: only forces of other bodies on the attached particles remain.
+        The force includes the weight of the attached particles and the force that accelerates them. If the
+        body is frozen, the force contains only forces of other bodies on the attached particles.
         Raises: StateError after release, or without `two_way`.
         """
         return self._load()[:3]
@@ -92,7 +92,7 @@ class Attachment(Handle):
 
 
 class Attachments(Slice):
-    """All attachments of one world; `Frames` stores them by body."""
+    """Slice of all attachments of one world. `Frames` stores the attachments by body."""
 
     name = "attachments"
     prevents_cuts = False  # `share_attachments` keeps the pieces attached
@@ -112,7 +112,7 @@ class Attachments(Slice):
             attachment.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Compile the kernels, by attaching a free vertex to a frame and reading its load."""
+        """Compile the kernels, by attaching a free vertex to a frame and reading the load on the frame."""
         free = np.setdiff1d(np.arange(body.vertex_count), body.pinned)
         if not len(free):
             return
@@ -192,7 +192,7 @@ def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[n
 
     Args:
         body: body that was cut.
-        pieces: pieces, the largest first, each with the original of each of its vertices, (n,).
+        pieces: pairs of a piece and the original of each vertex of the piece, (n,); the largest piece first.
     """
     context = context_of(body)
     frames = context.of(Frames)
@@ -212,13 +212,13 @@ def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[n
 
 
 def attached_vertices(body: SoftBody) -> NDArray[np.int32]:
-    """All attached vertices of a body, (k,)."""
+    """Return all attached vertices of a body, (k,)."""
     held = context_of(body).of(Frames).holding(body)
     return np.concatenate([np.zeros(0, np.int32), *(each.particles for each in held)])
 
 
 def require_unattached(body: SoftBody, vertices: NDArray[np.int32]) -> None:
-    """Check that none of `vertices` is attached to a frame. Raises: StateError with the first that is."""
+    """Check that none of `vertices` is attached to a frame. Raises: StateError with the first such vertex."""
     held = np.intersect1d(vertices, attached_vertices(body))
     if len(held):
         raise StateError(

@@ -41,14 +41,20 @@ def numbers(*values: Any) -> Rows32:
 
 
 def some_particles(body: SoftBody, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
-    """Check and sort vertex indices of a body; None means all. Raises: OptionError if invalid or empty."""
+    """Check and sort vertex indices of a body. None means all vertices.
+
+    Raises: OptionError if an index is invalid, or if there is none.
+    """
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
     return named_particles(body, particles, name)
 
 
 def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
-    """Check and sort vertex indices of a body. Raises: OptionError if invalid, empty or None."""
+    """Check and sort vertex indices of a body.
+
+    Raises: OptionError if an index is invalid, or if `particles` is empty or None.
+    """
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
         raise OptionError(f"{name} is empty: give at least one vertex, from 0 to {body.vertex_count - 1}")
@@ -56,12 +62,12 @@ def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles
 
 
 def mass_of(body: SoftBody, vertices: NDArray[np.int32]) -> float:
-    """Total mass of some vertices of a body [kg]. It is summed in order, as in the native library."""
+    """Return the total mass of `vertices` [kg]. The masses are added in order, as in the native library."""
     return float(np.cumsum(body.masses[vertices])[-1])
 
 
 def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the rows of some vertices of a body in the fields. Raises: StateError before `World.build`."""
+    """Return the row in the fields of each of `vertices`. Raises: StateError before `World.build`."""
     return context_of(body).built.rows_of(body.index, vertices)
 
 

@@ -28,7 +28,7 @@ ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
 """Function that returns accelerations, (n, 3) [m/s^2], for positions (n, 3) [m] and a time [s]."""
 
 MAX_ACCELERATION = 1e9
-"""Largest acceleration [m/s^2]. It reaches the limit of valid velocities within 20 us."""
+"""Largest acceleration [m/s^2]. At this limit, a vertex reaches the highest valid velocity within 20 us."""
 
 
 def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -> None:
@@ -108,9 +108,9 @@ def apply_force_field(context: Context, field: ForceField) -> list[tuple[SoftBod
 
 
 def accelerate_bodies(rows: Sequence[tuple[SoftBody, Any]]) -> None:
-    """Accelerate bodies during the next step. Each row is a body and float32 (n, 3) [m/s^2].
+    """Accelerate bodies during the next step. Bodies with zero acceleration are not woken.
 
-    Zero accelerations do not wake a body.
+    Args: rows: bodies, each with the accelerations of its vertices, float32 (n, 3) [m/s^2].
     """
     for body, accelerations in rows:
         if accelerations.any():

@@ -3,7 +3,8 @@
 A sudden change to a stiffer material would increase the strain energy of a deformed body and accelerate it.
 The constants therefore follow k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance decreases as a
 parabola, and a loaded body moves to its new shape with constant deceleration. While k grows, vibrations are
-damped like k^-`FADING`: the energy of a mode that is faster than the change follows k^(1/2 - FADING).
+damped in proportion to k^-`FADING`. The energy of a mode that is faster than the change then follows
+k^(1/2 - FADING).
 """
 
 from __future__ import annotations
@@ -28,23 +29,24 @@ from taichi_soft.core.serialisation import below
 Floats = NDArray[np.float64]
 
 SHORTEST, PERIODS = 0.5, 8.0
-"""Duration of a change: the larger of SHORTEST [s] and PERIODS / omega, omega of the slowest mode [rad/s]."""
+"""A change lasts SHORTEST [s] or PERIODS / omega, whichever is longer. omega is the angular frequency of the
+slowest mode [rad/s]."""
 
 HELD = 6.4
-"""Frequency of a free beam relative to a beam held at one end: (4.730 / 1.875)^2, from the roots of the
-bending equation."""
+"""Frequency of a free beam, relative to the frequency of a beam that is held at one end: (4.730 / 1.875)^2,
+from the roots of the bending equation."""
 
 FADING = 2.0
-"""Exponent of the stiffness in the damping of vibrations. With it, the slowest mode is critically damped."""
+"""Exponent of the stiffness in the damping of vibrations. This value damps the slowest mode critically."""
 
 TIMES_A_STEP = 8.0
 """Smallest number of dampings of vibrations per step: see `kept_vibration`."""
 
 LIFT = 1e-4
-"""Height [m]: a change that adds less energy than lifting the body by it is immediate."""
+"""A change is immediate if it adds less energy than lifting the body by this height [m]."""
 
 LARGEST_RATIO = 1e12
-"""Upper limit of the ratio of new to initial stiffness, because the initial stiffness can be zero."""
+"""Upper limit of the ratio of new to initial stiffness, for elements with an initial stiffness of zero."""
 
 
 @dataclass(eq=False)
@@ -63,7 +65,10 @@ class Easing:
         return [self.ratio, self.seconds, self.passed, content]
 
     def stiffness(self, passed: float) -> float:
-        """Return the relative stiffness of the element that changes most, `passed` [s] after the start."""
+        """Return the ratio of present to initial stiffness of the element that changes most.
+
+        Args: passed: time since the start of the change [s].
+        """
         part = min(passed / self.seconds, 1.0)
         compliance = 1.0 - (1.0 - 1.0 / math.sqrt(self.ratio)) * part
         return 1.0 / (compliance * compliance)
@@ -78,7 +83,7 @@ class Easings(Slice):
         """Start without running changes."""
         super().__init__(context)
         self.by_body: dict[SoftBody, Easing] = {}
-        self._left: list[SoftBody] = []  # bodies whose fields a snapshot is about to overwrite
+        self._left: list[SoftBody] = []  # bodies that had a running change before a restore
 
     def begin(self, body: SoftBody, material: Any) -> None:
         """Start to change the material of a body."""
@@ -108,7 +113,7 @@ class Easings(Slice):
         return max(SHORTEST, PERIODS * slower * math.sqrt(softer * heavier) / asset.guessed_frequency)
 
     def advance(self, seconds: float) -> None:
-        """Advance all changes to the end of the next step, of `seconds` [s]."""
+        """Advance all changes to the end of the next step, which lasts `seconds` [s]."""
         for body, easing in list(self.by_body.items()):
             before = easing.stiffness(easing.passed)
             easing.passed += seconds
@@ -124,7 +129,7 @@ class Easings(Slice):
             self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
 
     def finish(self, body: SoftBody) -> None:
-        """Finish the change of a body's material, if any, immediately."""
+        """Finish a running change of a body's material immediately."""
         if body in self.by_body:
             self.release_body(body)
             arrays, place = self._arrays(body), self._place(body)
@@ -146,8 +151,8 @@ class Easings(Slice):
 
         Args:
             body: body that was cut.
-            order: order of its tetrahedra in the fields before the cut.
-            pieces: pieces, each with the original of each of its tetrahedra, (m,).
+            order: order of the body's tetrahedra in the fields before the cut.
+            pieces: pairs of a piece and the original of each tetrahedron of the piece, (m,).
         """
         easing = self.by_body.get(body)
         self.release_body(body)
@@ -207,7 +212,10 @@ class Easings(Slice):
 
 
 def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: float, seconds: float) -> None:
-    """Write constants, and the damping rate of vibrations in the next step [1/s]. Called like a kernel."""
+    """Write the constants of a body, and the damping `rate` of its vibrations in the next step [1/s].
+
+    This function has the signature of a kernel, for `Built.change`.
+    """
     write_stiffness(state, place, arrays)
     own, interval = present_asset(body).vibration_row(record_of(body).description)
     if rate > 0.0:
@@ -217,7 +225,7 @@ def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: flo
 
 
 def _parts(arrays: BodyArrays) -> list[Floats]:
-    """Return the constants that change: elastic constants, and the edge constants of a pairwise law."""
+    """Return the constants that change with time: elastic constants, and edge constants of a pairwise law."""
     parts = [arrays.lame]
     if arrays.stiffness.any():
         parts.append(arrays.stiffness)
@@ -229,7 +237,7 @@ def _parts(arrays: BodyArrays) -> list[Floats]:
 
 
 def _constants(arrays: BodyArrays) -> Floats:
-    """Concatenate `_parts` to one array; for laws on tetrahedra, tetrahedron by tetrahedron."""
+    """Concatenate the arrays of `_parts`. For laws on tetrahedra, the result is ordered by tetrahedron."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         return np.concatenate(parts, axis=1).ravel()
@@ -237,7 +245,7 @@ def _constants(arrays: BodyArrays) -> Floats:
 
 
 def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
-    """Return a body's arrays with `constants` in place of its `_constants`."""
+    """Return `arrays` with their constants replaced by `constants`, in the layout of `_constants`."""
     parts = _parts(arrays)
     if arrays.bonds is None:
         rows = constants.reshape(len(arrays.lame), -1)
@@ -253,8 +261,8 @@ def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
 def _moduli(arrays: BodyArrays) -> Floats:
     """Return the moduli by which the stiffness of elements is compared, (m, k).
 
-    They are bulk and shear modulus (up to factors), stiffness along an edge, or the diagonal of an
-    anisotropic stiffness.
+    The moduli of an element are its bulk and shear moduli (up to factors), the stiffness along an edge, or
+    the diagonal of an anisotropic stiffness.
     """
     if not len(arrays.lame):
         assert arrays.bonds is not None

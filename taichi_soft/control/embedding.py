@@ -1,4 +1,4 @@
-"""Points embedded in a body, which follow the vertices of a tetrahedron."""
+"""Points embedded in a body. Each point follows the vertices of a tetrahedron."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 FARTHEST = -0.5
-"""Smallest weight: a point must lie in the tetrahedron scaled by 3 about its centre."""
+"""Smallest allowed weight. A point must lie in its tetrahedron scaled by 3 about the centre."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Barycentric coordinates of n points in four vertices each. The weights of a point sum to 1."""
+    """Barycentric coordinates of n points: vertices and weights. The four weights of a point sum to 1."""
 
     vertices: NDArray[np.int32]  # (n, 4)
     weights: Floats  # (n, 4)
@@ -28,7 +28,7 @@ class Places:
 def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
     """Embed points (n, 3) [m] in the tetrahedra of a body in its present shape.
 
-    For a point outside the body, it chooses the tetrahedron with the largest smallest weight.
+    A point outside the body gets the tetrahedron in which the smallest of the point's weights is largest.
     Raises: OptionError with the name of the first point that is too far away, or for a body without
         tetrahedra.
     """
@@ -57,7 +57,10 @@ def embedded(points: Floats, x: Floats, tets: NDArray[np.int32]) -> tuple[NDArra
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:
-    """Embed vertices of a body, each in the first tetrahedron that contains it, if there is one."""
+    """Embed vertices of a body, each in the first tetrahedron of which it is a corner.
+
+    In a body without tetrahedra, the four vertices of a point are copies of the vertex.
+    """
     corners = np.repeat(vertices[:, None], 4, axis=1)
     if len(body.tets):
         flat = body.tets.ravel()

@@ -22,7 +22,7 @@ from taichi_soft.core.serialisation import vector_of
 
 
 class Frames(Slice):
-    """Poses of all frames of one world: rotation by rows, and position [m], (f, 12)."""
+    """All frames of one world, with their poses: rotation matrix by rows, and position [m], (f, 12)."""
 
     name = "frames"
 
@@ -30,7 +30,7 @@ class Frames(Slice):
         """Start without frames, but with one row of poses, because kernels do not accept empty arrays."""
         super().__init__(context)
         self.attachments: dict[SoftBody, list[Any]] = {}  # attachments of each body, in order of creation
-        self.rows: list[Frame | None] = []  # None after removal; a new frame gets the first free row
+        self.rows: list[Frame | None] = []  # frame in each row, None if the row is free
         self.present = np.zeros((1, 12), dtype=np.float32)
         self.coming = self.present.copy()  # poses at the end of the next step
         self.past = self.present.copy()  # poses before the last step
@@ -79,7 +79,10 @@ class Frames(Slice):
         self.past, self.present = self.present, self.coming.copy()
 
     def displacement(self, body: SoftBody) -> float:
-        """Return the largest distance [m] that frames moved a particle in the last step, which was undone."""
+        """Return the largest distance by which frames moved a particle of a body in the last step [m].
+
+        Call this method after the last step was undone.
+        """
         x, longest = body.positions().astype(np.float64), 0.0
         for each in self.holding(body):
             (a, start), (b, end) = (
@@ -90,7 +93,7 @@ class Frames(Slice):
         return longest
 
     def entries(self) -> list[list[Any]]:
-        """List the serial number (0 if free), the present pose and the next pose of each row."""
+        """List each row's serial number (0 if the row is free), present pose and next pose."""
         return [
             [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
             for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)
@@ -113,7 +116,7 @@ class Frames(Slice):
         return found
 
     def things(self, read: Any) -> dict[str, int]:
-        """Return the number of rows for frames: see `Slice.things`."""
+        """Return the number of rows of frames: see `Slice.things`."""
         return {FRAME: len(read)}
 
     def restore(self, read: Any) -> None:
@@ -182,8 +185,8 @@ class Frame(Handle):
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Move the frame to a pose during the next step. It stays there until it is moved again.
 
-        Attached bodies are dragged along. A body that is dragged farther than its size in one step fails: use
-        `teleport` for jumps.
+        The frame drags the attached bodies along. A body that is dragged farther than its size in one step
+        fails: use `teleport` for jumps.
         Args:
             position: new position of the origin, (3,) [m].
             rotation: new rotation, as a matrix (3, 3) or quaternion (x, y, z, w); None: unchanged.
@@ -203,8 +206,9 @@ class Frame(Handle):
         """Jump to a pose, and move every attached body as a whole by the same rigid motion.
 
         The previous positions for interpolation and the targets of pins jump too. Bodies joined to the
-        attached bodies do not move, nor do grabs. An earlier `move_to` is discarded. Parts that are then
-        below the floor or inside a collider are pushed out; if they are pushed far, the body fails.
+        attached bodies do not move. Targets of grabs do not move either. An earlier `move_to` is discarded.
+        Parts that are then below the floor or inside a collider are pushed out. A body fails if its parts are
+        pushed far.
         Args:
             position: new position of the origin, (3,) [m].
             rotation: new rotation, as a matrix (3, 3) or quaternion (x, y, z, w); None: unchanged.

@@ -40,7 +40,10 @@ def set_friction(body: SoftBody, friction: float) -> None:
 
 
 def give_friction(state: Any, body: SoftBody, friction: float | None) -> None:
-    """Store and write the friction of a body; None: its asset's friction. Called like a kernel."""
+    """Store the friction of a body, and write it to the fields. None: the friction of the body's asset.
+
+    This function has the signature of a kernel, for `Built.change`.
+    """
     record = record_of(body)
     record.friction = None if friction == body.asset.contact.friction else friction
     if state.capacity.contact.soft:

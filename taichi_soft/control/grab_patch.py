@@ -13,28 +13,28 @@ from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
-"""Radius of a patch relative to the diagonal of the body, about the size of a hand's grip."""
+"""Radius of a patch, relative to the diagonal of the body. The patch is about the size of a hand's grip."""
 
 FARTHEST_PULL = 0.5
-"""Largest estimated displacement of a patch relative to its radius. Elements then stretch by a quarter to a
-third, which is stable with the longest stable substeps; a displacement four times as large is not."""
+"""Largest estimated displacement of a patch, relative to the radius of the patch. Elements then stretch by a
+quarter to a third, which is stable with the longest stable substeps. Four times this value is unstable."""
 
 LIMITS = np.array([PATCH_SIZE, 1.2, 1e-6, FARTHEST_PULL])
-"""Constants for `shape_patch`. The second is the smallest radius relative to the distance of the farthest
-corner, the third the smallest falloff of a vertex in a patch."""
+"""Constants for `shape_patch`: relative radius, smallest radius relative to the distance of the farthest
+corner, smallest falloff of a vertex in a patch, largest relative displacement."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Vertices around a grabbed point, with their fractions of the force, which sum to 1."""
+    """Vertices around a grabbed point, and the fraction of the force that each vertex gets."""
 
-    vertices: NDArray[np.int32]
-    shares: NDArray[np.float64]
+    vertices: NDArray[np.int32]  # (k,)
+    shares: NDArray[np.float64]  # (k,), fractions of the force, which sum to 1
     strength: float  # force that moves the patch by `FARTHEST_PULL` times its radius [N]
 
 
 def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """Return the patch around a point at rest, given by weights of three or four corners."""
+    """Return the patch around a point at rest. The point is given by weights of three or four corners."""
     elements, stiffness = elements_of(body)
     rows, strength = np.empty((len(body.masses), 2)), np.empty(1)
     x = np.ascontiguousarray(body.mesh.vertices)
@@ -52,10 +52,10 @@ def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArra
 
 
 def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the vertices of each element, and its stiffness against the motion of a patch.
+    """Return the vertices of each element, and the element's stiffness against the motion of a patch.
 
-    Springs (e, 2) have k / 3 [N/m], because a third of them acts along any direction. Tetrahedra (m, 4) have
-    V mu [N m].
+    The stiffness of a spring, (e, 2), is k / 3 [N/m], because a third of the springs acts along any
+    direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m].
     """
     mesh: Any = body.mesh
     if isinstance(body.material, SpringMaterial):
@@ -73,7 +73,8 @@ def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
 def wave_speed(body: BodyDescription) -> float:
     """Return a lower bound of the wave speed in a body [m/s].
 
-    It is sqrt(mu / density); for springs, a sqrt(k / m) with the mean edge a and the mean mass m.
+    The bound is sqrt(mu / density). For springs, it is a sqrt(k / m), with the mean edge length a and the
+    mean mass m.
     """
     mesh: Any = body.mesh
     if isinstance(body.material, SpringMaterial):

@@ -37,10 +37,10 @@ from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, vector_of
 
 WEIGHTS = 10.0
-"""Default largest force of a grab, relative to the weight of the body on Earth."""
+"""Default limit of a grab's force, relative to the weight of the body on Earth."""
 
 HIGHEST_SPEED = 50.0
-"""Largest speed that a grab gives a body [m/s]; faster than any hand."""
+"""Largest speed that a grab gives a body [m/s]. No hand is faster."""
 
 
 class Grab(Handle):
@@ -112,7 +112,7 @@ class Grabs(Numbered[Grab]):
             grab.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Compile the kernels, by grabbing a body that has a surface, and moving and releasing the grab."""
+        """Compile the kernels: grab a body that has a surface, move the grab and release it."""
         if len(body.surface) == 0:
             return
         with contextlib.suppress(StateError):  # if all grabs are in use, the kernels are compiled already
@@ -131,7 +131,7 @@ class Grabs(Numbered[Grab]):
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """See `Slice.row_counts`. Grabs count up to the last one in use."""
+        """See `Slice.row_counts`. All rows up to the last grab in use are counted."""
         used = max((int(number) for _, number, _, _ in entries), default=-1) + 1
         return {ALL_GRABS: MOST_GRABS, USED_GRABS: used, PATCHES: used * PATCH_ROWS}
 
@@ -159,7 +159,10 @@ class Grabs(Numbered[Grab]):
 
 
 def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
-    """Check and return the frequency [Hz] and the largest force [N] of a grab. Raises: OptionError."""
+    """Check and return the frequency [Hz] and the largest force [N] of a grab. Raises: OptionError.
+
+    A force of None stays None.
+    """
     hertz = as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
     if max_force is None:
         return hertz, None
@@ -213,9 +216,10 @@ def place_of(grab: Grab) -> NDArray[np.float64]:
 
 
 def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
-    """Move a grab to the body's present tetrahedra, around a point `place` of the rest shape, (3,) [m].
+    """Move a grab to the body's present tetrahedra, around a point of the rest shape.
 
     The target, the spring, the largest force and the force in the last substep do not change.
+    Args: place: grabbed point in the rest shape, (3,) [m].
     """
     body, (_, row) = grab.body, _read(grab)
     (corners,), (weights,) = embedded(place[None], body.mesh.vertices, body.tets)

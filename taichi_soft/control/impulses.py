@@ -1,6 +1,6 @@
 """Impulses: instantaneous changes of momentum. Velocities change at once, positions in the next step.
 
-Pinned particles do not move: the constraint that holds them absorbs their part of an impulse.
+Pinned particles do not move, because their constraint absorbs their part of an impulse.
 """
 
 from __future__ import annotations

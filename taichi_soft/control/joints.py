@@ -46,7 +46,7 @@ from taichi_soft.core.serialisation import below, indices_below
 
 DRAW = 0.25
 """Largest closing speed of a gap, relative to the wave speed in the body times the square root of the held
-fraction of its mass. At this speed, elements stretch by at most about a quarter."""
+fraction of the body's mass. At the largest closing speed, elements stretch by at most about a quarter."""
 
 
 class Joint(Handle):
@@ -117,7 +117,7 @@ class Joints(Numbered[Joint]):
         return sum(len(joint.particles) for joint in self.by_number.values())
 
     def holding(self, body: SoftBody) -> list[Joint]:
-        """Return the joints of which a body is either side."""
+        """Return the joints that connect a body to another body, in either direction."""
         return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
     def release_body(self, body: SoftBody) -> None:
@@ -126,11 +126,11 @@ class Joints(Numbered[Joint]):
             joint.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Compile the kernels, by joining two bodies for a step, if possible."""
+        """Compile the kernels, by joining two bodies for a step, if there are two bodies and contact."""
         context = self.context
         if other is None or not context.built.program.has_contact:
             return
-        with contextlib.suppress(StateError):  # if all joints are in use
+        with contextlib.suppress(StateError):  # if all joints are in use, the kernels are compiled already
             joint = self.join(body, other, [0], [0])
             step()
             _ = joint.force, body.velocities()
@@ -177,7 +177,7 @@ class Joints(Numbered[Joint]):
             raise ValueError("its joints differ from its fields")
 
     def clear(self) -> None:
-        """Clear the marks of held particles; each step finds them again."""
+        """Clear the marks of held particles. Each step marks the held particles again."""
         if self.context.built.program.has_contact:
             forget_held(self.context.built.state)
 
@@ -232,7 +232,7 @@ class Joints(Numbered[Joint]):
 def _find_places(
     body: SoftBody, other: SoftBody, particles: ArrayLike, onto: ArrayLike | None
 ) -> tuple[NDArray[np.int32], Places]:
-    """Return the held vertices of `body` and their embedding in `other`. Raises: OptionError."""
+    """Return the held vertices of `body`, (n,), and their embedding in `other`. Raises: OptionError."""
     vertices = named_particles(body, particles)
     if onto is None:
         points = body.positions()[vertices].astype(np.float64)

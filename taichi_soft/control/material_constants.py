@@ -13,7 +13,10 @@ from taichi_soft.bodies.tet_constants import write_tet_constants
 
 
 def write_constants(state: BodyFields, body: SoftBody, description: BodyDescription) -> None:
-    """Write all constants of a body, from its description. Called like a kernel."""
+    """Write all constants of a body's `description` to the fields.
+
+    This function has the signature of a kernel, for `Built.change`.
+    """
     arrays = rearrange(context_of(body).layout.bodies[body.index], description)
     place = redescribe(body, description, arrays)
     masses = arrays.mass
@@ -30,7 +33,7 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
 
 
 def write_stiffness(state: BodyFields, place: Ranges, arrays: BodyArrays) -> None:
-    """Write the constants of all tetrahedra and edges of a body, but not its masses. Called like a kernel."""
+    """Write the constants of all tetrahedra and edges of a body, but not the masses of its particles."""
     write_tet_constants(state, place.blocks[0], arrays)
     if arrays.bonds is None:
         return

@@ -45,9 +45,9 @@ LARGEST_LIMIT = 1e12
 class Drive:
     """Settings of a motor."""
 
-    turns: bool  # True: rotates about the axis, False: pushes along it
-    is_fixed: bool  # True: the axis keeps its direction, False: it rotates with the particles
-    axis: NDArray[np.float64]  # unit vector, (3,), in world axes, or in the rest shape if not fixed
+    turns: bool  # True: rotates about the axis, False: pushes along the axis
+    is_fixed: bool  # True: the axis keeps its direction, False: the axis rotates with the particles
+    axis: NDArray[np.float64]  # unit vector, (3,); in world axes if fixed, else in the rest shape
     point: NDArray[np.float64] | None  # point on the axis, (3,) [m]; None: centre of the particles
     speed: float  # target speed [rad/s] or [m/s]
     limit: float  # largest torque [N m] or force [N]
@@ -59,7 +59,8 @@ class Drive:
 
 
 THINNEST = 1e-3
-"""Smallest ratio of width to length of the driven part for which its rotation about its length is defined."""
+"""Smallest ratio of width to length of the driven part. A thinner part has no defined rotation about its
+length."""
 
 
 class Motor(Handle):
@@ -129,7 +130,7 @@ class Motor(Handle):
 
     @recorded
     def set_limit(self, limit: float) -> None:
-        """Set the limit of the torque or force. With 0, the motor exerts none.
+        """Set the limit of the torque or force. With the limit 0, the motor has no effect.
 
         Args:
             limit: largest torque [N m], or largest force [N] if the motor pushes; 0 or more.
@@ -177,7 +178,7 @@ class Motors(Numbered[Motor]):
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Compile the kernels, by adding a motor to a body and reading its effort."""
-        with contextlib.suppress(OptionError):  # one particle has no width, but the kernel gets compiled
+        with contextlib.suppress(OptionError):  # one particle has no width, but the call compiles the kernel
             _rest_axis(body, np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, 1.0]))
         with contextlib.suppress(StateError):  # if all motors are in use, the kernels are compiled already
             motor = self.add(body, [0], (0.0, 0.0, 1.0), 0.0, None, 0.0, True, None)
@@ -215,7 +216,7 @@ class Motors(Numbered[Motor]):
         ]
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
-        """See `Slice.row_counts`. Motors count up to the last one in use."""
+        """See `Slice.row_counts`. All rows up to the last motor in use are counted."""
         return {USED_MOTORS: max((int(number) for _, number, *_ in entries), default=-1) + 1}
 
     def read(
@@ -318,9 +319,10 @@ def _as_limit(limit: Any, name: str) -> float:
 
 
 def _rest_axis(body: SoftBody, vertices: NDArray[np.int32], axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Transform the direction of an axis from the present state of particles to their rest state.
+    """Transform an axis from the present shape of the driven particles to their rest shape.
 
-    Raises: OptionError if the particles lie on a line, so that their rotation about it is undefined.
+    Returns: direction of the axis, (3,).
+    Raises: OptionError if the particles lie on a line, because their rotation about the line is undefined.
     """
     rest, now = body.mesh.vertices[vertices], body.positions()[vertices].astype(np.float64)
     found = np.empty(4)

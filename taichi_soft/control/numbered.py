@@ -1,4 +1,4 @@
-"""Base of slices with a fixed number of handles, in which a new handle gets the lowest free index."""
+"""Base class of slices with a limited number of handles. A new handle gets the lowest free index."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Numbered(Slice, Generic[Kind]):
     """Base class of `Grabs`, `Joints` and `Motors`: all handles of one world, by index."""
 
     most = 0  # largest number of handles
-    advice_verb = ""  # verb of the advice in the error if all handles are in use
+    advice_verb = ""  # verb for the advice in the error of `free_number`
 
     def __init__(self, context: Context) -> None:
         """Start without handles."""
@@ -36,7 +36,7 @@ class Numbered(Slice, Generic[Kind]):
         return bool(self.holding(body))
 
     def free_number(self) -> int:
-        """Return the lowest free index. Raises: StateError if all are in use."""
+        """Return the lowest free index. Raises: StateError if all indices are in use."""
         free = next((number for number in range(self.most) if number not in self.by_number), None)
         if free is None:
             raise StateError(

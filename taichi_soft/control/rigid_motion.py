@@ -1,4 +1,4 @@
-"""Set the velocity of a whole body, or move the body, as if it were rigid."""
+"""Set the velocity of a whole body as if the body were rigid, or teleport the body."""
 
 from __future__ import annotations
 

@@ -28,8 +28,9 @@ def jump_to(
         turn: rotation matrix, (3, 3).
         lowest: smallest allowed height [m].
         keep: True rotates the velocities, False stops the body.
-    Returns: lowest height, highest height and largest coordinate of the moved body [m]. If the first is below
-        `lowest` or the last is out of range, nothing was changed; else the caller must call `mark_modified`.
+    Returns: lowest height, highest height and largest coordinate of the moved body [m]. If the lowest height
+        is below `lowest` or the coordinate is out of range, the body was not moved. Otherwise, the caller
+        must call `mark_modified`.
     """
     found = np.empty(3)
     attempt(body, jump, body.index, np.array([*center, lowest, float(keep)]), turn, found)
@@ -44,7 +45,7 @@ def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, 
     """
     centers = [turned((body.center_of_mass() - start)[None], turn)[0] + end for body in bodies]
     for body, center in zip(bodies, centers, strict=True):
-        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # changes nothing
+        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # moves nothing
         if not farthest < POSITION_LIMIT:
             raise OptionError(
                 f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: move it closer to the origin"

@@ -12,7 +12,10 @@ from taichi_soft.elements.kernels.elastic import lane_forces
 
 @ti.func
 def _add_tet_forces(state: ti.template(), model: ti.template(), body):
-    """Add the forces of tetrahedra. Return the first that failed (block times `LANES` plus lane), or -1."""
+    """Add the forces of tetrahedra. Return the first tetrahedron that failed, or -1.
+
+    The number of a tetrahedron is block times `LANES` plus lane.
+    """
     failed = -1
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
@@ -47,8 +50,9 @@ def _add_bond_forces(state: ti.template(), model: ti.template(), body):
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, element by element.
 
-    Returns: the first tetrahedron (block times `LANES` plus lane), or edge for laws along edges, that has a
-        particle out of range or a force that is not finite; -1 if there is none.
+    Returns: the first element that failed, or -1. An element fails if one of its particles is out of range or
+        its force is not finite. For a law along edges, the result is an edge; for other laws, it is a
+        tetrahedron, as block times `LANES` plus lane.
     """
     failed = -1
     for m, model in ti.static(enumerate(program.models)):

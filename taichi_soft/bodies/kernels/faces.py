@@ -8,12 +8,16 @@ from taichi_soft.core.math.triangle import solid_angle
 from taichi_soft.core.runtime import ti
 
 INSIDE = 6.283
-"""Solid angle [sr] above which a point counts as inside: half of 4 pi, the angle inside a closed surface."""
+"""Solid angle [sr] above which a point counts as inside. For a closed surface, the angle is 4 pi inside and 0
+outside."""
 
 
 @ti.func
 def face_count(state: ti.template(), body):
-    """Number of triangles of a body, or of vertices if it has none; 0 for an absent body."""
+    """Return the number of triangles of a body; without triangles, the number of vertices.
+
+    An absent body has no faces.
+    """
     triangles, particles = state.body_triangles[body], state.body_particles[body]
     count = triangles[1] - triangles[0]
     if count == 0:
@@ -25,7 +29,7 @@ def face_count(state: ti.template(), body):
 
 @ti.func
 def face_particles(state: ti.template(), body, face):
-    """Three particles of a face; for a vertex, three times the same particle."""
+    """Return the three particles of a face. For a vertex, all three are the same particle."""
     triangles = state.body_triangles[body]
     particles = ti.Vector.one(ti.i32, 3)
     if triangles[1] > triangles[0]:
@@ -37,7 +41,7 @@ def face_particles(state: ti.template(), body, face):
 
 @ti.func
 def face_corners(state: ti.template(), body, face, origin):
-    """Corners of a face relative to `origin` [m]."""
+    """Return the three corners of a face relative to `origin` [m]."""
     v = face_particles(state, body, face)
     x = ti.static(state.particle_position)
     return x[v[0]] - origin, x[v[1]] - origin, x[v[2]] - origin
@@ -45,7 +49,7 @@ def face_corners(state: ti.template(), body, face, origin):
 
 @ti.func
 def box_around(state: ti.template(), body):
-    """Bounding box of a body: smallest and largest coordinates [m]."""
+    """Return the bounding box of a body: smallest and largest coordinates [m]."""
     outer = state.body_outer[body]
     lower = ti.Vector([1e30, 1e30, 1e30])
     upper = -lower
@@ -57,7 +61,10 @@ def box_around(state: ti.template(), body):
 
 @ti.func
 def is_inside(state: ti.template(), body, x):
-    """True if a point is inside a body, by the solid angle of its surface, which can be mirrored."""
+    """True if a point is inside a body, according to the solid angle of the surface seen from the point.
+
+    The sign of the angle has no effect, because a body can be mirrored.
+    """
     total = x.x * 0.0
     for face in range(face_count(state, body)):
         a, b, c = face_corners(state, body, face, x)
@@ -69,8 +76,8 @@ def is_inside(state: ti.template(), body, x):
 def write_result(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
     """Write a result to a row of `out`: distance, weights, point, unit normal, body and face.
 
-    The normal is along `away` if the face has no area. All values are float32, which represents numbers of up
-    to 16 million faces exactly.
+    The normal is along `away` if the face has no area. All values are float32, which represents integers up
+    to 16 million exactly.
     """
     v = face_particles(state, body, face)
     x = ti.static(state.particle_position)

@@ -15,7 +15,7 @@ def save_particle(state: ti.template(), p):
 
 @ti.func
 def highest_speed(state: ti.template(), body):
-    """Highest speed of a body's particles [m/s]."""
+    """Return the highest speed of a body's particles [m/s]."""
     particles, speed2 = state.body_particles[body], ti.Vector.zero(state.real, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -27,37 +27,40 @@ def highest_speed(state: ti.template(), body):
 
 @ti.func
 def restore_particle(state: ti.template(), p):
-    """Restore a particle's state from before the step."""
+    """Restore the state of a particle that `save_particle` saved."""
     state.particle_position[p] = state.prev_position[p]
     state.particle_velocity[p] = state.prev_velocity[p]
 
 
 @ti.func
 def gravity_on(state: ti.template(), body):
-    """Gravity of one body [m/s^2]."""
+    """Return the acceleration of one body by gravity [m/s^2]."""
     return state.gravity[None] * state.body_gravity_scale[body]
 
 
 @ti.func
 def particle_is_valid(state: ti.template(), p):
-    """1 if position and velocity of a particle are within their limits, else 0."""
+    """Return 1 if the position and the velocity of a particle are within their limits, else 0."""
     in_range = is_within(state.particle_position[p], POSITION_LIMIT)
     return in_range & is_within(state.particle_velocity[p], VELOCITY_LIMIT)
 
 
 @ti.func
 def moves(state: ti.template(), p):
-    """1 if the body of a particle moves, else 0."""
+    """Return 1 if the body of a particle moves, else 0."""
     return ti.select(state.body_status[state.particle_body[p]] == ACTIVE, 1.0, 0.0)
 
 
 @ti.func
 def inv_mass_of(state: ti.template(), p):
-    """Inverse mass of a particle [1/kg]; zero if its body does not move."""
+    """Return the inverse mass of a particle [1/kg], or zero if its body does not move."""
     return state.particle_inv_mass[p] * moves(state, p)
 
 
 @ti.func
 def velocity(state: ti.template(), p):
-    """Velocity of a particle [m/s]; zero if its body does not move: a frozen body stores invalid ones."""
+    """Return the velocity of a particle [m/s], or zero if its body does not move.
+
+    The stored velocities of a frozen body are invalid.
+    """
     return state.particle_velocity[p] * moves(state, p)

@@ -23,7 +23,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 _ITERATIONS = 12
-"""Iterations of the search for the strain at yield. For twice that strain, eight are exact to float32."""
+"""Number of iterations in `_excess`. At twice the yield strain, eight iterations are exact to float32."""
 
 _MAX_STRAIN = 1e6
 """Strain above which a tetrahedron does not flow, because its body is diverging."""
@@ -43,13 +43,13 @@ def _deviator(v):
 
 @ti.func
 def _equivalent(v):
-    """Equivalent strain sqrt(2/3 e:e) of the principal values of a deviator."""
+    """Return the equivalent strain sqrt(2/3 e:e) of a deviator e, given by its principal values."""
     return ti.sqrt(v.dot(v) * 2.0 / 3.0)
 
 
 @ti.func
 def _excess(logarithms, limit):
-    """Fraction of the deviator of logarithmic strains that is beyond the yield strain `limit`, 0 to 1."""
+    """Return the fraction of the deviator of logarithmic strains above the yield strain `limit`, 0 to 1."""
     deviator = _deviator(logarithms)
     mean = logarithms - deviator
     kept = logarithms.x * 0.0 + 1.0
@@ -61,10 +61,10 @@ def _excess(logarithms, limit):
 
 @ti.func
 def _limited(columns, maximum):
-    """Symmetric matrix of determinant 1 with the stretches of M, limited to the maximum strain, as columns.
+    """Return the columns of a symmetric matrix of determinant 1 that has the stretches of a matrix M.
 
-    M, given as columns, is such a matrix times a rotation. The rotation has no effect in an isotropic
-    material.
+    The equivalent strain is limited to `maximum`. M, with columns `columns`, is a symmetric matrix times a
+    rotation. The rotation has no effect in an isotropic material.
     """
     squares, axes = symmetric_eigen(outer_square(columns))
     logarithms = _deviator(0.5 * log_each(ti.max(squares, 1e-30)))

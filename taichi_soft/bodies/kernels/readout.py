@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
     """Write positions of all bodies [m], interpolated by `alpha` from the previous step (0) to the last (1).
 
-    Rows of absent bodies are unchanged.
+    The rows of absent bodies in `out` do not change.
     """
     ti.loop_config(serialize=True)
     for body in range(state.capacity.bodies):
@@ -29,7 +29,7 @@ def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dt
 def read_velocities(
     state: ti.template(), begin: ti.i32, count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Write the velocities of one body [m/s] as the integrator stores them."""
+    """Write the velocities of one body [m/s] to `out`, as the integrator stores them."""
     ti.loop_config(serialize=True)
     for i in range(count):
         v = state.particle_velocity[state.particle_of_vertex[begin + i]]
@@ -44,7 +44,7 @@ def write_motion(
     positions: ti.types.ndarray(ndim=2),
     velocities: ti.types.ndarray(ndim=2),
 ):
-    """Set the positions [m] of one body's particles, and their velocities [m/s] at that time."""
+    """Set the positions [m] of one body's particles, and the velocities [m/s] at the same time."""
     i = 0
     while i < positions.shape[0]:
         p = state.particle_of_vertex[state.body_particles[body][0] + i]

@@ -1,24 +1,24 @@
 """Vertices and normals of one body for a renderer.
 
 Render vertices are grouped in blocks of `LANES`. The computation of a block does not depend on its position,
-so the bits are the same for any number of threads.
+so the results are bitwise identical for any number of threads.
 """
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Numbers of vertices in the ring around a render vertex: enough for eight triangles, and for six in the
-first blocks. Most render vertices have six."""
+"""Largest number of vertices in a ring around a render vertex, in any block and in the first blocks. Most
+render vertices have six triangles, which need seven vertices. Eight triangles need nine vertices."""
 
 STRIDE = (1 + RING) * LANES
-"""Number of table entries of a block."""
+"""Number of entries of a block in the table of `render_table`."""
 
 BLOCK_BITS = (1 << 24) - 1
 """Mask that leaves block numbers unchanged. It proves to the compiler that indices cannot overflow."""
 
 NO_LENGTH = 1e-37
-"""Squared norm [m^4] of a sum of triangle normals below which it has no direction, near float32's limit."""
+"""Squared norm [m^4] below which a sum of triangle normals counts as zero, near float32's limit."""
 
 
 @ti.func
@@ -28,7 +28,7 @@ def _row(rows: ti.template(), i):
 
 @ti.func
 def drawn_position(state: ti.template(), first, vertex, alpha):
-    """Position of a vertex [m], interpolated by `alpha`; `first` is the body's first particle."""
+    """Return the position of a vertex [m], interpolated by `alpha`. `first` is the body's first particle."""
     p = state.particle_of_vertex[first + vertex]
     before, after = state.prev_position[p], state.particle_position[p]
     x = before + alpha * (after - before)
@@ -44,7 +44,7 @@ def _block_count(positions: ti.template()):
 
 @ti.func
 def _sum_of_ring(positions: ti.template(), table: ti.template(), place, length: ti.template()):
-    """Sum over the triangles around a render vertex: twice the area times the normal of each [m^2]."""
+    """Return the sum of normals of the triangles around a render vertex, each times twice the area [m^2]."""
     a = _row(positions, table[place])
     one = _row(positions, table[place + LANES]) - a
     n = ti.Vector.zero(ti.f32, 3)
@@ -67,7 +67,7 @@ def write_render_mesh(
 ):
     """Write positions [m] and unit normals of render vertices.
 
-    They are interpolated by `alpha` from the previous step (0) to the last one (1).
+    Positions and normals are interpolated by `alpha` from the previous step (0) to the last step (1).
 
     Args:
         table: see `render_table`.
@@ -86,7 +86,7 @@ def write_render_mesh(
         nx, ny = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
         nz = ti.Vector.zero(ti.f32, LANES)
         small = table[_block_count(positions) * (STRIDE + 1) + positions.shape[0] // 3 + 1]
-        # These loops read arrays and write only local ones, so that LLVM vectorises them in one pass.
+        # These loops read arrays and write only to local arrays, so that LLVM vectorises them in one pass.
         if block < small:
             for lane in range(LANES):
                 j = lane & (LANES - 1)
@@ -97,7 +97,7 @@ def write_render_mesh(
                 j = lane & (LANES - 1)
                 n = _sum_of_ring(positions, table, (block & BLOCK_BITS) * STRIDE + j, RING)
                 nx[j], ny[j], nz[j] = n.x, n.y, n.z
-        # The few further triangles, which are in no ring.
+        # Add the few triangles that do not fit into the rings.
         row = _block_count(positions) * STRIDE + positions.shape[0] // 3 + block
         for number in range((table[row + 1] - table[row]) // 3):
             place = table[row] + 3 * number

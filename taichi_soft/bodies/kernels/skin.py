@@ -6,23 +6,24 @@ from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
 FRAME = 12
-"""Numbers stored for each vertex of the body: the deformation gradient F by columns, and x - F X / 2 with the
-position x and the rest position X."""
+"""Number of values stored for each vertex of the body: the columns of the deformation gradient F, and
+x - F X / 2 with the position x and the rest position X."""
 
 ROW = 10
-"""Numbers per skin vertex: four weights, the position q (see `bodies.skin`), and the normal at rest."""
+"""Number of values per skin vertex: four weights, the position q (see `bodies.skin`), the normal at rest."""
 
 LANES = 16
 """Number of skin vertices that are stored and computed together."""
 
 NO_LENGTH = 1e-30
-"""Squared norm of a normal below which it has no direction, near float32's limit."""
+"""Squared norm below which a normal counts as zero, near float32's limit."""
 
 
 def interleaved(rows: np.ndarray) -> np.ndarray:
-    """Return rows (k, n) in kernel order: the first numbers of `LANES` rows, then the second ones, and so on.
+    """Return rows (k, n) in kernel order, as a flat array with `LANES` n numbers for each block of rows.
 
-    The last block is padded with 0. The result is flat, with `LANES` n numbers for each block.
+    A block contains the first numbers of `LANES` rows, then their second numbers, and so on. The last block
+    is padded with 0.
     """
     blocks = -(-len(rows) // LANES)
     padded = np.zeros((blocks * LANES, rows.shape[1]), dtype=rows.dtype)
@@ -50,14 +51,14 @@ def write_skin(
 ):
     """Write positions [m] and unit normals of skin vertices.
 
-    They are interpolated by `alpha` from the previous step (0) to the last one (1).
+    Positions and normals are interpolated by `alpha` from the previous step (0) to the last step (1).
 
     Args:
         count: number of vertices of the body.
-        ints: concatenation of: index of the first neighbour of each of these vertices, and of the end; the
+        ints: index of the first neighbour of each of these vertices, and the number of neighbours; the
             neighbours; the four vertices of the body that carry each skin vertex, `interleaved`.
-        floats: concatenation of: row of each neighbour (see `gradient_rows`); the body's vertices at rest;
-            `ROW` numbers for each skin vertex, `interleaved`.
+        floats: row of each neighbour (see `gradient_rows`); the body's vertices at rest; `ROW` numbers for
+            each skin vertex, `interleaved`.
         frames: work array, (FRAME count,).
         positions, normals: (3 k,).
     """
@@ -80,7 +81,7 @@ def write_skin(
         rows = 3 * (edges + count) + ROW * LANES * block
         corners = count + 1 + edges + 4 * LANES * block
         drawn = ti.Vector.zero(ti.f32, 6 * LANES)
-        for lane in range(LANES):  # reads arrays and writes only local ones, so that LLVM vectorises it
+        for lane in range(LANES):  # LLVM vectorises this loop, because it writes only to local arrays
             frame = ti.Vector.zero(ti.f32, FRAME)
             for c in ti.static(range(4)):
                 start, weight = FRAME * ints[corners + LANES * c + lane], floats[rows + LANES * c + lane]

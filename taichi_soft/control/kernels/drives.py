@@ -1,8 +1,8 @@
-"""External forces of a step: applied forces, linear damping and wind; and the load on pinned particles.
+"""External forces of a step (applied forces, linear damping and wind), and the load on pinned particles.
 
-All of them act on the velocities for their exact duration, so that their impulse over a step is exact. With
-leapfrog, velocities are at half substeps: half a substep's impulse is applied before the first kick, and the
-other half after the last kick.
+The forces act on the velocities for their exact duration, so that their impulse over a step is exact. With
+leapfrog, velocities are at half substeps. Half of a substep's impulse is therefore applied before the first
+kick, and the other half after the last kick.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -33,8 +33,8 @@ def apply_external_forces(state: ti.template(), body, seconds):
 def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
     """Change the velocities of one body by wind during `h` [s], triangle by triangle.
 
-    A vertex gets a third of the force 1/4 rho c_d A |v_n| v_n of a triangle. The integration is implicit, so
-    that a vertex never exceeds the wind's speed along the normal.
+    The force on a triangle is 1/4 rho c_d A |v_n| v_n. Each vertex gets a third of this force. The
+    integration is implicit, so that a vertex never exceeds the wind's speed along the normal.
     """
     wind = state.wind[None]
     drives = state.body_drives[body]
@@ -105,7 +105,7 @@ def add_push(
 
 @ti.kernel
 def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Accelerate every vertex of one body during the next step by its row of `accelerations` [m/s^2]."""
+    """Accelerate the vertices of one body during the next step by `accelerations`, (n, 3) [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         _open_pushes(state, body)
@@ -130,7 +130,7 @@ def write_linear_damping(state: ti.template(), body: ti.i32, rate: ti.f32):
 
 @ti.kernel
 def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
-    """Write whether one body is sheltered from the wind."""
+    """Shelter one body from the wind if `is_sheltered` is 1. Expose it if `is_sheltered` is 0."""
     _set_bit(state, body, SHELTERED, is_sheltered)
 
 

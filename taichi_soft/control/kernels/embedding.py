@@ -13,7 +13,7 @@ def embed_points(
     corners: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f64, ndim=2),
 ):
-    """Find the tetrahedron of each point: of all tetrahedra, the one with the largest smallest weight.
+    """Find for each point the tetrahedron in which the smallest weight of the point is largest.
 
     Args:
         points: points to embed, (k, 3) [m].

@@ -21,9 +21,9 @@ def _count_within(patch: ti.template(), distance):
 
 @ti.func
 def _distance_of_last(patch: ti.template(), radius):
-    """Find the smallest distance within which there are more vertices than a patch can have, by bisection.
+    """Find by bisection the smallest distance within which there are more vertices than a patch can have.
 
-    The bisection uses the bits of the floats, which have the same order as non-negative floats.
+    The bisection uses the bits of the floats. As integers, they have the same order as non-negative floats.
     """
     lowest, highest = ti.cast(0, ti.i64), ti.bit_cast(radius, ti.i64)
     while lowest < highest:
@@ -37,7 +37,10 @@ def _distance_of_last(patch: ti.template(), radius):
 
 @ti.func
 def _square_of_slope(x: ti.template(), elements: ti.template(), patch: ti.template(), e):
-    """Squared gradient of the falloff in a tetrahedron, or its squared difference along a spring."""
+    """Return the squared gradient of the falloff in a tetrahedron.
+
+    For a spring, return the squared difference of the falloff between the ends.
+    """
     first = elements[e, 0]
     rise, is_near = ti.Vector.zero(ti.f64, 3), patch[first, 0] != 0.0
     for i in ti.static(range(3)):
@@ -69,9 +72,10 @@ def shape_patch(
 ):
     """Find the patch around a point at rest, and its strength.
 
-    The strength is `FARTHEST_PULL` times the radius of the patch, times its stiffness. The stiffness is the
-    force per distance if each vertex moves by its falloff w. It is twice the energy of that deformation per
-    squared distance: the sum of V mu |grad w|^2 in tetrahedra, or of k (w_i - w_j)^2 / 3 in springs.
+    The strength is `FARTHEST_PULL` times the radius and the stiffness of the patch. The stiffness is the
+    force per distance if each vertex moves in proportion to its falloff w. This stiffness is twice the energy
+    of that deformation per squared distance: the sum of V mu |grad w|^2 over all tetrahedra, or of
+    k (w_i - w_j)^2 / 3 over all springs.
 
     Args:
         corners: three or four vertices between which the point lies.
@@ -81,7 +85,8 @@ def shape_patch(
         masses: masses of the vertices, (n,) [kg].
         elements: vertices of springs (e, 2) or tetrahedra (e, 4).
         stiffness: stiffness of each element, k / 3 [N/m] or V mu [N m], (e,).
-        patch: (n, 2), receives the falloff of each vertex, 0 outside the patch, and its fraction of a pull.
+        patch: (n, 2), receives the falloff of each vertex, 0 outside the patch, and the vertex's fraction of
+            the force.
         strength: (1,), receives the strength [N].
     """
     ti.loop_config(serialize=True)

@@ -1,9 +1,9 @@
 """Grabs: their fields, and springs that pull a patch of a body's surface to a target.
 
-A grab is a soft constraint (Catto, Soft Constraints, GDC 2011): spring and damper use the velocity after the
-pull, so that the grab does not overshoot for any stiffness. Each particle of the patch gets a fraction of the
-force. The part of a force above the strength of the patch acts on the whole body in proportion to mass, which
-causes no deformation.
+A grab is a soft constraint (Catto, Soft Constraints, GDC 2011): its spring and its damper use the velocity
+after the pull, so that the grab does not overshoot for any stiffness. Each particle of the patch gets a
+fraction of the force. The part of a force above the strength of the patch acts on the whole body in
+proportion to mass, which causes no deformation.
 
 Groups of fields: writes grabs.
 """
@@ -20,10 +20,11 @@ MOST_GRABS, PATCH_ROWS = 16, 128
 """Largest number of grabs of a world, and largest number of particles of a grab."""
 
 CORNERS = 4
-"""Number of corners of a grabbed point's element: a triangle, or a tetrahedron after a change of level."""
+"""Number of corners of a grabbed point's element: a tetrahedron after a change of level, else a triangle with
+its first corner twice."""
 
 PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
-"""Columns of weights, limits and force in the numbers of `write_grab` and `read_grab`."""
+"""Columns of the weights, the limits and the force in `numbers` of `write_grab` and `read_grab`."""
 
 
 ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
@@ -59,7 +60,7 @@ class GrabFields(FieldGroup):
 
 @ti.func
 def _stretch(state: ti.template(), g):
-    """Vector from a grab's target to the grabbed point [m], limited to the longest stretch."""
+    """Return the vector from a grab's target to the grabbed point [m], limited to the longest stretch."""
     corners, weights = state.grabs.corners[g], state.grabs.weights[g]
     point = ti.Vector.zero(state.real, 3)
     for i in ti.static(range(CORNERS)):
@@ -70,11 +71,11 @@ def _stretch(state: ti.template(), g):
 
 @ti.func
 def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
-    """Change of velocity of the whole body by the part of the force above the patch's strength [m/s].
+    """Return the change of a whole body's velocity [m/s] by the part of a force above the patch's strength.
 
     Args:
         wanted: force of spring and damper at the resulting velocity [N].
-        drag: decrease of that force per velocity [N s/m].
+        drag: decrease of the force `wanted` per velocity [N s/m].
     """
     on_patch, on_all, inv_mass = state.grabs.limits[g].x, state.grabs.limits[g].y, state.grabs.limits[g].z
     force = wanted / (1.0 + h * drag * inv_mass)
@@ -87,7 +88,7 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
     """Change the velocities of one body by its grabs during `h` [s].
 
     The springs use the velocities after a kick of `kick` [s] by the forces of this substep, so that the pull
-    includes resisting forces.
+    also balances these forces.
     """
     if state.body_drives[body] & GRABBED != 0:
         gravity = gravity_on(state, body)
@@ -99,7 +100,7 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
                 drag = spring.y + h * spring.x
                 part = ti.cast(0.0, state.real)
                 wanted, total = -pull, ti.Vector.zero(state.real, 3)
-                for turn in range(2):  # first compute the strength, then apply the force
+                for turn in range(2):  # first compute the total force, then apply the limited force
                     total = ti.Vector.zero(state.real, 3)
                     row = g * PATCH_ROWS
                     while row < g * PATCH_ROWS + state.grabs.count[g]:

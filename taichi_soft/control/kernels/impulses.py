@@ -1,6 +1,6 @@
 """Impulses on particles between two steps, as immediate changes of velocity.
 
-Leapfrog stores velocities half a substep earlier than positions; the change is added to the stored
+Leapfrog stores velocities half a substep earlier than positions. The change is added to these stored
 velocities.
 """
 
@@ -12,7 +12,11 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def falloff(distance2, radius2):
-    """Smooth falloff from 1 at the centre to 0 at the radius, with zero slope at both; 0 beyond."""
+    """Return a smooth falloff from 1 at the centre to 0 at the radius and beyond.
+
+    The slope is zero at the centre and at the radius.
+    Args: distance2, radius2: squared distance and squared radius [m^2].
+    """
     rest = ti.max(1.0 - distance2 / radius2, 0.0)
     return rest * rest
 
@@ -84,7 +88,7 @@ def add_radial_impulse(
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Push all bodies away from a point, each in proportion to the fraction of its mass in range.
+    """Push all bodies away from a point, each body in proportion to the fraction of its mass in range.
 
     Args:
         place: centre [m], radius [m], impulse on a body at the centre [N s]: (5,).

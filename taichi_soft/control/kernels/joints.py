@@ -1,16 +1,17 @@
 """Joints: their fields and their solver.
 
-A joint holds particles of one body at points embedded in tetrahedra of another.
+A joint holds particles of one body at points embedded in tetrahedra of another body. Each held particle has a
+row.
 
-In every substep, Gauss-Seidel sweeps over the rows apply impulses that equalise the velocities of each
-particle and its point. For any masses, this never adds energy, and it has no stiffness that could be too
-high. Sweeps alternate their direction: with one direction, the remaining errors would act as non-conservative
-forces, and bodies would flutter.
+In every substep, Gauss-Seidel sweeps over the rows apply impulses that equalise the velocities of each held
+particle and its point. For any masses, this method adds no energy, and there is no stiffness that could be
+too high. Successive sweeps have opposite directions. With only one direction, the remaining errors would act
+as non-conservative forces, and bodies would flutter.
 
 Remaining gaps are closed no faster than the bodies can follow.
 
-The impulse on the point is distributed so that it acts at the particle's position. Momentum and angular
-momentum are therefore conserved even with a gap.
+The impulse on a point is distributed over the point's tetrahedron so that it acts at the position of the held
+particle. Momentum and angular momentum are therefore conserved even if there is a gap.
 
 Groups of fields: reads islands; writes joints.
 """
@@ -30,15 +31,16 @@ ENDS = 5
 weights sum to -1. The weighted sum of their positions is the gap between the held particle and its point."""
 
 SWEEPS = 6
-"""Number of sweeps over all rows of an island per substep, even. Rows without common particles need one."""
+"""Number of sweeps over all rows of an island per substep. The number must be even. Rows without common
+particles need one sweep."""
 
 CLOSE = 30.0
-"""Closing rate of a gap [1/s]. At higher rates, conflicting rows, such as between a fine and a coarse mesh,
-would shake light bodies."""
+"""Closing rate of a gap [1/s]. At higher rates, conflicting rows would shake light bodies. Rows can conflict
+between a fine and a coarse mesh."""
 
 MOST_SHIFT = 0.5
-"""Largest change of the weights that moves an impulse to the particle's position. If a gap is larger relative
-to the tetrahedron, the joint does not conserve angular momentum exactly."""
+"""Largest change of the weights that moves an impulse to the particle's position. If a gap needs a larger
+change, the joint does not conserve angular momentum exactly."""
 
 
 MOST_WEIGHT = 1e3
@@ -49,7 +51,7 @@ ALL_JOINTS, USED_JOINT_ROWS, JOINT_ENDS = "joints", "rows of joints", "ends of j
 
 
 class JointFields(FieldGroup):
-    """Joints and their rows, packed in the order of creation.
+    """All joints of a world, and the rows of the joints in the order of creation, without free rows between.
 
     End k of row r has the index r ENDS + k.
     """
@@ -155,7 +157,7 @@ def solve_joints(
             for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
-                # Ignore joints to a body that failed, so that it cannot damage others.
+                # Ignore joints to a failed body, so that this body cannot damage other bodies.
                 is_exploding = (
                     state.islands.is_exploding[body] + state.islands.is_exploding[ti.max(ends[1] - 1, 0)]
                 )
@@ -181,7 +183,7 @@ def solve_joints(
 
 @ti.func
 def are_joined(state: ti.template(), a, b):
-    """1 if a joint connects the bodies a and b, else 0."""
+    """Return 1 if a joint connects the bodies a and b, else 0."""
     found = 0
     if state.body_drives[a] & state.body_drives[b] & JOINED != 0:
         for j in range(MOST_JOINTS):
@@ -229,7 +231,7 @@ def write_joint(
         first: first row of the joint, after the rows of all other joints.
         draw_speed: largest closing speed of a gap [m/s].
         particles: held particle of `body` and four particles of `other` in each row, (n, 5).
-        weights: weights of these particles, 1 and four that sum to -1, (n, 5).
+        weights: weights of these particles, (n, 5): 1 for the held particle, and four that sum to -1.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -251,7 +253,7 @@ def write_joint(
 
 @ti.kernel
 def end_joint(state: ti.template(), j: ti.i32):
-    """Remove a joint, and move later rows forward into its rows."""
+    """Remove a joint, and move later rows forward to fill the gap."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         mark_held(state, 0)

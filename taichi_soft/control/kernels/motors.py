@@ -1,7 +1,8 @@
 """Motors: their fields, and functions that rotate or push a part of a body.
 
-A motor moves its particles by one pattern d: d = a x (x - c) [m] for a rotation about the axis a through c,
-and d = a for a push along the axis. With velocities v after the forces of a substep of h seconds
+A motor moves its particles by a pattern d. The pattern is d = a x (x - c) [m] for a rotation about the axis a
+through c, and d = a for a push along the axis. The motor uses the velocities v after the forces of a substep
+of h seconds:
 
     inertia  I = sum m d.d        speed  w = sum m d.v / I
     impulse  J = I (wanted - w), no larger than limit h
@@ -38,12 +39,12 @@ class MotorRow:
     """Data of one motor."""
 
     body: ti.i32  # index plus 1, 0 if unused
-    first: ti.i32  # first row in `MotorFields.particle`, and the row after the last
-    end: ti.i32
-    turns: ti.i32  # 1: rotates particles about its axis, 0: pushes them along it
-    is_fixed: ti.i32  # 1: the axis keeps its direction, 0: it rotates with the particles
+    first: ti.i32  # first row in `MotorFields.particle`
+    end: ti.i32  # row after the motor's last row
+    turns: ti.i32  # 1: rotates particles about the axis, 0: pushes particles along the axis
+    is_fixed: ti.i32  # 1: the axis keeps its direction, 0: the axis rotates with the particles
     has_point: ti.i32  # 1: the axis passes through `point`, 0: through the centre of the particles
-    axis: ti.math.vec3  # unit vector, in world axes, or in the rest shape if not fixed
+    axis: ti.math.vec3  # unit vector; in world axes if fixed, else in the rest shape
     point: ti.math.vec3  # point on the axis [m]
     speed: ti.f32  # target [rad/s] or [m/s]
     limit: ti.f32  # largest torque [N m] or force [N]
@@ -64,16 +65,16 @@ class MotorFields(FieldGroup):
     )
     particle = declare(MOTOR_ROWS, ti.i32, native_keep=MOTOR_PARTICLES, below=Below(PARTICLE), native=True)
     is_driven = declare(BODY, ti.i32, start=0, native=True)  # 1 if a motor drives the body
-    # Impulse in the last step; for a motor that rotates, angular impulse [N m s].
+    # Impulse in the last step. A motor that rotates particles has an angular impulse [N m s].
     impulse = declare(MOST_MOTORS, ti.f32, unit="N s", start=0, keep=USED_MOTORS, most=FINITE, native=True)
 
 
 @ti.func
 def _axis_now(state: ti.template(), motor):
-    """Present point on the axis of a motor [m], and direction of the axis.
+    """Return a present point on the axis of a motor [m], and the present direction of the axis.
 
-    An axis that rotates with the particles follows the rotation nearest to sum m x r^T, with the present
-    positions x and the rest positions r of the particles relative to their centres.
+    An axis that rotates with the particles follows the rotation nearest to sum m x r^T, where x and r are the
+    present positions and the rest positions of the particles, relative to their centre.
     """
     first = state.motors.particle[motor.first]
     x0, r0 = state.particle_position[first], state.rest_position[first]
@@ -122,7 +123,7 @@ def _run_motor(state: ti.template(), motor, h, kick):
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
         row = row_behind(row)
-    impulse = h * 0.0  # NaN if the point is infinite
+    impulse = h * 0.0  # stays 0 if the inertia is NaN, because the point is infinite
     if inertia > 0.0:
         speed = momentum / inertia
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
@@ -145,8 +146,8 @@ def _run_motor(state: ti.template(), motor, h, kick):
 def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32):
     """Apply the motors of one body for a substep of `h` [s].
 
-    The motors use the velocities after a kick of `kick` [s], so that they include resisting forces. If `kick`
-    is 0, forces are computed later, and the motors include only gravity.
+    The motors use the velocities after a kick of `kick` [s], so that they also balance the forces of this
+    substep. If `kick` is 0, the forces are computed later, and the motors balance only gravity.
 
     Args:
         is_first: 1 in the first substep of a step.
@@ -242,13 +243,13 @@ def find_rest_axis(
     axis: ti.types.ndarray(dtype=ti.f64, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Transform the direction of an axis from the present state of particles to their rest state.
+    """Transform an axis from the present shape of the driven particles to their rest shape.
 
     Args:
         rest, now: positions of the particles at rest and at present, (n, 3) [m].
         weights: masses of the particles, scaled to the sum 1.
         axis: present direction, (3,).
-        found: (4,), receives the direction at rest, and the ratio of width to length of the particles.
+        found: (4,), receives the direction at rest, and the ratio of the width of the part to its length.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

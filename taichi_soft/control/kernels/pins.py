@@ -1,4 +1,4 @@
-"""Pinned particles: their inverse mass is zero, and their velocity is prescribed.
+"""Pinned particles, which have an inverse mass of zero and a prescribed velocity.
 
 `particle_aim` encodes the motion of a pinned particle in the next step. For particles attached to a frame,
 the target is in the frame's axes.
@@ -35,7 +35,7 @@ def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32
 
 @ti.kernel
 def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Unpin particles: restore their inverse mass. They keep their velocity."""
+    """Unpin particles, by restoring their inverse mass. The particles keep their velocity."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]
@@ -58,11 +58,11 @@ def write_targets(
     targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Write targets of pinned particles: their positions at the end of the next step [m].
+    """Write the targets of pinned particles, which are their positions at the end of the next step [m].
 
+    If one of the particles is not pinned, nothing is changed.
     Args:
-        found: (1,), receives -1, or the index in `particles` of the first particle that is not pinned; in
-            that case, nothing is changed.
+        found: (1,), receives the index in `particles` of the first particle that is not pinned, or -1.
     """
     loose = -1
     ti.loop_config(serialize=True)
@@ -89,9 +89,9 @@ def attach_particles(
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     places: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Attach particles of one body to a frame at `places` in the frame's axes [m].
+    """Attach particles of one body to a frame at `places` in the frame's axes, (k, 3) [m].
 
-    If `feels` is 1, record the load of the body's pins.
+    If `feels` is 1, record the load on the body's pins.
     """
     i = 0
     while i < particles.shape[0]:
@@ -109,7 +109,7 @@ def attach_particles(
 
 @ti.kernel
 def write_feeling(state: ti.template(), body: ti.i32, feels: ti.i32):
-    """Write whether the load on one body's pins is recorded."""
+    """Record the load on one body's pins if `feels` is 1. Stop recording if `feels` is 0."""
     bit = ti.select(feels != 0, FEELS_REACTION, 0)
     state.body_drives[body] = (state.body_drives[body] & ~FEELS_REACTION) | bit
 
@@ -122,7 +122,12 @@ def read_reaction(
     origin: ti.types.ndarray(dtype=ti.f32, ndim=1),
     load: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Write the impulse on `particles` in the last step [N s], and its moment about `origin` [N m s]."""
+    """Write the impulse of `particles` on their pins in the last step [N s], and its moment [N m s].
+
+    Args:
+        origin: point to which the moment refers, (3,) [m].
+        load: (6,), receives the impulse and the moment.
+    """
     ti.loop_config(serialize=True)
     for _ in range(1):
         center = ti.Vector([origin[0], origin[1], origin[2]])
@@ -145,7 +150,7 @@ def aim_pinned(
 
     Args:
         frames: poses of all frames after the step: rotation matrix by rows, and position [m], (f, 12).
-    Returns: number of bodies for which this must be called again before the following step.
+    Returns: number of bodies for which this kernel must be called again before the following step.
     """
     waiting = 0
     ti.loop_config(serialize=True)
@@ -176,7 +181,7 @@ def aim_pinned(
 
 @ti.func
 def _aim(state: ti.template(), p, dt, frames: ti.template()):
-    """Set the velocity of one pinned particle. Return 1 if it needs another call after the step, else 0."""
+    """Set the velocity of one pinned particle. Return 1 if the particle needs a call after the step."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
     if aim >= WITH_FRAME:

@@ -10,7 +10,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def forget_loads(state: ti.template(), body):
-    """Clear the loads of a step that was undone because the body failed: they can be NaN."""
+    """Clear the loads of a step that was undone because the body failed. These loads can be NaN."""
     zero = ti.Vector.zero(state.real, 3)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):

@@ -1,4 +1,4 @@
-"""Move a whole body, or set its velocities, as if it were rigid, between two steps."""
+"""Kernels that move a whole body, or set its velocities, like a rigid body between two steps."""
 
 from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
@@ -8,7 +8,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def _center_of_mass(state: ti.template(), body):
-    """Centre of mass of a body [m], in float64."""
+    """Return the centre of mass of a body [m], in float64."""
     particles = state.body_particles[body]
     moment, mass = ti.Vector.zero(ti.f64, 3), ti.cast(0.0, ti.f64)
     p = particles[0]
@@ -31,7 +31,7 @@ def write_rigid_velocity(
     motion: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Set the velocities of one body, except for pinned particles, to a rigid motion.
+    """Set the velocities of one body to a rigid motion. Pinned particles keep their velocities.
 
     Args:
         motion: velocity of the centre of mass [m/s], angular velocity [rad/s]: (6,).
@@ -74,7 +74,7 @@ def jump(
 ):
     """Rotate one body about its centre of mass and move it.
 
-    Previous positions and the targets of pins move too.
+    The body's previous positions and the targets of its pins move too.
     Args:
         place: new centre of mass [m], smallest allowed height [m], factor of the velocities: (5,).
         turn: rotation matrix (3, 3).
