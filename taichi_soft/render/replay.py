@@ -79,12 +79,12 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
 
 
 def _is_state(world: World, expected: str) -> bool:
-    """True if the state has this hash: that of `World`, or that printed by web pages."""
+    """True if `expected` is the world's `state_hash` or `bodies_hash`, which web pages store."""
     return expected in (world.state_hash(), world.bodies_hash())
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
-    """Build a world of the recorded structure. Returns: the world, and its assets and shapes by digest."""
+    """Build a world with the recorded structure. Returns: the world, and its assets and shapes by digest."""
     shapes: dict[str, Any] = {name: from_plain(data) for name, data in made_of["shapes"].items()}
     assets = {name: _asset(options) for name, options in made_of["assets"].items()}
     world = World(**made_of["world"])
@@ -107,7 +107,7 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
-    """Repeat a recorded call. Raises an error for calls that a recorder does not store."""
+    """Repeat a recorded call. Raises: SnapshotError for a call that recorders do not store."""
     handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
     if handle is None or not is_recorded(handle, name):
         raise SnapshotError(f"{name!r} of handle {serial} is not a call that recordings contain")
@@ -127,7 +127,7 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
 
 
 def _step(world: World, seconds: float, substeps: int | None, expected: str, pushes: list[Any]) -> str:
-    """Repeat a step. Returns: the hash of the state, in the form of the recorded hash."""
+    """Repeat a recorded step with its accelerations. Returns: `expected`, the recorded hash of the state."""
     rows = []
     for serial, data in pushes:
         body = handles_of(world).find(serial, Body)
