@@ -30,7 +30,7 @@ class StressRow:
 
 @dataclass(frozen=True)
 class StressTable:
-    """Result of `stress_table`. Notebooks show a table, and a histogram of volume over stress below it."""
+    """Result of `stress_table`. Notebooks show a table and below it a histogram of the volume over stress."""
 
     rows: tuple[StressRow, ...]  # one per body
     edges: NDArray[np.float64]  # edges of the bars [Pa], (BARS + 1,)
