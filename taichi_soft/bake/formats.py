@@ -36,7 +36,7 @@ def _floats(frames: int, vertices: int) -> int:
 
 
 def _with_weights(frames: int, vertices: int) -> int:
-    """Return the size of positions, normals and a matrix of weights, frames by frames [bytes]."""
+    """Return the size of positions, normals and a (frames, frames) matrix of weights [bytes]."""
     return _floats(frames + 1, vertices) + 4 * frames**2
 
 
