@@ -30,8 +30,8 @@ class Camera:
         eye: position of the camera [m].
         target: point at the centre of the image [m].
         up: direction that points up in the image, of any length.
-        fov_degrees: field of view across the shorter side of the image, 1 to 150. An object
-            that fits in a square image therefore fits in every image.
+        fov_degrees: field of view across the shorter side of the image, 1 to 150. An object that
+            fits in a square image therefore fits in every image.
     Raises: OptionError for numbers that are not finite, an eye at the target, `up` along the line of sight
         or an angle out of range.
     """

@@ -24,8 +24,8 @@ PALETTE: tuple[Color, ...] = (
     (0.32, 0.62, 0.85),  # sky
     (0.66, 0.50, 0.38),  # clay
 )
-"""Body colours, sRGB from 0 to 1, with different hues and similar lightness. Reuse them from the start for
-more bodies."""
+"""Body colours, sRGB from 0 to 1, with different hues and similar lightness. After the last
+colour, begin again with the first."""
 
 RAMP: tuple[Color, ...] = (
     (0.30, 0.52, 0.80),

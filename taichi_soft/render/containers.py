@@ -36,7 +36,7 @@ LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
 # With one palette per film and ordered dithering, pixels that do not move stay equal: later frames compress
 # well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers slow down the next possible rate, 100
+GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers play the next possible rate, 100, too slowly
 
 
 @contextlib.contextmanager
@@ -159,7 +159,7 @@ class Pictures(Container):
 
 
 def _frames_of(fps: float, size: tuple[int, int]) -> list[str]:
-    """Return the ffmpeg arguments that describe the raw frames in its pipe."""
+    """Return the ffmpeg arguments that describe the raw frames in the input pipe of ffmpeg."""
     rate = Fraction(fps).limit_denominator(100_000)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     return [*raw, "-r", f"{rate.numerator}/{rate.denominator}", "-i", "pipe:0"]

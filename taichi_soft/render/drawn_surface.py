@@ -23,8 +23,8 @@ class Surface:
     Before each frame, set `positions`, and also `color` if it changes.
 
     Args:
-        positions: positions of all vertices of the body, including inner ones, (n, 3) [m]. An edge
-            stays sharp if its triangles meet at more than 60 degrees in these positions. All other edges are
+        positions: positions of all vertices of the body, including inner vertices, (n, 3) [m]. An edge
+            stays sharp if its triangles meet at more than 60 degrees in these positions. Other edges are
             shaded smooth.
         triangles: vertex indices, (m, 3), counterclockwise seen from outside. Only a cloth is drawn from both
             sides. Shadows assume a closed surface.
@@ -34,11 +34,11 @@ class Surface:
         texture: texture, multiplied by `color`; use white to leave it unchanged.
         uv: (n, 2), texture coordinates of the vertices: (0, 0) at the lower left, (1, 1) at the upper right;
             the texture repeats.
-        look: "matte", "jelly" or "cloth".
-            If a cloth has each triangle twice, once per side, the first one is its front.
+        look: "matte", "jelly" or "cloth". If a cloth has each triangle twice, once per side, the first of the
+            two is the front.
     Raises: OptionError for wrong shapes, an unknown look, a texture without `uv` or the reverse, positions
-        that are not finite (as after an explosion) or colours out of range; MeshError
-        for indices out of range.
+        that are not finite (as after an explosion) or colours out of range; MeshError for indices out of
+        range.
     """
 
     def __init__(
@@ -66,7 +66,8 @@ class Surface:
         if self.look is Look.CLOTH:
             corners, codes = _both_sides(corners)
         self.looks = codes
-        # Only vertices on the surface are projected and lit. Those on sharp edges are stored once per side.
+        # Only vertices on the surface are projected and lit. A vertex on a sharp edge is stored once per
+        # side.
         if normals is None:
             self._used, self.triangles = split_at_creases(first, corners, DEFAULT_CREASE)
         else:

@@ -32,7 +32,7 @@ Progress = Callable[[int, int], None]
 class FilmReport:
     """Measurements of a film. Step times exclude drawing, writing and compiling.
 
-    Exception: kernels that only `Stage.act` calls are compiled during a step, and this counts as step time.
+    The compile time of kernels that only `Stage.act` calls counts as step time.
     """
 
     path: Path | None  # path of the film; None if nothing was written

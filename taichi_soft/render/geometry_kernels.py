@@ -58,7 +58,7 @@ def project_triangles(
     """Compute edges, depth and pixel box of each triangle, and count the triangles per tile.
 
     Args:
-        to_picture: matrix from (x, y, z, 1) to (u d, v d, d, q d). The largest q is visible.
+        to_picture: matrix from (x, y, z, 1) to (u d, v d, d, q d). Points with a larger q are in front.
         near: smallest d to draw.
         planes: out (m, 12), coefficients, see `PLANE`. The sum of the edges at (u, v) is 1 / d.
         boxes: out (m, 4), first and last column, first and last row [pixels]. The box is empty if the

@@ -16,7 +16,8 @@ SOFT_TAPS = 8
 """Width of the box filter for shadows on bodies [texels]."""
 
 LIFT = 0.7
-"""Shadow bias [texels]: look-ups are offset by it along the normal, and again towards the sun."""
+"""Shadow bias [texels]. Look-ups are shifted by this distance along the normal, and by the same distance
+towards the sun."""
 
 
 @ti.func
@@ -119,7 +120,7 @@ def fifth_power(x):
 
 @ti.func
 def mirrored(normal, view, sun, doublings: ti.template()):
-    """Return the specular highlight of the key light, 0 to 1. More doublings make it sharper."""
+    """Return the specular highlight of the key light, 0 to 1. More doublings sharpen the highlight."""
     half = sun + view
     shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
     for _ in ti.static(range(doublings)):
@@ -132,7 +133,7 @@ def surroundings(normal, sun, above):
     """Return the ambient and fill light on a surface of albedo 1.
 
     Args:
-        above: 0 on the floor, 1 well above it, where the floor lights undersides fully.
+        above: 0 on the floor, 1 well above the floor, where undersides receive the full light of the floor.
     """
     upward = 0.5 + 0.5 * normal.z
     below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)

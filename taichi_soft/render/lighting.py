@@ -44,5 +44,5 @@ SUN_AZIMUTH = np.radians(62.0)  # angle to the direction from target to eye, pos
 
 # Fraction of light that remains on the floor in full shadow of the key: the light of the sky.
 SHADED = vec3(0.36, 0.40, 0.47)
-# Fraction of that light which remains on the floor directly under a touching body.
+# Fraction of the light on the floor that is left directly under a touching body.
 CONTACT = 0.35

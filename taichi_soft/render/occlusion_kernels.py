@@ -27,11 +27,11 @@ WIDEST = 64.0
 """Largest distance of a tap from its point [points]."""
 
 BIAS = 0.12
-"""Sine of the smallest angle above a triangle's plane at which other surfaces occlude it. Without this limit,
-the flat triangles of a curved surface would occlude each other."""
+"""Sine of the smallest angle above a triangle's plane at which other surfaces occlude the triangle. Without
+this limit, the flat triangles of a curved surface would occlude each other."""
 
 STRENGTH = 10.0
-"""Factor of the occlusion in an exponential function, which never makes a surface black."""
+"""Factor in exp(-STRENGTH * occlusion), the fraction of the surroundings that stays visible."""
 
 ALIKE = 0.03
 """Relative difference of depth above which two points belong to different surfaces."""
@@ -44,7 +44,7 @@ def spiral_taps() -> NDArray[np.float32]:
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
-    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # from tap to tap by the golden angle
+    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # in steps of the golden angle
     radius = (k + 0.6) / TAPS
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     return places.reshape(-1, 2).astype(np.float32)
@@ -61,10 +61,12 @@ def gather_depth(
     depth: reals,
     out: rows,
 ):
-    """Store q of the first sample of every second pixel. In tiles without triangles, store q of the floor.
+    """Store q = 1 / depth of the first sample of every second pixel.
+
+    In tiles without triangles, store q of the floor.
 
     Args:
-        backdrop: a, b, c of the floor's q over the image.
+        backdrop: a, b, c of q on the floor, which is a u + b v + c.
         offset_u, offset_v: position of the first sample relative to the centre of the pixel [pixels].
         out: (height / 2, width / 2).
     """
@@ -100,7 +102,7 @@ def hidden_share(
     Args:
         rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
         lens: inverse of `rays`.
-        plane: a, b, c of the triangle's q over the image.
+        plane: a, b, c of q = 1 / depth on the triangle, which is a u + b v + c.
         reach: distance beyond which nothing occludes [m].
         focal: focal length [pixels].
     """

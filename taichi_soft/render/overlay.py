@@ -56,7 +56,7 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
 def draw_legend(
     picture: Picture, entries: Sequence[tuple[Color, str]], *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """Draw lines of text like `draw_text`, each after a swatch of its colour. Returns: the image.
+    """Draw lines of text like `draw_text`, each with a colour swatch in front. Returns: the image.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.

@@ -191,7 +191,10 @@ class Renderer:
         return picture
 
     def _floor_depth(self) -> tuple[float, float, float]:
-        """Return a, b and c of the floor's 1 / depth, a u + b v + c. It hides surfaces below the floor."""
+        """Return a, b and c of the floor's 1 / depth over the image, a u + b v + c.
+
+        The raster hides surfaces behind this plane.
+        """
         if self.floor is None or self.camera.eye[2] <= self.floor:
             return NOTHING_BEHIND
         a, b, c = (float(x) / (self.floor - self.camera.eye[2]) for x in self._rays[2])

@@ -44,8 +44,8 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
         path: file written by `World.save_recording`, by a frozen body or by a page of the gallery.
         picture: path for an image of the final state, .png; None draws nothing.
         steps: largest number of steps; None replays all.
-    Raises: SnapshotError for a damaged file, a file that is not a recording, or one from another version of
-        this package; VideoError if the image cannot be written.
+    Raises: SnapshotError for a damaged file, a file that is not a recording, or a recording from another
+        version of this package; VideoError if the image cannot be written.
     """
     target = None if picture is None else as_path(picture)
     most = math.inf if steps is None else as_count(steps, "steps", 0)
@@ -79,7 +79,7 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
 
 
 def _is_state(world: World, expected: str) -> bool:
-    """True if `expected` is the world's `state_hash` or `bodies_hash`, which web pages store."""
+    """True if `expected` is the `state_hash` of the world, or the `bodies_hash` that web pages record."""
     return expected in (world.state_hash(), world.bodies_hash())
 
 

@@ -166,7 +166,7 @@ def shade(
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
                             look = looks[t]
-                            # The key can light the other side of a cloth.
+                            # The key light can shine on the other side of a cloth.
                             outward = n
                             if look >= CLOTH and n.dot(sun) < 0.0:
                                 outward = -n

@@ -128,7 +128,7 @@ def _fit(
     """Return the matrix (4, 4) of a (size, size) map that contains `points`, and the edge of a texel [m].
 
     The line of sight is opposite to the last of `axes`. Texel sizes change in steps and texels are fixed in
-    the world, so that shadows do not crawl while a body moves. The map leaves a border of width
+    the world, so that shadows do not crawl while a body moves. The map has a border of three times
     `blur` around the points.
     """
     seen = points @ axes[:2].T.astype(np.float32)

@@ -28,7 +28,7 @@ def texture_picture(visual: Any, count: int) -> Any:
 
 
 def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
-    """Return the vertex colours of a mesh, sRGB from 0 to 1, (count, 3), by which its texture is multiplied.
+    """Return the vertex colours of a mesh, sRGB from 0 to 1, (count, 3). They tint the texture.
 
     Args:
         visual: `visual` of a trimesh mesh, or None.

@@ -54,7 +54,7 @@ class Stage:
         film(stage, "balls.mp4")
 
     All colliders are drawn, level floors as a chequered plane. All texts must be plain ASCII. Keep them short
-    enough for a film of 480 pixels.
+    enough for a film that is 480 pixels wide.
     """
 
     title: str  # text in the corner

@@ -35,7 +35,7 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
 def texture_light(
     texels: ti.template(), levels: ti.template(), decode: ti.template(), first, uv, uv_right, uv_below
 ):
-    """Sample a texture at `uv` with trilinear filtering; `first` is its largest mip level.
+    """Sample a texture at `uv` with trilinear filtering; `first` is the largest mip level.
 
     Args:
         uv_right, uv_below: texture coordinates at the next pixels to the right and below.
