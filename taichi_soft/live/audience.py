@@ -24,7 +24,7 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.meshing.surfaces import Up
 
 UNSEEN = 2
-"""Largest number of frames that a visitor has been sent but has not shown yet. Further frames are skipped."""
+"""Largest number of frames that were sent to a visitor but are not shown yet. Further frames are skipped."""
 
 MOST_MESSAGES = 20
 """Largest number of messages queued for a visitor; older messages are dropped."""
@@ -83,7 +83,7 @@ class Audience:
         self._status_version = 0
 
     def say(self, words: str) -> None:
-        """Queue a message to all visitors."""
+        """Queue a message for each visitor, and log the message."""
         _log.info("live: %s", words)
         for visitor in self.visitors.values():
             visitor.put(said=words)
@@ -175,7 +175,7 @@ class Audience:
                     await self._send_frame(visitor, pane, runner, len(worlds.panes))
 
     async def _send_frame(self, visitor: Visitor, pane: int, runner: Runner, panes: int) -> None:
-        """Send the newest frame of a pane, unless the visitor still has to show too many earlier frames."""
+        """Send the newest frame of a pane, unless too many earlier frames are not shown yet."""
         if runner.drawn is None or visitor.sent - visitor.seen >= UNSEEN * panes:
             return
         version, number, packet = runner.newest_packet(pane)

@@ -78,7 +78,7 @@ class Guard:
         rebinding). Therefore `Host` must name this server, and `Origin` must match `Host`. Files in `PUBLIC`
         need no token.
         Args:
-            path: path with its query.
+            path: path and query of the request.
             host, origin: values of the headers `Host` and `Origin`, or None.
         """
         place = host_and_port(host)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SERVER = 0
-"""Sender number of the server. Its messages are served first, never merged and never refused."""
+"""Sender number of the server. Messages of the server are served first, and never merged or refused."""
 
 MOST_WAITING = 64
 """Largest number of queued requests of one visitor; further requests are refused."""
@@ -24,7 +24,7 @@ BURST = 2.0
 """Longest period over which unused time of a visitor accumulates [s]. Short bursts therefore do not wait."""
 
 LONGEST_WAIT = 1.0
-"""Longest delay of a visitor's next request after an expensive one [s]."""
+"""Longest delay of a visitor's next request after an expensive request [s]."""
 
 Message = tuple[Any, ...]
 

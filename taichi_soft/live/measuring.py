@@ -60,7 +60,7 @@ class LiveCost:
     triangles: int
     packet: int  # size of a frame [bytes]
     pictures: float  # frames per second
-    latency_ms: tuple[float, float]  # from a move to the frame that shows it, 50th and 95th percentile
+    latency_ms: tuple[float, float]  # time until a move is shown, 50th and 95th percentile
     alone_ms: tuple[float, float]
     visited_ms: tuple[float, float]
     ratios: tuple[float, ...]
@@ -173,7 +173,7 @@ class _Reader:
 
 
 async def _latency(reader: _Reader, number: int) -> float:
-    """Grab and lift a resting body. Returns: the time from the lift to the first frame that shows it [s]."""
+    """Grab and lift a resting body. Returns: the time until the first frame in which it is lifted [s]."""
     await reader.say("reset")
     await reader.listen(0.6 + 0.013 * (number % 7))  # moves begin at different times between two frames
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])

@@ -22,10 +22,11 @@ STEPS = 65535
 """Quantisation steps along an edge of the bounding box."""
 
 LARGEST_BOX = np.float32(400.0)
-"""Largest edge of the bounding box [m]; points outside are clamped to it."""
+"""Largest edge of the bounding box [m]. Points outside are clamped to the box."""
 
 _PICTURE = struct.Struct("<BBHIIId3f3f")
-"""Kind, pane, is tinted, number, version, number of vertices, time, lower corner and size of the box."""
+"""Header of a frame: kind, pane, 1 if it has tints, number, version, number of vertices, time, lower corner
+and size of the box."""
 
 
 def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:

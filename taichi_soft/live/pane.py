@@ -46,7 +46,7 @@ class Runner:
         self.is_over = False
         self.is_lost = False  # True if the connection is lost
         self.is_asked = False  # True after this world requested the shown world's motion
-        self.is_fresh = False  # True to start in the initial state, not in that of the shown world
+        self.is_fresh = False  # True to start in the initial state, False to continue the shown world
         self.keeps_sliders = False  # True to ignore the slider values of the shown world
         self._inbox = Inbox()
         self._changed = threading.Condition()

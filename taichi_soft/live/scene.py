@@ -80,7 +80,7 @@ class SceneSource:
         """Return the script that makes `world`.
 
         Args:
-            is_alone: True if the files that the script names are in the folder `files` next to it.
+            is_alone: True if the files that the script names are in the folder `files` next to the script.
         """
         files = ", ".join(self._place(each, is_alone) for each in self.meshes)
         options = [

@@ -44,7 +44,7 @@ ANSWERING = 0.008
 
 
 def words_of(error: BaseException) -> str:
-    """Return the message of an error, preceded by its type unless it is a TaichiSoftError."""
+    """Return the message of an error. The type of the error precedes it, except for a TaichiSoftError."""
     text = str(error) or type(error).__name__
     return text if isinstance(error, TaichiSoftError) else f"{type(error).__name__}: {text}"
 
@@ -184,7 +184,7 @@ class Simulation:
     # Requests of visitors
 
     def do_set(self, name: str, value: float) -> None:
-        """Set a slider."""
+        """Set a slider to a value, and apply it to the world."""
         before = self.controls.substeps
         with self._undoable(SLIDERS[name].label, is_slider=True):
             self.controls.set_value(name, value)
@@ -240,7 +240,7 @@ class Simulation:
         self._due["told"] = 0.0
 
     def do_reset(self) -> None:
-        """Restore the initial state, and set all sliders to the scene's values or the preset's.
+        """Restore the initial state, and set all sliders to the scene's values or to the chosen preset.
 
         The server restarts scenes with their own code, because a snapshot does not contain the state
         of that code.

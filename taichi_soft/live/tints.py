@@ -79,7 +79,7 @@ class Tints:
 
 
 def _round_up(value: float) -> float:
-    """Round up to the next of 1, 2, 5, 10, ..."""
+    """Round up to 1, 2 or 5 times a power of ten. Returns: 0 if `value` is not positive."""
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** math.floor(math.log10(value))

@@ -28,7 +28,7 @@ OnFile = Callable[[Runner, tuple[Any, ...]], None]
 
 
 class Worlds:
-    """The shown world, or two side by side, and the worlds that will replace them.
+    """One or two shown worlds, side by side, and the worlds that will replace them.
 
     Args:
         source: source of the first world.
@@ -58,7 +58,7 @@ class Worlds:
     def begin(
         self, pane: int, source: SceneSource, *, is_fresh: bool = False, given: Given | None = None
     ) -> None:
-        """Prepare a world for a pane. The shown world continues until the new one is ready.
+        """Prepare a world for a pane. The shown world continues until the new world is ready.
 
         Args:
             is_fresh: True to start in the initial state instead of the shown world's state.
@@ -120,7 +120,7 @@ class Worlds:
         return runner is not None and bool((runner.state or {}).get("restarts"))
 
     def leave(self, visitor: int) -> None:
-        """Release a visitor's grab, and drop its waiting requests."""
+        """Release the grab of a visitor who has left, and drop the visitor's waiting requests."""
         for runner in self.panes.values():
             runner.send("leave", visitor, sender=visitor)
 
@@ -222,7 +222,7 @@ class Worlds:
                 self._audience.set_trouble(words)
                 _log.warning("live: %s", words)
             return
-        if pane in self.coming:  # the coming world replaces the failed one
+        if pane in self.coming:  # the coming world replaces the failed world
             if self.coming[pane].is_asked:
                 self._show(pane, self.coming[pane])
             return
