@@ -160,7 +160,10 @@ def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Inte
 
 
 def _move(made: Path, path: Path, old: Path) -> None:
-    """Move a complete result to `path`. In a folder, keep files of others, such as Godot's settings."""
+    """Move a complete result to `path`.
+
+    If `path` is a folder, keep files that a bake did not write, such as Godot's import settings.
+    """
     if not path.is_dir():
         made.replace(path)
         return

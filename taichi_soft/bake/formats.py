@@ -18,7 +18,7 @@ LARGEST_GLB = 4 * 1024**3 - 1
 
 
 class Format(NamedTuple):
-    """A format of a bake."""
+    """Functions that write a bake format and check its limits, and the packages that it needs."""
 
     write: Callable[[Take, Path, Interpolation], object]
     size: Callable[[int, int], int]  # function of (frames, vertices) that returns the size [bytes]

@@ -16,7 +16,7 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 STEPS_PER_SECOND = 60.0
-"""Smallest step rate of a world without an adapter [1/s]; also the default of `FixedStep`."""
+"""Smallest step rate of a world without an adapter [1/s], equal to the default rate of `FixedStep`."""
 
 STEP_TOLERANCE = 1e-6
 """Largest accepted time between a frame and a step [steps]. Frame rates such as 29.97 are rounded."""

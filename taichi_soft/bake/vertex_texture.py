@@ -111,7 +111,7 @@ def is_vat(folder: Path) -> bool:
 
 
 def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
-    """Return positions and normals of all vertices in a frame, y up. Absent bodies shrink to points."""
+    """Return positions and normals of all vertices in a frame, y up. An absent body is shrunk to a point."""
     places, normals = [], []
     for clip in take.clips:
         position, normal = clip.at(frame)

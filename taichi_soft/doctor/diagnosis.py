@@ -96,7 +96,7 @@ def diagnose(
     method: CageMethodName = "lattice",
     up: Up | None = None,
 ) -> Diagnosis:
-    """Check a file, make a body from it, and time its frames.
+    """Check a file, make a body from it, and time simulated frames of the body.
 
     Args:
         path: file of a surface, see `read_surfaces`, or of tetrahedra, see `load_mesh`.

@@ -50,7 +50,7 @@ PERIOD_RANGE = 1.0, 100.0
 vibration; with more, it seems never to end."""
 
 MAX_LEAN = 0.2
-"""Largest lean of a standing body [rad]. Beyond it, the body rolls or tips over."""
+"""Largest lean of a standing body [rad]. A body that leans further rolls or tips over."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ class Behaviour:
 class Feel:
     """Result of `material_from_feel`."""
 
-    material: Material  # for `World.add_body`
-    gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
+    material: Material  # material to pass to `World.add_body`
+    gravity_scale: float  # value for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
     predicted: Behaviour  # calculated from statics and from the slowest mode
     simulated: Behaviour  # measured in a simulation, on a floor and in the air
 
@@ -200,7 +200,7 @@ class _Search:
 
     @property
     def gravity_scale(self) -> float:
-        """Gravity scale for the requested sag."""
+        """Gravity scale for the requested sag; 1 unless both a sag and a frequency are requested."""
         scales_gravity = self.sag is not None and self.wobble_hz is not None
         return self.weight_ratio * self.young / self.body.weight if scales_gravity else 1.0
 
