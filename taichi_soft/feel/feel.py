@@ -132,8 +132,8 @@ class _Body:
             raise OptionError(f"{mesh!r} has no vibration mode: use a finer mesh")
         height = float(np.ptp(mesh.vertices[:, 2]))
         self.weight = density * GRAVITY_EARTH * height  # pressure under a column of the body's height [Pa]
-        # Values divided by sqrt(young): angular frequency of the slowest mode; its estimate, to which damping
-        # ratios refer; number of substeps of a frame.
+        # Divide values by sqrt(young): the angular frequency of the slowest mode, the estimate of this
+        # frequency that damping ratios refer to, and the number of substeps of a frame.
         self.speed = omega / sqrt(1e5)
         self.estimate = self.asset.first_frequency / sqrt(1e5)
         self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)
