@@ -34,7 +34,7 @@ class BakeReport:
     meshes: tuple[str, ...]  # names of the meshes
     vertices: int  # number of vertices of all meshes
     size: int  # total size of the files [bytes]
-    left_out: tuple[str, ...]  # bodies without triangles
+    left_out: tuple[str, ...]  # names of bodies without triangles
 
 
 def bake(
@@ -50,12 +50,12 @@ def bake(
 ) -> BakeReport:
     """Simulate a scene and write the meshes of all bodies and their motion into one file.
 
-    Frames are `1 / fps` apart: the first is the initial state, the last comes after `seconds`. Each frame is
-    the exact state after a fixed step. A world makes at least 60 steps per second, an integer number per
-    frame.
+    Frames are `1 / fps` apart. The first frame is the initial state, and the last frame is the state after
+    `seconds`. Each frame is the exact state after a fixed step: a world makes the same integer number of
+    steps for each frame, and at least 60 steps per second.
     Args:
-        scene: a world, which is built if needed, or an `EngineAdapter`, which steps with its own step length
-            and `before_step`. It continues from its current state.
+        scene: a world, which is built if needed, or an `EngineAdapter`, whose step length and `before_step`
+            are used. The simulation continues from the current state.
         out: .glb (glTF 2.0, morph targets), .npz (point cache), .vat (a folder: vertex-animation texture,
             mesh, shaders) or .usdc (USD). An existing file is replaced when the bake is complete.
         seconds: length of the clip [s].
@@ -64,11 +64,11 @@ def bake(
         limit: largest size of the file [MB], estimated from the number of vertices and frames.
         on_room: called once with the estimated size, before anything moves.
         on_frame: called with (frames made, total frames) after each frame.
-    Returns: names and sizes of the written meshes.
-    Raises: OptionError for a value out of range, for more than `limit`, and for frames between an adapter's
-        steps; MissingExtraError; StateError for a body that is cut or torn during the bake, with the frame;
-        MeshError if no body has triangles; BakeError if the file cannot be written. After an error, no file
-        is written.
+    Returns: a report with the names and the size of the written meshes.
+    Raises: OptionError for a value out of range, for a file larger than `limit`, and for frames between an
+        adapter's steps; MissingExtraError without the packages that the format needs; StateError, which
+        names the frame, for a body that is cut or torn during the bake; MeshError if no body has triangles;
+        BakeError if the file cannot be written. After an error, no file is written.
     """
     path = as_path(out)
     form = _format_of(path)
@@ -112,7 +112,7 @@ def _format_of(path: Path) -> Format:
 
 
 def _require_place(path: Path) -> None:
-    """Raise a BakeError if `path` holds something that a bake must not replace."""
+    """Raise a BakeError if there is a file or folder at `path` that a bake must not replace."""
     wants_folder = path.suffix.lower() == ".vat"
     if path.is_dir() and not (wants_folder and (is_vat(path) or not any(path.iterdir()))):
         raise BakeError(f"cannot write {path}: the folder is not a .vat: choose another path, or remove it")
@@ -147,7 +147,7 @@ def _part_folder(path: Path) -> Iterator[Path]:
 
 
 def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Interpolation) -> int:
-    """Write into the temporary folder, and move the complete result to `path`. Returns: its size [bytes]."""
+    """Write into the temporary folder, and move the complete result to `path`. Returns: the size [bytes]."""
     try:
         made = part / f"bake{path.suffix.lower()}"
         form.write(take, made, interpolation)
@@ -160,7 +160,10 @@ def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Inte
 
 
 def _move(made: Path, path: Path, old: Path) -> None:
-    """Move a complete result to `path`. Files of others in a folder stay, such as Godot's import settings."""
+    """Move a complete result to `path`.
+
+    If `path` is a folder, keep files that a bake did not write, such as Godot's import settings.
+    """
     if not path.is_dir():
         made.replace(path)
         return

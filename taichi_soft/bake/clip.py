@@ -17,7 +17,7 @@ Ints32 = NDArray[np.int32]
 class Clip:
     """A render mesh of a body, for all frames in which the body is in the world.
 
-    If nothing moved, a frame is the same array object as the frame before it.
+    If nothing moved, a frame refers to the same array objects as the frame before it.
     """
 
     name: str  # unique name of the mesh
@@ -34,7 +34,7 @@ class Clip:
 
     @property
     def end(self) -> int:
-        """Number of the first frame after those that contain the body."""
+        """Number of the first frame after the last frame with the body."""
         return self.first + len(self.positions)
 
     @property
@@ -58,17 +58,18 @@ class Clip:
         return self.first <= frame < self.end
 
     def at(self, frame: int) -> tuple[Floats32, Floats32]:
-        """Return positions and normals at a frame of the bake; those of the nearest frame if the body is
-        absent.
+        """Return positions and normals at a frame of the bake, (k, 3) each.
+
+        If the body is absent in this frame, return those of the nearest frame with the body.
         """
         index = min(max(frame - self.first, 0), len(self.positions) - 1)
         return self.positions[index], self.normals[index]
 
     def targets(self) -> tuple[list[int], list[int]]:
-        """Return the distinct shapes of the clip, except the first one.
+        """Find the distinct shapes of the clip, except the shape of the first frame.
 
-        Returns: indices of the frames in which these shapes first occur, and for each frame the index of its
-            shape in this list, -1 for the first shape.
+        Returns: a list with the frame in which each of these shapes first occurs; and for each frame, the
+            index of its shape in this list, or -1 for the shape of the first frame.
         """
         shapes, place, current = [], [-1], -1
         for index in range(1, len(self.positions)):
@@ -88,11 +89,11 @@ class Take:
     clips: tuple[Clip, ...]
     frame_count: int
     fps: float
-    left_out: tuple[str, ...]  # bodies without triangles
+    left_out: tuple[str, ...]  # names of bodies without triangles
 
     @property
     def times(self) -> Floats:
-        """Times of the frames from the first [s]."""
+        """Times of all frames, measured from the first frame [s]."""
         return np.arange(self.frame_count) / self.fps
 
     @property

@@ -12,14 +12,14 @@ PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
 """Default material. glTF treats a material without these values as metal."""
 
 COLORS = ((232, 107, 82), (41, 148, 158), (242, 178, 71), (102, 115, 199), (128, 178, 97), (204, 107, 153))
-"""Colours of bodies without a colour, sRGB up to 255, equal to those in films."""
+"""Colours of bodies without a colour, sRGB from 0 to 255, the same colours as in films."""
 
 UNSET = (102, 102, 102)
 """The grey that trimesh assigns to a material without a colour."""
 
 
 def visual_of(clip: Clip, number: int) -> Any:
-    """Make TextureVisuals of trimesh with a glTF material: that of the artist, or a default one.
+    """Make a trimesh `TextureVisuals` with a glTF material: the artist's material or a default material.
 
     Args:
         number: index of the clip, which chooses the colour of a clip without a colour.
@@ -43,8 +43,8 @@ def visual_of(clip: Clip, number: int) -> Any:
 def _as_pbr(material: Any) -> Any:
     """Convert a material of an .obj file to glTF.
 
-    It sets values whose glTF defaults differ, and removes the grey that trimesh assigns to materials without
-    a colour, because that grey darkens the texture.
+    Set the values whose glTF defaults differ. Remove the grey that trimesh assigns to materials without a
+    colour, because this grey would darken the texture.
     """
     if not hasattr(material, "to_pbr"):
         return material

@@ -18,7 +18,7 @@ LARGEST_GLB = 4 * 1024**3 - 1
 
 
 class Format(NamedTuple):
-    """A format of a bake."""
+    """Functions that write a bake format and check its limits, and the packages that it needs."""
 
     write: Callable[[Take, Path, Interpolation], object]
     size: Callable[[int, int], int]  # function of (frames, vertices) that returns the size [bytes]
@@ -36,7 +36,7 @@ def _floats(frames: int, vertices: int) -> int:
 
 
 def _with_weights(frames: int, vertices: int) -> int:
-    """Return the size of positions, normals and a matrix of weights, frames by frames [bytes]."""
+    """Return the size of positions, normals and a (frames, frames) matrix of weights [bytes]."""
     return _floats(frames + 1, vertices) + 4 * frames**2
 
 

@@ -1,7 +1,7 @@
 """Write glTF 2.0: one node per clip, with a morph target for each distinct shape.
 
 trimesh writes the first frame with materials and textures; pygltflib appends the motion. At each frame one
-weight is 1 and all others are 0; between two frames, interpolated weights blend their shapes.
+weight is 1 and all others are 0. Between two frames, interpolated weights blend the shapes of both frames.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class GlbFile:
 
         Args:
             rows: (n,) or (n, 2 or 3), stored as float32.
-            is_bounded: True to store minimum and maximum, which positions and times require.
+            is_bounded: True to store minimum and maximum, which glTF requires for positions and times.
             is_vertices: True for one row per vertex.
         """
         from pygltflib import Accessor, BufferView
@@ -153,9 +153,9 @@ class _Motion:
         mesh.extras = {"targetNames": [f"frame {clip.first + index}" for index in shapes]}
 
     def _weights(self, count: int, place: list[int]) -> int:
-        """Add an array of weights, 1 for the shape of each frame.
+        """Add the weights of a clip: in each frame, 1 for its shape and 0 for all other shapes.
 
-        Returns: its accessor. Clips with equal weights share it.
+        Returns: the index of their accessor. Clips with equal weights share an accessor.
         """
         key = (count, *place)
         if key not in self.weights:

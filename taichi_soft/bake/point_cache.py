@@ -2,15 +2,14 @@
 
 | array | shape | content |
 |---|---|---|
-| positions | (frames, vertices, 3) float32 | of all meshes, concatenated [m]; z is up |
+| positions | (frames, vertices, 3) float32 | vertices of all meshes, concatenated [m]; z is up |
 | normals | (frames, vertices, 3) float32 | unit normals |
 | triangles | (triangles, 3) int32 | vertex indices, counterclockwise seen from outside |
-| uvs | (vertices, 2) float32 | texture coordinates from the lower left; NaN for meshes without |
-| times | (frames,) float64 | from the first frame [s] |
+| uvs | (vertices, 2) float32 | texture coordinates from the lower left; NaN for meshes without them |
+| times | (frames,) float64 | time since the first frame [s] |
 | names | (meshes,) | names of the meshes |
 | vertex_starts, triangle_starts | (meshes + 1,) int64 | start of each mesh, and end of the last one |
-| is_there | (frames, meshes) bool | false if the body is absent; its shape is then that of the nearest frame
-|
+| is_there | (frames, meshes) bool | false if the body is absent; then the nearest frame is repeated |
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from taichi_soft.bake.clip import Clip, Take
 
 
 def write_npz(take: Take, path: Path) -> None:
-    """Write the arrays of the table above."""
+    """Write a take as an .npz file with the arrays that the docstring of this module lists."""
     clips = take.clips
     starts = np.cumsum([0, *(clip.vertex_count for clip in clips)])
     shape = take.frame_count, take.vertex_count, 3

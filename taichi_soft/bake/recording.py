@@ -16,13 +16,14 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 STEPS_PER_SECOND = 60.0
-"""Smallest step rate of a world without an adapter [1/s]; also the default of `FixedStep`."""
+"""Smallest step rate of a world without an adapter [1/s], equal to the default rate of `FixedStep`."""
 
 STEP_TOLERANCE = 1e-6
-"""Largest distance between a frame and a step [steps], because frame rates such as 29.97 are rounded."""
+"""Largest accepted time between a frame and a step [steps]. Frame rates such as 29.97 are rounded."""
 
 FRAME_TOLERANCE = 1e-3
-"""Largest missing fraction of the last frame: 0.3333 s at 30 FPS give ten frames."""
+"""Largest fraction of a frame by which a clip can be too short for its last frame: 0.33333 s at 30 FPS have
+frames at 0 s, 1/30 s and so on up to 1/3 s."""
 
 Scene = World | EngineAdapter
 Progress = Callable[[int, int], None]
@@ -55,15 +56,15 @@ def record(
     require_room: Callable[[int], object],
     on_frame: Progress | None = None,
 ) -> Take:
-    """Step a scene and record every frame; the first is the current state.
+    """Step a scene and record every frame. The first frame is the current state.
 
     Args:
         scene: a built world, or the adapter that steps it.
         require_room: called with the number of vertices before the first frame and when bodies are added. It
-            raises an error if they exceed the limit.
+            must raise an error if there are too many vertices.
         on_frame: called with (frames made, total frames) after each frame.
-    Raises: StateError for a body that is cut or torn during the recording, with the frame; MeshError if no
-        body has triangles; errors of `require_room` and of steps.
+    Raises: StateError, which names the frame, for a body that is cut or torn during the recording; MeshError
+        if no body has triangles; errors of `require_room` and of steps.
     """
     advance = steps_of(scene, fps)
     recorder = _Recorder(scene.world if isinstance(scene, EngineAdapter) else scene, fps, require_room)
@@ -109,7 +110,7 @@ class _Recorder:
         meshes: tuple[RenderMesh, ...] = body.render_meshes
         try:
             meshes = meshes or (body.render_mesh(),)
-        except MeshError:  # no triangles, such as a rope
+        except MeshError:  # a body without triangles, such as a rope
             name = f"body {body.index}"
             self.left_out += [name] if name not in self.left_out else []
         for mesh in meshes:

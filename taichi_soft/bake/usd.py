@@ -37,7 +37,10 @@ def write_usd(take: Take, path: Path) -> None:
 
 
 def _identifier(name: str, taken: set[str]) -> str:
-    """Convert a name to a USD identifier (letters, digits, underscores) that is not in `taken`."""
+    """Convert a name to a USD identifier (letters, digits, underscores), and add it to `taken`.
+
+    A number is appended to an identifier that is already in `taken`.
+    """
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     plain = plain if plain[:1].isalpha() else f"_{plain}"
     each = plain

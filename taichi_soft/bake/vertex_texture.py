@@ -1,9 +1,10 @@
-"""Write a vertex-animation texture: images from which a shader reads the positions of vertices in each frame.
+"""Write a vertex-animation texture: images from which a shader reads the vertices' positions in each frame.
 
-A pixel is a vertex in a frame. Vertex v of frame f is in column v % width and row
+Each pixel is one vertex in one frame. Vertex v of frame f is in column v % width and row
 f * rows_per_frame + v // width, counted from the upper left. Positions have 16 bits per axis, from the lowest
-to the highest position of the whole bake. One image has the upper eight bits and one the lower eight, because
-engines treat 16-bit images differently. An absent body is collapsed to one point, so that it is invisible.
+to the highest position of the whole bake. One image has the upper eight bits and another image the lower
+eight, because engines treat 16-bit images differently. All vertices of an absent body are at one point, so it
+is invisible.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ SHADERS = {
     "godot3.shader": ("godot.gdshader", GODOT_3),
     "unity.hlsl": ("unity.hlsl", {}),
 }
-"""By file: its template, and the engine's keywords in it."""
+"""For each shader file, its template and the keywords of the engine that replace placeholders."""
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ def require_pixels(frames: int, vertices: int) -> None:
 
 
 def write_vat(take: Take, folder: Path) -> None:
-    """Write a folder with images, mesh, metadata and shaders."""
+    """Write a take to a folder with images, mesh, metadata and shaders. Raises: OptionError, OSError."""
     require_pixels(take.frame_count, take.vertex_count)
     folder.mkdir()
     width = min(take.vertex_count, WIDEST)
@@ -110,7 +111,7 @@ def is_vat(folder: Path) -> bool:
 
 
 def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
-    """Return positions and normals of all vertices in a frame, y up. Absent bodies are collapsed."""
+    """Return positions and normals of all vertices in a frame, y up. An absent body is shrunk to a point."""
     places, normals = [], []
     for clip in take.clips:
         position, normal = clip.at(frame)
@@ -123,7 +124,7 @@ def _frame(take: Take, frame: int) -> tuple[Floats, Floats]:
 
 
 def _gathered(clip: Clip, frame: int) -> Floats:
-    """Return positions that collapse all vertices of a clip to their centre in a frame."""
+    """Return positions (k, 3) that all equal the centre of a clip in a frame."""
     rows = clip.at(frame)[0].astype(np.float64)
     return np.repeat(rows.mean(axis=0, keepdims=True), len(rows), axis=0)
 

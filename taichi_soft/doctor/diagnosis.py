@@ -28,13 +28,13 @@ FRAME = 1 / 60
 """Length of a frame [s]."""
 
 MOST_SUBSTEPS = 500
-"""Largest acceptable number of substeps per frame; above it, `World` warns."""
+"""Largest acceptable number of substeps per frame. `World` warns above this number."""
 
 SMALLEST, LARGEST = 0.02, 50.0
 """Usual sizes of objects in a game [m]; other sizes suggest another unit."""
 
 THIN = 0.5
-"""Solid fraction of a tetrahedron below which it counts as thin."""
+"""Solid fraction of a tetrahedron below which the tetrahedron counts as thin."""
 
 MOST_THIN = 0.3
 """Largest acceptable fraction of the solid in thin tetrahedra. Every surface has some thin tetrahedra."""
@@ -96,10 +96,10 @@ def diagnose(
     method: CageMethodName = "lattice",
     up: Up | None = None,
 ) -> Diagnosis:
-    """Check a file, make a body from it, and time its frames.
+    """Check a file, make a body from it, and time simulated frames of the body.
 
     Args:
-        path: surface for `read_surfaces`, or tetrahedra for `load_mesh`.
+        path: file of a surface, see `read_surfaces`, or of tetrahedra, see `load_mesh`.
         material: material of the body.
         cells, method, up: see `SoftBodyAsset.from_surface`.
     Raises: MeshError or OptionError for a file that cannot be read.
@@ -162,7 +162,7 @@ def _judge_surface(found: Diagnosis, facts: SurfaceFacts) -> None:
 
 
 def _judge_refinement(found: Diagnosis, asset: SoftBodyAsset, plain: SoftBodyAsset) -> None:
-    """Report the cost of limbs and sheets that are thinner than the cells."""
+    """Report the cost of keeping limbs and sheets that are thinner than the cells."""
     counts = [len(each.mesh.tets) for each in (plain, asset) if isinstance(each.mesh, TetMesh)]
     shorter = plain.stable_step.recommended / asset.stable_step.recommended
     found.say(
@@ -215,7 +215,7 @@ def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
 
 
 def _frame_time(asset: SoftBodyAsset, substeps: int) -> float:
-    """Median time of a frame while the body falls and lands [s]."""
+    """Return the median time of a frame while the body falls and lands [s]."""
     world = World(sleep_speed=0.0)
     low = float(asset.mesh.vertices[:, 2].min())
     world.add_body(asset, position=(0.0, 0.0, 0.01 - low))

@@ -1,4 +1,4 @@
-"""Repair a surface: remove degenerate and duplicate triangles, and orient the others outwards."""
+"""Repair a surface: remove degenerate and duplicate triangles, and turn all other triangles outwards."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from taichi_soft.meshing.surface import Surface, joined
 from taichi_soft.meshing.surfaces import UP
 
 VOXELS = 96
-"""Voxels along the longest side of the grid that separates inside and outside."""
+"""Number of voxels along the longest side of the grid that separates inside from outside."""
 
 ROUNDS = 3
 
@@ -28,8 +28,8 @@ PROBES = (1.0, 2.0, 4.0, 8.0)
 def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     """Write surfaces without degenerate and duplicate triangles, all facing outwards.
 
-    Vertices and holes are unchanged. In the file, the default axis of its format points up.
-    Returns: the numbers of removed and of flipped triangles.
+    Vertices and holes are unchanged. The default axis of the file format points up.
+    Returns: the number of removed triangles, and the number of flipped triangles.
     Raises: MeshError for a path that trimesh cannot write to.
     """
     import trimesh  # slow to import
@@ -41,7 +41,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     kept = _kept(vertices[triangles], triangles, size)
     faces, turned = triangles[kept], np.zeros(int(kept.sum()), dtype=np.bool_)
-    for _ in range(ROUNDS):  # each round sharpens the inside test for the next
+    for _ in range(ROUNDS):  # each round makes the inside test of the next round more accurate
         inward = _faces_inward(vertices[faces], solid_of(vertices, faces, size / VOXELS))
         faces[inward], turned = faces[inward][:, ::-1], turned ^ inward
     up = UP[path.suffix.lower()]
@@ -64,7 +64,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
 
 
 def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDArray[np.bool_]:
-    """True for triangles that have an area and are not duplicates, (m,)."""
+    """Return True for triangles that have an area and are not duplicates, bool (m,)."""
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     first = np.zeros(len(triangles), dtype=np.bool_)
     first[np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]] = True
@@ -72,7 +72,7 @@ def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDA
 
 
 def _faces_inward(corners: FloatArray, solid: Solid) -> NDArray[np.bool_]:
-    """True for triangles with more solid in front than behind, (m,)."""
+    """Return True for triangles with more solid in front than behind, bool (m,)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals *= solid.spacing / np.linalg.norm(normals, axis=1, keepdims=True)
     middles = corners.mean(axis=1)

@@ -1,4 +1,4 @@
-"""Facts about the triangles of a surface."""
+"""Find faults in the triangles of a surface."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surface import Surface, joined
 
 NO_AREA = 1e-12
-"""A triangle counts as having no area if twice its area, divided by the square of the surface's longest side,
-is at most this."""
+"""A triangle counts as having no area if twice its area is at most this number times the square of the
+surface's longest side."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class SurfaceFacts:
     size: float  # longest side of the bounding box [m]
     open_edges: int  # edges that belong to only one triangle
     crowded_edges: int  # edges that belong to more than two triangles
-    turned_edges: int  # edges that both triangles traverse in the same direction
+    turned_edges: int  # edges that both adjacent triangles traverse in the same direction
     flat_triangles: int  # triangles without area
     repeated_triangles: int
 
 
 def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
-    """Return the facts of several surfaces together."""
+    """Count the triangles, parts and faults of several surfaces together."""
     vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     welded = places_of(vertices, size)[triangles]

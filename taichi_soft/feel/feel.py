@@ -24,42 +24,42 @@ from taichi_soft.solver.substeps import FRAME, MANY_SUBSTEPS
 _log = logging.getLogger(__name__)
 
 SETTLED = 0.05
-"""Fraction of a vibration's amplitude at its settling time: the 5 % settling time of control engineering."""
+"""Fraction of a vibration's amplitude that remains at its settling time, as usual in control engineering."""
 
 DECAY_FACTOR = -log(SETTLED)
-"""Decay rate of a vibration times its settling time."""
+"""Product of the decay rate and the settling time of a vibration."""
 
 MODE_TOLERANCE = 1e-5
 """Relative change of the squared frequency at which the search for the slowest mode ends."""
 
 TOLERANCE, GUARANTEED = 0.015, 0.05
-"""Relative error of each target at which the search ends, and the error that it guarantees. The second is
-larger, because the floor and the steps of a game differ slightly from those of the search."""
+"""Relative error of each target at which the search ends, and the relative error that the search guarantees.
+The guaranteed error is larger, because the floor and the steps of a game differ slightly from the search."""
 
 MAX_TRIALS = 8
 """Largest number of simulations in a search."""
 
 SAG_RANGE = 1e-3, 0.3
-"""Allowed sags. Below this range, a body looks rigid and rounding matters; above it, bodies invert."""
+"""Allowed sags. Below this range, a body looks rigid and rounding matters; above it, tetrahedra invert."""
 
 GRAVITY_SCALE_RANGE = 0.05, 20.0
 """Allowed gravity scales. Outside this range, motion does not look natural."""
 
 PERIOD_RANGE = 1.0, 100.0
-"""Allowed numbers of periods until a vibration settles. Fewer do not look like a vibration; more seem never
-to end."""
+"""Allowed numbers of periods until a vibration settles. With fewer periods, the motion does not look like a
+vibration; with more, it seems never to end."""
 
 MAX_LEAN = 0.2
-"""Largest lean of a standing body [rad]. Beyond it, the body rolls or tips over."""
+"""Largest lean of a standing body [rad]. A body that leans further rolls or tips over."""
 
 
 @dataclass(frozen=True)
 class Behaviour:
     """Sag, frequency and settling time of a body."""
 
-    sag: float  # lowering of its highest point on a floor, over its height; nan if it tips over
-    wobble_hz: float  # frequency of its slowest vibration when nothing holds it [Hz]
-    settle_s: float  # time after which 5 % of that vibration's amplitude remains [s]
+    sag: float  # lowering of the highest point on a floor, relative to the height; nan if the body tips over
+    wobble_hz: float  # frequency of the slowest vibration of the free body [Hz]
+    settle_s: float  # time after which 5 % of the amplitude of this vibration remains [s]
 
     def __str__(self) -> str:
         return f"sag {self.sag:.3g}, wobble_hz {self.wobble_hz:.3g}, settle_s {self.settle_s:.3g}"
@@ -69,8 +69,8 @@ class Behaviour:
 class Feel:
     """Result of `material_from_feel`."""
 
-    material: Material  # for `World.add_body`
-    gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
+    material: Material  # material to pass to `World.add_body`
+    gravity_scale: float  # value for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were requested
     predicted: Behaviour  # calculated from statics and from the slowest mode
     simulated: Behaviour  # measured in a simulation, on a floor and in the air
 
@@ -89,18 +89,18 @@ def material_from_feel(
 
     Sag and frequency both depend on Young's modulus. If both are requested, the frequency sets Young's
     modulus and gravity is scaled for the sag. The result is simulated, and meets each target within 5 %. The
-    search takes seconds, and starts Taichi with its defaults if `init` was not called.
+    search takes seconds, and starts Taichi with default settings if `init` was not called.
     Args:
-        mesh: the body at rest, standing upright with z up. For an artist's mesh pass the cage, `asset.mesh`.
-        sag: lowering of its highest point over its height, when it stands on a floor.
-        wobble_hz: frequency of its slowest vibration when nothing holds it [Hz].
-        settle_s: time after which 5 % of its amplitude remains [s]; None for the default damping_ratio of
-            `Material`.
+        mesh: the body at rest, standing upright with z up. For an artist's mesh, pass the cage, `asset.mesh`.
+        sag: lowering of the body's highest point when it stands on a floor, relative to its height.
+        wobble_hz: frequency of the slowest vibration of the free body [Hz].
+        settle_s: time after which 5 % of the amplitude of this vibration remains [s]; None for the default
+            damping_ratio of `Material`.
         poisson: Poisson's ratio, as in `Material`.
         density: [kg/m^3].
         law: law of the body, as in `SoftBodyAsset`.
     Raises: OptionError for targets that are out of range or cannot be met together, with the nearest
-        possible one; MeshError and MaterialError as `SoftBodyAsset`.
+        possible target; MeshError and MaterialError for the same reasons as `SoftBodyAsset`.
     Example:
         feel = material_from_feel(sphere(radius=0.3), sag=0.05, settle_s=0.8)
         print(feel.material)
@@ -117,7 +117,7 @@ def material_from_feel(
 
 
 class _Body:
-    """A body with unknown Young's modulus, gravity and damping, alone in a world."""
+    """The body whose Young's modulus, gravity and damping are sought, in a separate world."""
 
     def __init__(self, mesh: TetMesh, poisson: float, density: float, law: LawName | None) -> None:
         self.constants = poisson, density
@@ -132,9 +132,11 @@ class _Body:
             raise OptionError(f"{mesh!r} has no vibration mode: use a finer mesh")
         height = float(np.ptp(mesh.vertices[:, 2]))
         self.weight = density * GRAVITY_EARTH * height  # pressure under a column of the body's height [Pa]
-        self.speed = omega / sqrt(1e5)  # angular frequency of the slowest mode / sqrt(young)
-        self.estimate = self.asset.first_frequency / sqrt(1e5)  # estimate that damping ratios refer to
-        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)  # per frame / sqrt(young)
+        # Divide values by sqrt(young): the angular frequency of the slowest mode, the estimate of this
+        # frequency that damping ratios refer to, and the number of substeps of a frame.
+        self.speed = omega / sqrt(1e5)
+        self.estimate = self.asset.first_frequency / sqrt(1e5)
+        self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)
         self.trial = Trial(self.asset)
 
     def material(self, young: float, rate: float) -> Material:
@@ -143,11 +145,11 @@ class _Body:
         return Material(young, poisson, density, damping_ratio=rate / (self.estimate * sqrt(young)))
 
     def omega(self, young: float) -> float:
-        """Angular frequency of the slowest mode without damping [rad/s]."""
+        """Return the angular frequency of the slowest mode without damping [rad/s]."""
         return self.speed * sqrt(young)
 
     def static_sag(self, weight_ratio: float) -> float:
-        """Static sag of the body if the pressure `weight` over Young's modulus is `weight_ratio`."""
+        """Return the static sag of the body if `weight` is `weight_ratio` times Young's modulus."""
         young = self.weight / MAX_SAG
         material = self.material(young, DAMPING_RATIO * self.omega(young))
         standing = self.trial.stand(material, weight_ratio / MAX_SAG, 2 * pi / self.omega(young), 0.0)
@@ -155,7 +157,7 @@ class _Body:
         return standing.static_sag
 
     def weight_ratio_for(self, sag: float) -> float:
-        """Ratio of `weight` to Young's modulus that gives a sag, by the secant method on logarithms.
+        """Find the ratio of `weight` to Young's modulus that gives a sag, by the secant method on logarithms.
 
         Raises: OptionError if the body would be too soft.
         """
@@ -198,7 +200,7 @@ class _Search:
 
     @property
     def gravity_scale(self) -> float:
-        """Gravity scale for the requested sag."""
+        """Gravity scale for the requested sag; 1 unless both a sag and a frequency are requested."""
         scales_gravity = self.sag is not None and self.wobble_hz is not None
         return self.weight_ratio * self.young / self.body.weight if scales_gravity else 1.0
 
@@ -239,7 +241,7 @@ class _Search:
         return Feel(material, self.gravity_scale, predicted, simulated)
 
     def _largest_error(self, result: Behaviour) -> float:
-        """Largest relative error of all targets."""
+        """Return the largest relative error of all targets."""
         pairs = (self.sag, result.sag), (self.wobble_hz, result.wobble_hz), (self.settle_s, result.settle_s)
         return max(abs(value / target - 1) for target, value in pairs if target is not None)
 
@@ -254,7 +256,7 @@ class _Search:
             self.young = self.body.weight / self.weight_ratio
 
     def _check(self) -> None:
-        """Check the constants. Raises: OptionError for impractical ones, with the nearest possible target."""
+        """Raise an OptionError with the nearest possible target if the constants are impractical."""
         body, omega = self.body, self.body.omega(self.young)
         hz = sqrt(max(omega**2 - self.rate**2, 0.0)) / (2 * pi)
         periods = hz * DECAY_FACTOR / self.rate

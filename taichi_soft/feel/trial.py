@@ -16,32 +16,37 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 AMPLITUDE = 1e-3
-"""Amplitude of a measured vibration over the body's size: small, but far above the rounding of positions."""
+"""Amplitude of a measured vibration, relative to the body's size. It is small, but far above the rounding
+errors of positions."""
 
 SAMPLES = 12
-"""Samples per period: few enough to separate the frequency from rounding, many enough to resolve the wave."""
+"""Number of samples per period. With more samples, rounding errors change the frequency; with fewer, the
+samples do not resolve the wave."""
 
 PERIODS = 6
 """Number of measured periods."""
 
 SETTLED_CHANGE = 2e-3
-"""Relative change of the sag over a period below which a damped body counts as standing."""
+"""A damped body counts as standing if its sag changes by at most this fraction within a period."""
 
 MAX_PERIODS = 60
-"""Longest time until a damped body counts as standing, in periods."""
+"""Number of periods after which a damped body counts as standing in any case."""
 
 
 class Standing(NamedTuple):
-    """Sag of a standing body: lowering of its highest point under its own weight, over its height."""
+    """Sag and lean of a standing body.
 
-    static_sag: float  # at rest, with drag
-    free_sag: float  # after the drag is removed, as in a game
+    The sag is the lowering of the highest point under the body's own weight, relative to the height.
+    """
+
+    static_sag: float  # sag at rest, with drag
+    free_sag: float  # sag after the drag is removed, as in a game
     lean: float  # rotation from the pose of the mesh [rad]
-    inverted: int  # number of inverted tetrahedra; all if the body froze
+    inverted: int  # number of inverted tetrahedra; all tetrahedra if the body froze
 
 
 class Trial:
-    """World with one body, to which each material is assigned in turn."""
+    """World with a single body, in which materials are tested one after another."""
 
     def __init__(self, asset: SoftBodyAsset) -> None:
         """Build the world. Raises: StateError, see `World.build`."""
@@ -59,7 +64,7 @@ class Trial:
         """Put the body on the floor in the pose of its mesh, with drag until it rests; then remove the drag.
 
         Args:
-            period: period of its slowest vibration [s].
+            period: period of the body's slowest vibration [s].
             seconds: time without drag [s].
         """
         body = self._prepare(material, gravity_scale, 2 * np.pi / period)
@@ -78,8 +83,8 @@ class Trial:
     def ring_down(self, material: Material, mode: Floats, period: float) -> tuple[float, float]:
         """Let the body vibrate in a mode, without contact and gravity.
 
-        Each sample of a damped wave is a linear combination of the two samples before it. The coefficients
-        give frequency and decay (Prony 1795), and are fitted by least squares over all samples.
+        Each sample of a damped wave is a linear combination of the two previous samples. The two coefficients
+        are fitted by least squares over all samples, and give frequency and decay (Prony 1795).
         Args:
             mode: (n, 3), with a largest entry of 1.
             period: approximate period of the mode [s].
@@ -113,7 +118,7 @@ class Trial:
         return positions
 
     def _sag_over(self, period: float) -> float:
-        """Step for a period [s]. Returns: mean lowering of the highest point, over the height."""
+        """Step for a period [s]. Returns: mean lowering of the highest point, relative to the height."""
         count = max(SAMPLES, int(np.ceil(60.0 * period)))  # no step is longer than a game's frame
         highest = []
         for _ in range(count):

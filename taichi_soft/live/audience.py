@@ -1,6 +1,6 @@
 """Visitors of a live world.
 
-Each one receives messages, and frames at the rate that its browser can display.
+Each visitor receives messages, and frames at the rate that the visitor's browser can display.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.meshing.surfaces import Up
 
 UNSEEN = 2
-"""Largest number of frames in flight to a visitor. Further frames are skipped until the browser shows one."""
+"""Largest number of frames that were sent to a visitor but are not shown yet. Further frames are skipped."""
 
 MOST_MESSAGES = 20
 """Largest number of messages queued for a visitor; older messages are dropped."""
@@ -33,7 +33,7 @@ _log = logging.getLogger("taichi_soft")
 
 
 class Shown(Protocol):
-    """Interface of the worlds that visitors need."""
+    """The attributes of `Worlds` that visitors need."""
 
     panes: dict[int, Runner]
     coming: dict[int, Runner]
@@ -49,13 +49,14 @@ class Visitor:
     allowance: Allowance = field(default_factory=Allowance)
     sent: int = 0  # number of frames sent
     seen: int = 0  # number of the last frame that the page has shown
-    last: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # by pane: runner, version, number
+    # Last frame sent, by pane: id of the runner, version of the meshes, number of the frame.
+    last: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)  # queued messages
     upload: tuple[str, Up | None] | None = None  # name and upward axis of the next file
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
     def put(self, **message: str) -> None:
-        """Queue a message."""
+        """Queue a message for the page, as JSON. If the queue is full, drop the oldest message."""
         self.messages.append(json.dumps(message))
         del self.messages[:-MOST_MESSAGES]
         self.wake.set()
@@ -63,7 +64,7 @@ class Visitor:
 
 @dataclass
 class _Activity:
-    """A long task that the page shows, such as compiling."""
+    """A long task that pages show, such as compiling. The fields are those of `Audience.show_activity`."""
 
     title: str
     step: str
@@ -82,7 +83,7 @@ class Audience:
         self._status_version = 0
 
     def say(self, words: str) -> None:
-        """Queue a message to all visitors."""
+        """Queue a message for each visitor, and log the message."""
         _log.info("live: %s", words)
         for visitor in self.visitors.values():
             visitor.put(said=words)
@@ -112,12 +113,12 @@ class Audience:
         self._change_status()
 
     def end_activity(self, key: str) -> None:
-        """End a task if it exists."""
+        """Stop showing the task with this key, if there is one."""
         if self._activities.pop(key, None) is not None:
             self._change_status()
 
     def set_trouble(self, words: str | None) -> None:
-        """Show the reason why there is no world; None if there is a world, or one is being prepared."""
+        """Show the reason why there is no world. None means that a world is shown or being prepared."""
         if words != self.trouble:
             self.trouble = words
             self._change_status()
@@ -127,7 +128,7 @@ class Audience:
         self.wake()
 
     def status(self) -> dict[str, Any]:
-        """Return the running tasks, and the reason why there is no world."""
+        """Return the running tasks, and the reason why there is no world, as plain types for JSON."""
         now = time.monotonic()
         rows = [
             {
@@ -142,7 +143,7 @@ class Audience:
         return {"activities": rows, "trouble": self.trouble}
 
     async def speak(self, visitor: Visitor, worlds: Shown) -> None:
-        """Send updates to a visitor until it leaves. Visitors do not wait for each other."""
+        """Send updates to a visitor until the visitor leaves. Visitors do not wait for each other."""
         states: dict[int, Any] = {}
         panes: list[int] = []
         version = -1
@@ -174,7 +175,7 @@ class Audience:
                     await self._send_frame(visitor, pane, runner, len(worlds.panes))
 
     async def _send_frame(self, visitor: Visitor, pane: int, runner: Runner, panes: int) -> None:
-        """Send the newest frame, unless too many earlier frames are still in flight."""
+        """Send the newest frame of a pane, unless too many earlier frames are not shown yet."""
         if runner.drawn is None or visitor.sent - visitor.seen >= UNSEEN * panes:
             return
         version, number, packet = runner.newest_packet(pane)
@@ -185,7 +186,7 @@ class Audience:
         if visitor.last.get(pane, (0, 0, 0))[:2] != identity:
             await visitor.connection.send(drawn_packet(pane, header, arrays))
         pull = runner.pulls.pop(visitor.number, None)
-        if pull is not None:  # the page measures the latency with it
+        if pull is not None:  # the page needs this number to measure the latency
             await visitor.connection.send(json.dumps({"pull": pull}))
         visitor.last[pane] = *identity, number
         visitor.sent += 1

@@ -35,14 +35,14 @@ def choices(
     has_palette: bool = False,
     meshes: Sequence[str | Path] = (),
 ) -> Iterator[None]:
-    """Return a context in which all new worlds give their bodies another law; None keeps the scene's law.
+    """Return a context in which new worlds use other settings for all bodies. None keeps the scene's setting.
 
     A script saved by `taichi-soft live` begins with this context.
     Args:
         law, strain, flips: settings of all bodies, see `SoftBodyAsset`. A new law also replaces the scene's
-            strain and flips, because it may not support them.
-        has_palette: True if `World.build` reserves capacity for bodies that visitors add, see `PALETTES`.
-        meshes: files of surfaces that visitors can also add.
+            strain and flips, which the new law may not support.
+        has_palette: True to let `World.build` reserve capacity for bodies that visitors add, see `PALETTES`.
+        meshes: surface files. Visitors can add bodies of these shapes too.
     """
     kept = {name: getattr(World, name) for name in ("add_body", "reserve", "spawn", "build")}
     changed: dict[int, tuple[SoftBodyAsset, SoftBodyAsset]] = {}

@@ -26,7 +26,7 @@ class Slider:
         low, high: the range.
         is_log: True for a logarithmic scale.
         is_whole: True for integers.
-        told: short text on the cost or the stability of a change.
+        told: short note for visitors on the cost or the stability of a change.
     """
 
     name: str
@@ -74,17 +74,17 @@ class Given:
     preset: str | None = None
 
     def with_preset(self, name: str | None) -> Given:
-        """Return these values with the material of a preset; None for the scene's materials."""
+        """Return a copy with the material values of a preset; for None, without material values."""
         others = {name: value for name, value in self.values.items() if name not in MATERIAL}
         return Given({**others, **PRESET_SLIDERS.get(name or "", {})}, name)
 
     def at_reset(self) -> Given:
-        """Return the values after a reset: those of the preset, or none."""
+        """Return the values after a reset: only the values of the preset, if one is chosen."""
         return Given().with_preset(self.preset)
 
 
 def checked_value(name: Any, value: Any) -> float:
-    """Return the value of a slider after checking it.
+    """Check the value of a slider. Returns: the value, rounded if the slider has integers.
 
     Raises: OptionError for an unknown slider or a value out of range.
     """
@@ -120,7 +120,7 @@ class Controls:
     def stable_substeps(self) -> int:
         """Number of substeps that the chosen materials need, predicted from the wave speed in each asset.
 
-        A new estimate for each body would pause the world whenever a slider moves.
+        Estimating each body again instead would pause the world whenever a slider moves.
         """
         has_stable_step = context_of_world(self.world).substeps.has_stable_step
         if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):
@@ -130,7 +130,7 @@ class Controls:
         return math.ceil(max(*counts, 1.0, self.dt / SOFT_CONTACT_STEP if soft else 1.0) - 1e-9)
 
     def _factor(self, asset: SoftBodyAsset) -> float:
-        """Return the asset's wave speed over its initial wave speed."""
+        """Return the wave speed in an asset with the chosen material, divided by its initial wave speed."""
         material = asset.material
         if not isinstance(material, Material):
             return 1.0
@@ -140,8 +140,9 @@ class Controls:
 
     @property
     def substeps(self) -> int:
-        """Substeps per step: the visitor's value, or the larger of the scene's value and the stable
-        number.
+        """Number of substeps per step.
+
+        It is the visitor's value if there is one, else the larger of the scene's value and `stable_substeps`.
         """
         if "substeps" in self.given:
             return int(self.given["substeps"])
@@ -150,7 +151,7 @@ class Controls:
         return self.stable_substeps
 
     def values(self) -> dict[str, float | None]:
-        """Return the value of each slider; None if no body has the property."""
+        """Return the values of all sliders by name. A value is None if no body has the property."""
         settings, first = self.world.settings, self._first
         own: dict[str, float | None] = {
             "young": None if first is None else _number(first.young),
@@ -180,11 +181,11 @@ class Controls:
         self._apply(changed)
 
     def record(self, sliders: Given) -> None:
-        """Store the values of a restored world, which already has them."""
+        """Store slider values without applying them, because a restored world already has them."""
         self.given, self.preset = dict(sliders.values), sliders.preset
 
     def _apply(self, names: set[str]) -> None:
-        """Apply the sliders `names` to the world, with one change per property."""
+        """Apply the values of the sliders `names` to the world. Each property is changed only once."""
         if names & set(MATERIAL):
             for body in self.world.bodies:
                 self._give_material(body)
@@ -202,9 +203,7 @@ class Controls:
             _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
-        """Apply the material sliders to a body, except to bodies made only of springs, which have no
-        material.
-        """
+        """Apply the material sliders to a body. Skip a body of springs only, which has no material."""
         material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}
@@ -229,10 +228,10 @@ def _set_friction(body: Body, value: float) -> None:
 
 
 def _number(constant: Any) -> float:
-    """Reduce a material constant to one number: the largest value."""
+    """Return a material constant as one number: the largest value if it varies inside the body."""
     return float(constant if isinstance(constant, (int, float)) else constant.max())
 
 
 def _wave_factor(poisson: float) -> float:
-    """Return the P-wave modulus over Young's modulus."""
+    """Return the P-wave modulus divided by Young's modulus."""
     return (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson))

@@ -15,7 +15,7 @@ from taichi_soft.live.saving import FILM_FPS, film_file, packed
 from taichi_soft.live.scene import SceneSource
 
 MOST_FILES = 8
-"""Largest number of stored files; the oldest files are dropped."""
+"""Largest number of stored files. Further files replace the oldest ones."""
 
 
 class Downloads:
@@ -53,7 +53,11 @@ class Downloads:
         self._offer(visitor, "application/zip", "scene.zip", content)
 
     def begin_film(self, frames: str) -> bool:
-        """Record that a world has written the frames of a film. Returns: False if it failed."""
+        """Record that a world has written the frames of a film. Returns: True if there are frames to render.
+
+        Args:
+            frames: path of the file with the frames, empty if writing it failed.
+        """
         self._filming, self._is_drawing = None, bool(frames)
         return self._is_drawing
 

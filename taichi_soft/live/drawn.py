@@ -15,8 +15,8 @@ from taichi_soft.render.props import SLATE, drawn_surface, is_level
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 
 CREASE = 65.0
-"""Largest angle between adjacent triangles that are shaded smooth [degrees]. It is larger than those of an
-icosahedron (42) and of a ring with six sides (60), and smaller than that of a box (90)."""
+"""Largest angle between adjacent triangles that are shaded smooth [degrees]. It is larger than the
+angles of an icosahedron (42) and of a ring with six sides (60), and smaller than the angle of a box (90)."""
 
 
 class Drawn:
@@ -78,7 +78,7 @@ class Drawn:
         return header, arrays
 
     def _colors(self, body: Body, mesh: RenderMesh) -> NDArray[np.float32]:
-        """Return vertex colours, sRGB from 0 to 1. A texture is sampled at the vertices."""
+        """Return vertex colours, (n, 3), sRGB from 0 to 1. A texture is sampled at the vertices."""
         plain = self.scene.color(body.index)
         if not isinstance(mesh, SkinMesh):
             return np.broadcast_to(np.asarray(plain, np.float32), (mesh.vertex_count, 3))

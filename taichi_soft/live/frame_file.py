@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PLACES = 3
-"""Number of buffers: one that is read, one that is written, and the newest."""
+"""Number of buffers: one being read, one being written, and the newest complete one."""
 
 _HEAD = np.dtype([("newest", "<i8"), ("pad", "<i8", 7)])
 _FRAME = np.dtype([("number", "<i8"), ("version", "<i8"), ("time", "<f8"), ("is_tinted", "<i8")])
@@ -23,8 +23,10 @@ the frame."""
 class Frame:
     """Positions of all bodies and colliders at one time.
 
-    For all n render vertices: `positions` (n, 3) [m] and `normals` (n, 3), float32, and `tints` (n,), uint8,
-    indices into a colour scale. For k colliders: `poses` (k, 12), float32, rotation by rows and position [m].
+    Attributes:
+        positions, normals: positions [m] and unit normals of all n render vertices, float32 (n, 3).
+        tints: indices of the vertices into a colour scale, uint8 (n,).
+        poses: rotation by rows and position [m] of each of k colliders, float32 (k, 12).
     """
 
     number: int
@@ -61,18 +63,18 @@ class FrameFile:
 
     @property
     def newest_number(self) -> int:
-        """Number of the newest frame, 0 before the first."""
+        """Number of the newest frame; 0 if there is none yet."""
         return int(self._newest[0])
 
     def begin(self) -> Frame:
-        """Return the arrays of the next frame, to be filled before `publish`."""
+        """Return the arrays of the next frame. Fill them before you call `publish`."""
         number = self.newest_number + 1
         head, frame = self._places[number % PLACES]
         head["number"] = -1  # marks the buffer as incomplete for readers
         return frame
 
     def publish(self, version: int, time: float, *, is_tinted: bool) -> int:
-        """Publish the filled arrays as the newest frame. Returns: its number, from 1."""
+        """Publish the filled arrays as the newest frame. Returns: the number of the frame, counted from 1."""
         number = self.newest_number + 1
         head = self._places[number % PLACES][0]
         head["version"], head["time"], head["is_tinted"] = version, time, is_tinted
@@ -81,7 +83,7 @@ class FrameFile:
         return number
 
     def newest(self) -> Frame | None:
-        """Return a copy of the newest frame; None before the first."""
+        """Return a copy of the newest frame; None if there is none yet or all attempts to read it failed."""
         for _ in range(TRIES):
             number = self.newest_number
             if number == 0:

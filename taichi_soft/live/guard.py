@@ -1,6 +1,6 @@
 """Access control of a live world.
 
-It admits this machine or holders of the token, and no pages of other origins.
+Requests must come from this machine or contain the token. Pages of other origins are refused.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ PUBLIC = (
     *("/quantity.js", "/activities.js"),
     *(f"/three/{name}.js" for name in ("three.module", "three.core", "OrbitControls")),
 )
-"""Files of the page."""
+"""Files of the page that do not need the token."""
 
 MESSAGES, BURST = 240.0, 480.0
-"""Message rate of one visitor [1/s], and its burst. A moving hand sends 60 messages a second."""
+"""Largest message rate of a visitor [1/s], and largest number of messages in a burst. Dragging a body sends
+60 messages per second."""
 
 _HOST = re.compile(
     r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::(?P<port>[0-9]{1,5}))?", re.ASCII
@@ -41,7 +42,7 @@ LARGEST_UPLOAD = 16 * 2**20
 """Largest mesh file of a visitor [bytes]."""
 
 LARGEST_TEXT = 4096
-"""Largest message of any other kind [bytes]."""
+"""Largest text message of a visitor [characters]."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Guard:
     Args:
         host: address to which the server is bound.
         port: port of the server.
-        token: secret in the address that visitors open; None on the loopback address.
+        token: secret in the address that visitors open; None if `host` is a loopback address.
     """
 
     host: str
@@ -60,7 +61,7 @@ class Guard:
 
     @classmethod
     def of(cls, host: str, port: int) -> Guard:
-        """Make a guard. Any address except loopback gets a token."""
+        """Make a guard. It has a token unless `host` is a loopback address."""
         return cls(host, port, None if is_loopback(host) else secrets.token_urlsafe(16))
 
     def address(self) -> str:
@@ -71,14 +72,14 @@ class Guard:
         return f"http://{name}:{self.port}/{query}"
 
     def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
-        """Return the status and the reason of refusing a request, or None to allow it. Scripts of the page
-        need no token.
+        """Return the HTTP status and the reason if a request is refused, or None if it is allowed.
 
         A page of another origin must not connect, even if DNS resolves its name to this machine (DNS
-        rebinding). So `Host` must name this server, and `Origin` must match it.
+        rebinding). Therefore `Host` must name this server, and `Origin` must match `Host`. Files in `PUBLIC`
+        need no token.
         Args:
-            path: path with its query.
-            host, origin: values of these headers.
+            path: path and query of the request.
+            host, origin: values of the headers `Host` and `Origin`, or None.
         """
         place = host_and_port(host)
         if place is None or (self.token is None and not self._is_mine(*place)):
@@ -96,9 +97,10 @@ class Guard:
 
 
 def host_and_port(host: str | None) -> tuple[str, int] | None:
-    """Return the name and port in a `Host` header, port 80 if it has none; None if the header is malformed.
+    """Return the name and the port in a `Host` header, or None if the header is malformed.
 
-    Browsers send a name or an address, and a port. Anything else, such as `user@name`, is malformed.
+    Browsers send a name or an address, and a port unless it is 80. Anything else, such as `user@name`, is
+    malformed.
     """
     found = _HOST.fullmatch(host or "")
     if found is None:

@@ -13,7 +13,7 @@ MOST_CHANGES = 20
 """Largest number of changes that can be undone."""
 
 DRAG = 2.0
-"""Longest interval between values of one slider that count as a single change [s]."""
+"""Longest interval between two values of a slider that still belong to the same change [s]."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Before:
         what: name of the change, as the page shows it.
         sliders: chosen slider values.
         snapshot: complete state; None if only the sliders can be restored.
-        held: grabs that exist in that state.
+        held: grabs that exist in the stored state.
     """
 
     what: str
@@ -34,7 +34,7 @@ class Before:
 
 
 class History:
-    """The last changes, which can be undone."""
+    """States before the last changes, the newest last."""
 
     def __init__(self) -> None:
         self._changes: deque[Before] = deque(maxlen=MOST_CHANGES)
@@ -51,16 +51,14 @@ class History:
         self._drag_at = -math.inf if drag_at is None else drag_at
 
     def goes_on(self, what: str, now: float) -> bool:
-        """True if the change `what` continues the last one, because the same slider is still being
-        dragged.
-        """
+        """True if `what` continues the last change, because the same slider is still being dragged."""
         if self.last != what or now - self._drag_at > DRAG:
             return False
         self._drag_at = now
         return True
 
     def pop(self) -> Before | None:
-        """Remove and return the last change; None if the history is empty."""
+        """Remove and return the state before the last change; None if the history is empty."""
         self._drag_at = -math.inf
         return self._changes.pop() if self._changes else None
 

@@ -1,6 +1,6 @@
 """Queue of requests to a world.
 
-It keeps the newest request of each kind, and limits the time of each visitor.
+The queue keeps the newest request of each kind, and limits the time that each visitor's requests take.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 SERVER = 0
-"""Sender number of the server. Its messages are served first, never merged and never refused."""
+"""Sender number of the server. Messages of the server are served first, and never merged or refused."""
 
 MOST_WAITING = 64
 """Largest number of queued requests of one visitor; further requests are refused."""
@@ -21,22 +21,22 @@ SHARE = 0.25
 """Largest fraction of the world's time that requests of all visitors take together."""
 
 BURST = 2.0
-"""Longest period over which unused time of a visitor accumulates [s], so that short bursts do not wait."""
+"""Longest period over which unused time of a visitor accumulates [s]. Short bursts therefore do not wait."""
 
 LONGEST_WAIT = 1.0
-"""Longest delay of a visitor's next request after an expensive one [s]."""
+"""Longest delay of a visitor's next request after an expensive request [s]."""
 
 Message = tuple[Any, ...]
 
 
 @dataclass
 class _Sender:
-    """Messages of one sender, by kind and segment. A message without a key ends a segment."""
+    """Messages of one sender, by kind and segment. A message without a key begins a new segment."""
 
     waiting: OrderedDict[tuple[Hashable, int], Message] = field(default_factory=OrderedDict)
     segment: int = 0
-    used_until: float = -math.inf  # time up to which its allowed time is used [s]
-    turn: int = 0  # number of the last turn in which it was served
+    used_until: float = -math.inf  # time up to which the sender's allowed time is used [s]
+    turn: int = 0  # number of the last turn in which the sender was served
 
 
 class Inbox:
@@ -61,10 +61,10 @@ class Inbox:
         """Add a message.
 
         Args:
-            key: kind of the message. It replaces a queued message of the same kind, unless a message without
-                a key came between them. None replaces no message.
-            is_kept: accept the message even if the queue is full.
-            is_last: the sender leaves; drop its queued messages.
+            key: kind of the message. The message replaces a queued message of the same kind, unless a message
+                without a key was added between the two. None replaces no message.
+            is_kept: True to accept the message even if the queue is full.
+            is_last: True if the sender leaves, to drop all earlier messages of the sender.
         Returns: False if too many messages of this sender are queued.
         """
         mine = self._senders.setdefault(sender, _Sender())
@@ -80,7 +80,7 @@ class Inbox:
         return True
 
     def take(self, now: float = math.inf) -> tuple[int, Message] | None:
-        """Remove and return the sender and the message to serve next; None if there is none at this time.
+        """Remove the message to serve next. Returns: its sender and the message, or None if nothing is ready.
 
         Args:
             now: current time [s]; by default, time limits are ignored.

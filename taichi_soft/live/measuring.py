@@ -25,11 +25,11 @@ COUNTS = (1, 16, 64)
 """Numbers of spheres in the measured worlds."""
 
 SECONDS = 11.0
-"""Length of a turn [s]. A world reports percentiles of its last 600 steps, which take 10 s; a longer turn
-excludes the steps of the turn before."""
+"""Length of a measurement [s]. A world reports percentiles of its last 600 steps, which take 10 s. In a
+longer measurement, these steps exclude those of the previous measurement."""
 
 TURNS = 5
-"""Number of turns. Each turn measures once without and once with a visitor."""
+"""Number of turns. Each turn consists of a measurement without and a measurement with a visitor."""
 
 PULLS = 40
 """Number of timed moves of a grab."""
@@ -49,15 +49,18 @@ world.build()
 class LiveCost:
     """Cost of the live view of one world.
 
-    Step times are 50th and 99th percentiles without and with a visitor, medians over the turns. `ratios` is
-    the 99th percentile with a visitor over that without, of each turn, ascending.
+    Attributes:
+        alone_ms, visited_ms: 50th and 99th percentile of the step time without and with a visitor, medians
+            over the turns.
+        ratios: for each turn, the 99th percentile with a visitor divided by the 99th percentile without a
+            visitor, ascending.
     """
 
     spheres: int
     triangles: int
     packet: int  # size of a frame [bytes]
     pictures: float  # frames per second
-    latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to its first frame
+    latency_ms: tuple[float, float]  # time until a move is shown, 50th and 95th percentile
     alone_ms: tuple[float, float]
     visited_ms: tuple[float, float]
     ratios: tuple[float, ...]
@@ -170,11 +173,9 @@ class _Reader:
 
 
 async def _latency(reader: _Reader, number: int) -> float:
-    """Return the time from grabbing and lifting a resting body to the first frame in which it has
-    moved [s].
-    """
+    """Grab and lift a resting body. Returns: the time until the first frame in which it is lifted [s]."""
     await reader.say("reset")
-    await reader.listen(0.6 + 0.013 * (number % 7))  # varies the phase between two frames
+    await reader.listen(0.6 + 0.013 * (number % 7))  # moves begin at different times between two frames
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])
     await reader.listen(0.1)
     rest, start = reader.corner[2], time.perf_counter()

@@ -29,7 +29,7 @@ class Meters:
         self._energies_due = 0.0
 
     def begin(self) -> None:
-        """Start recording steps."""
+        """Start recording the steps of a frame."""
         self._begun.clear()
 
     def begin_step(self) -> None:
@@ -43,7 +43,13 @@ class Meters:
         self._simulated += simulated
 
     def values(self, now: float) -> dict[str, Any]:
-        """Return percentiles of step times [ms], simulated time over real time, and energies [J]."""
+        """Return the measured values by name.
+
+        Args:
+            now: current time [s].
+        Returns: 50th and 99th percentile of the step time [ms]; simulated time divided by real time; energies
+            [J] and momentum [N s].
+        """
         if now >= self._energies_due:
             self._energies = self._measured_energies()
             self._energies_due = now + (time.perf_counter() - now) / SHARE

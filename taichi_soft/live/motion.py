@@ -13,8 +13,10 @@ from taichi_soft.live.controls import Controls
 
 @dataclass
 class Motion:
-    """State of all bodies, by slot: asset name if a visitor added the body, else None; positions [m];
-    velocities [m/s].
+    """Motion of all bodies of a world.
+
+    `rows` has for each slot: the name of the asset if a visitor added the body, else None; the positions [m];
+    the velocities [m/s].
     """
 
     rows: dict[int, tuple[str | None, NDArray[Any], NDArray[Any]]] = field(default_factory=dict)
@@ -31,7 +33,7 @@ def motion_of(controls: Controls) -> Motion:
 
 
 def continue_from(controls: Controls, motion: Motion) -> None:
-    """Set all bodies to their state in another world, and spawn and despawn bodies to match it."""
+    """Give all bodies of a world the motion of another world. Bodies are added or removed to match it."""
     world = controls.world
     palette, bodies = palette_of(world), {body.index: body for body in world.bodies}
     for slot, (name, positions, velocities) in motion.rows.items():

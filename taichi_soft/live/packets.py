@@ -16,16 +16,17 @@ from numpy.typing import NDArray
 from taichi_soft.live.frame_file import Frame
 
 DRAWN, PICTURE = 1, 2
-"""Kinds of packets."""
+"""Kinds of packets: meshes, and frames."""
 
 STEPS = 65535
 """Quantisation steps along an edge of the bounding box."""
 
 LARGEST_BOX = np.float32(400.0)
-"""Largest edge of the bounding box [m]; points outside are clamped to it."""
+"""Largest edge of the bounding box [m]. Points outside are clamped to the box."""
 
 _PICTURE = struct.Struct("<BBHIIId3f3f")
-"""Kind, pane, is tinted, number, version, number of vertices, time, lower corner and size of the box."""
+"""Header of a frame: kind, pane, 1 if it has tints, number, version, number of vertices, time, lower corner
+and size of the box."""
 
 
 def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
@@ -48,7 +49,7 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
     if len(positions) == 0:
         return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)
     low, high = positions.min(axis=0), positions.max(axis=0)
-    if float((high - low).max()) > LARGEST_BOX:  # a body flew away; keep the resolution of the others
+    if float((high - low).max()) > LARGEST_BOX:  # a body flew away; keep the resolution of the other bodies
         middle = np.median(positions, axis=0)
         positions = np.clip(positions, middle - LARGEST_BOX / 2, middle + LARGEST_BOX / 2)
         low, high = positions.min(axis=0), positions.max(axis=0)
@@ -57,7 +58,7 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """Return a copy of a frame's packet with the frame number for one visitor."""
+    """Return a copy of a frame's packet in which the frame number counts the frames of one visitor."""
     return packet[:4] + struct.pack("<I", number & 0xFFFFFFFF) + packet[8:]
 
 

@@ -14,7 +14,7 @@ PAGE = Path(__file__).parent / "page"
 
 FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:"
 """Sources that may embed a world in a frame: notebooks on this machine. A browser checks every enclosing
-page; VS Code encloses a vscode-webview: page in a vscode-file: page."""
+page; VS Code shows a vscode-webview: page inside a vscode-file: page."""
 
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
@@ -31,9 +31,9 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 def response(status: HTTPStatus, kind: str, content: bytes, name: str | None = None) -> Response:
-    """Make a response with content of a type.
+    """Make a response with content of the MIME type `kind`.
 
-    If `name` is given, the browser downloads it under this name.
+    With `name`, the browser saves the content as a file of this name.
     """
     headers = Headers()
     headers["Content-Type"] = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind

@@ -21,9 +21,10 @@ Heard = Callable[["Runner", tuple[Any, ...]], None]
 
 
 class Runner:
-    """A world in another process. One thread sends and one receives.
+    """A world in another process, as the server sees it. One thread sends and one thread receives.
 
-    Neither side waits for the other. Requests queue in an `Inbox`; messages of the world are read on arrival.
+    Neither process waits for the other. Requests wait in an `Inbox`; messages of the world are read
+    on arrival.
     """
 
     def __init__(
@@ -34,7 +35,7 @@ class Runner:
         heard: Heard,
         process: BaseProcess | None = None,
     ) -> None:
-        """Connect to a world. `process` is its process, or None if another program runs it."""
+        """Connect to a world. `process` is the process of the world, or None if another program steps it."""
         self.source, self.heard, self._loop = source, heard, loop
         self._connection, self._process = connection, process
         self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
@@ -45,7 +46,7 @@ class Runner:
         self.is_over = False
         self.is_lost = False  # True if the connection is lost
         self.is_asked = False  # True after this world requested the shown world's motion
-        self.is_fresh = False  # True to start in the initial state, not the shown world's
+        self.is_fresh = False  # True to start in the initial state, False to continue the shown world
         self.keeps_sliders = False  # True to ignore the slider values of the shown world
         self._inbox = Inbox()
         self._changed = threading.Condition()
@@ -102,7 +103,7 @@ class Runner:
             self._process.kill()
 
     def end(self) -> None:
-        """Wait until the process has ended. It stores its compiled kernels at exit."""
+        """Wait until the process has ended. The process stores its compiled kernels at exit."""
         self.stop()
         if self._process is None:
             return
@@ -114,7 +115,7 @@ class Runner:
     def newest_packet(self, pane: int) -> tuple[int, int, bytes]:
         """Return the version (0 before the first frame), the number and the packet of the newest frame.
 
-        A frame is packed once for all visitors.
+        Each frame is packed only once, for all visitors.
         """
         number = 0 if self.frames is None else self.frames.newest_number
         if self.frames is not None and number != self._packed[1]:

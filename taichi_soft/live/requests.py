@@ -43,7 +43,10 @@ def parse_request(text: str) -> dict[str, Any]:
 
 
 def merge_key(request: dict[str, Any]) -> Hashable:
-    """Return the kind of a request, by which it replaces a queued request; None if it replaces no request."""
+    """Return the kind of a request, or None.
+
+    A request replaces a queued request of the same kind. A request without a kind replaces none.
+    """
     do = request["do"]
     if do == "set":
         return do, request["name"]
@@ -160,4 +163,4 @@ _CHECKS = {
     "save": _save,
     "upload": _upload,
 }
-"""Argument checks of each request."""
+"""For each request, the function that checks its arguments."""

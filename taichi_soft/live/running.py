@@ -16,10 +16,10 @@ from taichi_soft.live.simulation import Simulation, words_of
 def run(connection: Connection, folder: str, source: SceneSource, given: Given) -> None:
     """Make a scene and step it until the message "stop" arrives. Errors are reported, not raised.
 
-    Incoming messages are `(sender, key, (name, *arguments))`, the arguments of `Simulation.do_NAME`.
-    Outgoing: ("progress", step, kernels), ("ready", state), ("drawn", ...), ("frame", number, pulls),
-    ("state", state), ("said", words), ("refused", visitor, words), ("saved", ...), ("filmed", ...),
-    ("motion", ...), ("failed", words).
+    Incoming messages are `(sender, key, (name, *arguments))`, with the arguments of `Simulation.do_NAME`.
+    Outgoing messages are ("progress", step, kernels), ("ready", state), ("drawn", ...),
+    ("frame", number, pulls), ("state", state), ("said", words), ("refused", visitor, words), ("saved", ...),
+    ("filmed", ...), ("motion", ...), ("failed", words).
     """
     from taichi_soft import init
 

@@ -33,9 +33,7 @@ if __name__ == "__main__":
 
 
 def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int) -> str:
-    """Return a script that restores the current world from a snapshot in the same folder, and steps it for 1
-    s.
-    """
+    """Return a script that restores the world from a snapshot in the same folder, and makes 60 steps."""
     title = f'"""The scene {source.title!r}, saved by `taichi-soft live`."""\n\n'
     script = source.script(is_alone=True)
     act = "\n        if act is not None:\n            act(world)" if source.kind == "demo" else ""
@@ -43,7 +41,7 @@ def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int)
 
 
 def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
-    """Pack the script, its snapshot and the files that it names. Returns: a .zip file."""
+    """Pack the script, its snapshot and the files that the script names. Returns: content of a .zip file."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("scene.py", script)
@@ -62,18 +60,23 @@ KEPT = 10.0
 """Length of a film [s]."""
 
 MOST_KEPT = 2**28
-"""Largest size of the frames stored for a film [bytes]. With many vertices the film is shorter."""
+"""Largest size of the frames stored for a film [bytes]. Films of many vertices are shorter."""
 
 
 class Recent:
-    """Frames of the last seconds, for a film."""
+    """Frames of the last `KEPT` seconds, for a film."""
 
     def __init__(self) -> None:
         self._rows: deque[tuple[float, int, Any]] = deque()
         self._due = 0.0
 
     def add(self, now: float, moment: float, drawn: Drawn, frame: Frame) -> None:
-        """Store a frame of world time `moment` [s], unless the last stored frame is too recent."""
+        """Store a frame, unless the last stored frame is too recent.
+
+        Args:
+            now: current time [s].
+            moment: world time of the frame [s].
+        """
         if now < self._due:
             return
         if self._rows and moment < self._rows[-1][0]:
@@ -89,17 +92,17 @@ class Recent:
         self._rows.clear()
 
     def rows(self) -> list[tuple[float, int, Any]]:
-        """Return the frames in order: world time [s], version of the meshes, and positions and poses."""
+        """Return the frames in order, each with world time [s], version of the meshes, (positions, poses)."""
         return list(self._rows)
 
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn) -> None:
-    """Write the input of `film_file`: meshes, and the frames that belong to their current version."""
+    """Write the input of `film_file`: the current meshes, and the recent frames of these meshes."""
     header, arrays = drawn.described()
     own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]
     if not own:
         raise StateError("nothing has moved yet, so there is no film: let the world run first")
-    # Each film frame shows the last stored frame before its time.
+    # Each frame of the film shows the last frame that was stored before its time.
     moments = np.array([moment for moment, _ in own])
     shown = np.arange(moments[0], moments[-1] + 1e-9, 1.0 / FILM_FPS)
     frames = [own[i][1] for i in np.searchsorted(moments, shown + 1e-9, side="right") - 1]

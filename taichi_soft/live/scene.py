@@ -1,4 +1,4 @@
-"""The source of a live world: a script. A saved scene contains the script that ran."""
+"""Sources of live worlds. Every source is run as a script, which a saved scene contains."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class SceneSource:
     Args:
         kind: "playground" for bodies on a floor, "demo" or "script".
         name: name of the demo, or path of the script.
-        law, strain, flips: settings of all bodies; None keeps those of the scene.
+        law, strain, flips: settings of all bodies; None keeps the scene's setting.
         meshes: paths of surfaces that visitors uploaded.
     """
 
@@ -80,7 +80,7 @@ class SceneSource:
         """Return the script that makes `world`.
 
         Args:
-            is_alone: True if the files that the script names are in the folder `files` next to it.
+            is_alone: True if the files that the script names are in the folder `files` next to the script.
         """
         files = ", ".join(self._place(each, is_alone) for each in self.meshes)
         options = [
@@ -97,7 +97,7 @@ class SceneSource:
 
     @staticmethod
     def _place(path: str, is_alone: bool) -> str:
-        """Return the expression for a file's path in the script."""
+        """Return the Python expression for the path of a file in the script."""
         return f'Path(__file__).parent / "files" / {Path(path).name!r}' if is_alone else repr(path)
 
 
@@ -120,7 +120,7 @@ class Scene:
 def made_scene(source: SceneSource) -> Scene:
     """Run a scene's script and return the scene.
 
-    Raises: every error of the script; OptionError if it makes no world or several worlds.
+    Raises: any error of the script; OptionError if the script makes no world or several worlds.
     """
     path = source.folder / "taichi_soft_live_scene.py"
     names: dict[str, Any] = {"__name__": "taichi_soft_live_scene", "__file__": str(path)}
@@ -164,9 +164,9 @@ def adapter_of(scene: Scene, substeps: int, before: Callable[[World], object]) -
 
 
 def found_source(text: str | None) -> SceneSource:
-    """Parse the argument of the command line: None for the playground, a demo, a script, or a mesh.
+    """Return the source that an argument of the command line names. None is the playground.
 
-    Raises: OptionError for any other text.
+    Raises: OptionError if the text names no demo, script or mesh.
     """
     from taichi_soft.render.demos import demo_names
 

@@ -39,13 +39,13 @@ from taichi_soft.live.worlds import Worlds
 from taichi_soft.meshing.surfaces import Up, assumed_up
 
 MOST_MESHES = 8
-"""Largest number of meshes that visitors can add, because a world reserves capacity for bodies of each."""
+"""Largest number of meshes that visitors can add. A world reserves capacity for bodies of each mesh."""
 
 BETWEEN_CHOICES = 1.0
 """Shortest time between two choices of a law [s], because each choice starts a process."""
 
 VIEWED = ("grab", "move", "release", "tint")
-"""Requests that work in a world that another program steps."""
+"""Requests that are accepted if another program steps the world."""
 
 
 class LiveServer:
@@ -82,7 +82,7 @@ class LiveServer:
         self._listening: Listening | None = None
 
     async def open(self) -> str:
-        """Start to serve, and return the address to open. Raises: OSError if the port is in use."""
+        """Start to serve. Returns: the address that visitors open. Raises: OSError if the port is in use."""
         self._listening = await serve(
             self._visit,
             self.host,
@@ -194,7 +194,7 @@ class LiveServer:
             visitor.put(refused=str(error))
 
     def obey(self, visitor: Visitor, request: dict[str, Any]) -> None:
-        """Execute a visitor's request. Raises: OptionError if it is refused."""
+        """Execute a visitor's request. Raises: OptionError if the request is refused."""
         do, runner = request["do"], self.worlds.panes.get(request["pane"])
         if do == "seen":
             visitor.seen = max(visitor.seen, min(request["number"], visitor.sent))

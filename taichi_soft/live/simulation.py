@@ -44,7 +44,7 @@ ANSWERING = 0.008
 
 
 def words_of(error: BaseException) -> str:
-    """Return the message of an error, preceded by its type unless it is a TaichiSoftError."""
+    """Return the message of an error. The type of the error precedes it, except for a TaichiSoftError."""
     text = str(error) or type(error).__name__
     return text if isinstance(error, TaichiSoftError) else f"{type(error).__name__}: {text}"
 
@@ -58,7 +58,7 @@ class Simulation:
         self.controls = Controls(self.world, scene.step.dt, scene.step.substeps)
         self.adapter: EngineAdapter = adapter_of(scene, self.controls.substeps, self._before_step)
         self.first = b""  # snapshot of the initial state
-        self.is_playing, self.is_moving = False, True  # starts to play when the server shows it
+        self.is_playing, self.is_moving = False, True  # the server starts a world when it is shown
         self.hands: dict[int, Grab] = {}
         self.inbox, self.history = Inbox(), History()
         self.tints: Tints | None = None
@@ -69,7 +69,8 @@ class Simulation:
         self.frames: FrameFile
         self._due = {"frame": 0.0, "told": 0.0, "tints": 0.0}
         self._steps_seen = 0
-        self._pulls: dict[int, tuple[int, int]] = {}  # move not yet shown, by visitor: number, step
+        # Moves that no frame shows yet, by visitor: number of the move, and step count at that time.
+        self._pulls: dict[int, tuple[int, int]] = {}
         self._alpha: float | None = None  # interpolation if another program steps the world
 
     def start(self, given: Given) -> None:
@@ -128,13 +129,13 @@ class Simulation:
         return True
 
     def _obey(self, sender: int, message: tuple[Any, ...]) -> None:
-        """Execute a request. A request that fails is refused and changes nothing."""
+        """Execute a request. If it fails, report the reason to the sender."""
         name, *arguments = message
         try:
             getattr(self, f"do_{name}")(*arguments)
         except Exception as error:
             self._refuse(sender, words_of(error))
-        if self.drawn.is_outdated:  # the visitor is charged for the time
+        if self.drawn.is_outdated:  # done here, so that the visitor is charged for the time
             self.describe()
         self.is_moving = True
 
@@ -163,7 +164,7 @@ class Simulation:
         self.meters.begin_step()
 
     def _advance(self, seconds: float) -> None:
-        """Advance the world by a time [s]. If a step fails, the world stops and reports the reason."""
+        """Advance the world by a time [s]. If a step fails, pause the world and report the reason."""
         before = self.world.step_count
         self.meters.begin()
         with warnings.catch_warnings(record=True) as caught:
@@ -174,16 +175,16 @@ class Simulation:
                 self.is_playing = False
                 self.connection.send(("said", f"stopped: {words_of(error)}"))
         self.meters.end((self.world.step_count - before) * self.adapter.fixed_step.dt)
-        self.is_moving = True  # also between two steps, by interpolation
+        self.is_moving = True  # bodies also move between two steps, by interpolation
         for each in caught:
-            # The page itself warns of instability, from the materials of existing bodies only.
+            # The page itself warns of instability, and only for the materials of existing bodies.
             if not issubclass(each.category, UnstableStepWarning):
                 self.connection.send(("said", str(each.message)))
 
     # Requests of visitors
 
     def do_set(self, name: str, value: float) -> None:
-        """Set a slider."""
+        """Set a slider to a value, and apply it to the world."""
         before = self.controls.substeps
         with self._undoable(SLIDERS[name].label, is_slider=True):
             self.controls.set_value(name, value)
@@ -219,7 +220,7 @@ class Simulation:
         self._renew_adapter()
 
     def do_settle(self, is_first: bool) -> None:
-        """Clear the history. If `is_first`, later resets restore the current state."""
+        """Clear the history. If `is_first` and no slider is set, later resets restore the current state."""
         self.history.clear()
         if is_first and not self.controls.given:
             self.first = self.world.snapshot()
@@ -239,9 +240,10 @@ class Simulation:
         self._due["told"] = 0.0
 
     def do_reset(self) -> None:
-        """Restore the initial state, and set all sliders to the scene's values or the preset's.
+        """Restore the initial state, and set all sliders to the scene's values or to the chosen preset.
 
-        The server restarts scenes with their own code, because a snapshot does not contain its state.
+        The server restarts scenes with their own code, because a snapshot does not contain the state
+        of that code.
         """
         with self._undoable("Reset"):
             self.do_release_all()
@@ -313,11 +315,11 @@ class Simulation:
             self.tints.renew(self.world)
 
     def do_motion(self) -> None:
-        """Send the motion of all bodies to the server, for a world with another law."""
+        """Send the motion of all bodies to the server, which passes it to the next world."""
         self.connection.send(("motion", motion_of(self.controls)))
 
     def do_take_motion(self, motion: Motion) -> None:
-        """Continue from the motion of another world."""
+        """Give all bodies the motion of another world."""
         continue_from(self.controls, motion)
 
     def do_save(self, number: int) -> None:
@@ -328,7 +330,7 @@ class Simulation:
         self.connection.send(("saved", number, text, snapshot))
 
     def do_film(self, number: int) -> None:
-        """Write the frames of the last seconds to a file for a film; `number` is the visitor."""
+        """Write the frames of the last seconds to a file, for a film; `number` is the visitor."""
         path = self.folder / f"film{number}.npz"
         try:
             film_frames(path, self.recent.rows(), self.drawn)
@@ -364,7 +366,7 @@ class Simulation:
         self.is_moving = False
 
     def describe(self) -> None:
-        """Update the meshes and send them."""
+        """Make the meshes again after bodies changed, and send them to the server."""
         self.versions += 1
         self.drawn = Drawn(self.scene, self.versions)
         path = self.folder / f"frames{self.versions}"

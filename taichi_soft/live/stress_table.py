@@ -30,9 +30,9 @@ class StressRow:
 
 @dataclass(frozen=True)
 class StressTable:
-    """Result of `stress_table`. Notebooks show a table, and a histogram of volume over stress below it."""
+    """Result of `stress_table`. Notebooks show a table and below it a histogram of the volume over stress."""
 
-    rows: tuple[StressRow, ...]  # one per body
+    rows: tuple[StressRow, ...]  # stress of each body
     edges: NDArray[np.float64]  # edges of the bars [Pa], (BARS + 1,)
     volumes: NDArray[np.float64]  # volume of material in each bar [m^3], (BARS,)
 

@@ -31,7 +31,7 @@ FILES = (
 def fetch_three_js(folder: Path = FOLDER) -> None:
     """Fetch the files into a folder, unless they exist.
 
-    Raises: OSError if the registry cannot be reached or sends another file.
+    Raises: OSError if the registry cannot be reached or sends another archive.
     """
     if all((folder / Path(name).name).is_file() for name in FILES):
         return

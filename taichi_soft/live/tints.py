@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity to show: name, unit, and a function of a body that returns the values at its vertices."""
+    """A quantity to show: name, unit, and function that returns the values at a body's vertices, (n,)."""
 
     name: str
     unit: str
@@ -49,7 +49,7 @@ QUANTITIES = {
 
 
 class Tints:
-    """Values of a quantity at all vertices, scaled to 0 to 255, and the scale."""
+    """Values of a quantity at the vertices of all bodies, as integers from 0 to 255, with their scale."""
 
     def __init__(self, quantity: str) -> None:
         self.quantity = QUANTITIES[quantity]
@@ -57,7 +57,7 @@ class Tints:
         self.rows = np.zeros(0, np.uint8)
 
     def renew(self, world: World) -> None:
-        """Update the values. The scale is adjusted if it is much too large or too small for them."""
+        """Update the values. Adjust the scale if it is too small, or far too large, for the values."""
         found = [self._values(body) for body in world.bodies]
         values = np.concatenate(found) if found else np.zeros(0)
         if self.quantity.name != "flips" and len(values):
@@ -79,7 +79,7 @@ class Tints:
 
 
 def _round_up(value: float) -> float:
-    """Round up to the next of 1, 2, 5, 10, ..."""
+    """Round up to 1, 2 or 5 times a power of ten. Returns: 0 if `value` is not positive."""
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** math.floor(math.log10(value))

@@ -36,8 +36,8 @@ def require_mesh(
         taken: names in use; a number is appended to a name that is taken.
         up: axis that points up in the file. If it is not the default of the format, the file is stored as
             .glb.
-    Raises: OptionError for a file that is too large or of another format; MeshError for one that cannot be
-        made into a body.
+    Raises: OptionError for a file that is too large or of another format; MeshError for a file that
+        cannot be made into a body.
     """
     suffix = Path(name).suffix.lower()
     if suffix not in KINDS:
@@ -68,9 +68,9 @@ def require_mesh(
 
 
 def _look_at(path: str, up: Up | None, connection: Connection) -> None:
-    """Make a body from a file. If its upward axis is not the default of the format, write it as .glb.
+    """Make a body from a file. If `up` is not the default axis of the format, write the file as .glb.
 
-    Sends an empty string on success, else the reason of the failure.
+    Send an empty string if this succeeds, else the reason of the failure.
     """
     from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.live.choices import VISITOR

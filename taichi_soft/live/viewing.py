@@ -44,7 +44,7 @@ class View:
             command = [sys.executable, "-m", "taichi_soft.live.serving", place]
             path = os.pathsep.join(each for each in sys.path if each)
             environment = {**os.environ, VIEW_KEY: key.hex(), "PYTHONPATH": path}
-            # In a separate process group, interrupting a notebook's cell does not end the server.
+            # A separate process group: interrupting a cell of a notebook must not end the server.
             group: dict[str, Any] = {"start_new_session": True}
             if sys.platform == "win32":
                 group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -67,7 +67,7 @@ class View:
     def update(self, alpha: float = 1.0) -> None:
         """Show the current state and apply visitors' grabs. Call this once per frame, between steps.
 
-        At most 60 frames per second are sent, at any rate of calls.
+        At most 60 frames per second are sent, even if you call this more often.
         Args:
             alpha: interpolation between the previous step (0) and the last one (1).
         Raises: StateError after `close`.

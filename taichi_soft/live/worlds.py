@@ -28,13 +28,13 @@ OnFile = Callable[[Runner, tuple[Any, ...]], None]
 
 
 class Worlds:
-    """The shown world, or two side by side, and the worlds that will replace them.
+    """One or two shown worlds, side by side, and the worlds that will replace them.
 
     Args:
         source: source of the first world.
         folder: folder for files that processes share.
         audience: visitors that receive status messages.
-        on_file: called with the messages "saved" and "filmed".
+        on_file: called with a world and its message "saved" or "filmed".
         is_attached: True if another program steps the world.
     """
 
@@ -58,11 +58,11 @@ class Worlds:
     def begin(
         self, pane: int, source: SceneSource, *, is_fresh: bool = False, given: Given | None = None
     ) -> None:
-        """Prepare a world for a pane. The shown world continues until the new one is ready.
+        """Prepare a world for a pane. The shown world continues until the new world is ready.
 
         Args:
             is_fresh: True to start in the initial state instead of the shown world's state.
-            given: slider values; None takes those of the shown world.
+            given: slider values; None uses the slider values of the shown world.
         """
         if pane in self.coming:
             self.coming.pop(pane).kill()
@@ -82,7 +82,7 @@ class Worlds:
         return Given() if state is None else Given(dict(state["given"]), state["preset"])
 
     def source(self, pane: int) -> SceneSource:
-        """Return the source of a pane's world; that of the new world if one is being prepared."""
+        """Return the source of a pane's world, or of the new world that is being prepared for the pane."""
         for runners in (self.coming, self.panes):
             if pane in runners:
                 return runners[pane].source
@@ -105,7 +105,8 @@ class Worlds:
     def reset(self, sender: int = SERVER) -> None:
         """Reset all worlds.
 
-        Scenes with their own code are restarted, because a snapshot lacks the code's state.
+        Scenes with their own code are restarted, because a snapshot does not contain the state
+        of that code.
         """
         for pane, runner in list(self.panes.items()):
             if self.restarts(pane):
@@ -119,7 +120,7 @@ class Worlds:
         return runner is not None and bool((runner.state or {}).get("restarts"))
 
     def leave(self, visitor: int) -> None:
-        """Release a visitor's grab, and drop its waiting requests."""
+        """Release the grab of a visitor who has left, and drop the visitor's waiting requests."""
         for runner in self.panes.values():
             runner.send("leave", visitor, sender=visitor)
 
@@ -166,7 +167,7 @@ class Worlds:
         self._audience.show_activity(f"world {pane}", described(runner.source), step, kernels, about)
 
     def _switch(self, pane: int, runner: Runner) -> None:
-        """Show a world that is ready. It continues the motion of the world that it replaces."""
+        """Show a world that is ready. The world continues the motion of the world that it replaces."""
         before = self.panes.get(pane)
         goes_on = before is not None and not before.is_lost and not runner.is_fresh
         if before is not None and goes_on and before.send("motion"):
@@ -201,12 +202,15 @@ class Worlds:
         self._audience.wake()
 
     def _settle(self, first: Runner | None = None) -> None:
-        """Clear the histories of all worlds, so that an undo affects both in the same way."""
+        """Clear the histories of all worlds, so that an undo affects all worlds in the same way.
+
+        Later resets of the world `first` restore its current state.
+        """
         for runner in self.panes.values():
             runner.send("settle", runner is first)
 
     def _fail(self, pane: int, runner: Runner, words: str) -> None:
-        """Drop a world that failed during preparation; restart one that failed while it was shown."""
+        """Drop a world that failed during preparation. Restart a world that failed while it was shown."""
         runner.stop()
         runner.is_lost = True
         if self.coming.get(pane) is runner:
@@ -218,7 +222,7 @@ class Worlds:
                 self._audience.set_trouble(words)
                 _log.warning("live: %s", words)
             return
-        if pane in self.coming:  # the coming world replaces the failed one
+        if pane in self.coming:  # the coming world replaces the failed world
             if self.coming[pane].is_asked:
                 self._show(pane, self.coming[pane])
             return

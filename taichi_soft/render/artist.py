@@ -21,11 +21,13 @@ _RECENT = 25
 """Number of recent frames whose median step time is displayed."""
 
 LABEL_DISTANCE = 1.2
-"""Distance from the centre of a body to its label, in half widths of the body at rest."""
+"""Distance from the centre of a body to its label, in units of half the width of the body at rest."""
 
 
 def speed_of(times: Sequence[float], fps: float) -> str:
-    """Format the median speed of the last frames. The median ignores single outliers.
+    """Return the simulation speed as text, such as "1.5 x real time", or "" before the second frame.
+
+    The speed is the median of the last frames, which ignores single outliers.
 
     Args:
         times: step time of each frame [s]. The first frame makes no step and is ignored.
@@ -45,7 +47,7 @@ class Artist:
         size: width and height [pixels].
         rate: frames per second of world time.
         slow: slow-motion factor of the film.
-        stats: also show the world's time and the speed of the last steps.
+        stats: True to also show the world's time and the speed of the last steps.
 
     Attributes:
         times: drawing time of each frame [s].
@@ -61,7 +63,8 @@ class Artist:
         self.times: list[float] = []
         self._spent = 0.0
         self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces by actor and topology version
-        self._textures: dict[int, tuple[Any, Texture]] = {}  # by id; storing the image keeps its id unique
+        # Images and their textures by the id of the image. Storing the image keeps its id unique.
+        self._textures: dict[int, tuple[Any, Texture]] = {}
 
     def draw(self) -> NDArray[np.uint8]:
         """Draw the current state of the take without text. Returns: sRGB, uint8 (height, width, 3)."""
@@ -85,9 +88,9 @@ class Artist:
         return picture
 
     def finish(self, pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-        """Average the subframes of a frame, draw the text on the result, and return it.
+        """Average the subframes of a frame and draw the text. Returns: sRGB, uint8 (height, width, 3).
 
-        A single subframe is changed in place.
+        If there is only one subframe, it is changed in place.
         """
         start = time.perf_counter()
         picture = mean_picture(pictures)
@@ -113,7 +116,7 @@ class Artist:
     def _surfaces_of(self, actor: Actor) -> list[Surface]:
         """Return the surfaces of an actor's skins, or of its body if it has no skin.
 
-        A cut makes new surfaces.
+        After a cut, the surfaces are made again.
         """
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:
@@ -122,7 +125,7 @@ class Artist:
         return self._surfaces[key]
 
     def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
-        """Make the surface of a skin, with the colours and the texture of its mesh if it has them."""
+        """Make the surface of a skin, with the colours and the texture of the mesh if there are any."""
         picture, texture = texture_picture(mesh.visual, mesh.vertex_count), None
         if picture is not None:
             if id(picture) not in self._textures:

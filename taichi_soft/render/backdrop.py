@@ -28,7 +28,7 @@ class BackdropColors:
     """Colours of a backdrop, in linear light.
 
     Args:
-        horizon, zenith: ends of the sky's gradient.
+        horizon, zenith: colours of the sky at the horizon and overhead, with a gradient between them.
         bright, dark: colours of the floor's checks; equal colours make a plain floor.
     """
 

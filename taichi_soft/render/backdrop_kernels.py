@@ -17,7 +17,7 @@ def smoothstep(low, high, x):
 
 @ti.func
 def pixel_ray(rays: ti.template(), u, v):
-    """Return the direction through a pixel [m per m of depth], not of unit length.
+    """Return the direction from the eye through the image point (u, v), scaled to a depth of 1.
 
     `rays` is (3, 3) and maps (u, v, 1) to the direction.
     """
@@ -26,7 +26,10 @@ def pixel_ray(rays: ti.template(), u, v):
 
 @ti.func
 def check_average(x, width):
-    """Return the mean over `width` about x of a square wave: +1 on [0, 1), -1 on [1, 2), period 2."""
+    """Average a square wave over an interval of length `width` centred at x.
+
+    The wave is +1 on [0, 1) and -1 on [1, 2), with period 2.
+    """
     low, high = (x - 0.5 * width) * 0.5, (x + 0.5 * width) * 0.5
     low_wave = ti.abs(low - ti.floor(low) - 0.5)
     high_wave = ti.abs(high - ti.floor(high) - 0.5)
@@ -35,8 +38,8 @@ def check_average(x, width):
 
 @ti.func
 def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
-    """Store linear light as sRGB; `encode` is the result of `tone.encode_table`."""
-    # Ordered dithering below one step of brightness prevents banding in smooth gradients.
+    """Store linear light as sRGB in `out`. `encode` is the result of `tone.encode_table`."""
+    # Ordered dithering by less than one step of brightness prevents banding in smooth gradients.
     grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
     for k in ti.static(range(3)):
         root = ti.sqrt(ti.math.clamp(color[k] / WHITE, 0.0, 1.0))
@@ -70,13 +73,13 @@ def paint_backdrop(
         check: edge of a check [m].
         fade: distance at which the floor has faded into the sky [m].
         horizon, zenith, bright, dark: see `BackdropColors`.
-        out: (height, width, 4), linear light and the weight of the floor in it.
-        plain: (height, width, 3), the same light as sRGB.
+        out: (height, width, 4), linear light, and the weight of the floor in the mix of floor and sky.
+        plain: (height, width, 3), the light of `out` as sRGB.
     """
     for y, x in ti.ndrange(out.shape[0], out.shape[1]):
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
-        # The sky is brightest at the horizon, and equally bright below it, where the floor has faded.
+        # The sky is brightest at the horizon and keeps this brightness below it, where the floor fades out.
         color = horizon + (zenith - horizon) * smoothstep(-0.05, 0.65, ti.sqrt(ti.max(up, 0.0)))
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)

@@ -18,22 +18,22 @@ Point = tuple[float, float, float]
 NEAREST = 1e-3
 # Largest elevation of a camera that frames a box [degrees].
 STEEP = 89.0
-# Sine of the smallest angle between the line of sight and `up` that defines an upright image.
+# Sine of the smallest allowed angle between the line of sight and `up`.
 STEEPEST = 1e-4
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera at `eye` that looks at `target`; world z is up, lengths in metres.
+    """Perspective camera at `eye` that looks at `target`. The z axis of the world points up.
 
     Args:
         eye: position of the camera [m].
         target: point at the centre of the image [m].
-        up: direction that is upright in the image, of any length.
-        fov_degrees: field of view across the shorter side of the image, 1 to 150. A view that fits a square
-            therefore fits every aspect ratio.
-    Raises: OptionError for numbers that are not finite, eye on target, `up` along the line of sight or an
-        angle out of range.
+        up: direction that points up in the image, of any length.
+        fov_degrees: field of view across the shorter side of the image, 1 to 150. An object that
+            fits in a square image therefore fits in every image.
+    Raises: OptionError for numbers that are not finite, an eye at the target, `up` along the line of sight
+        or an angle out of range.
     """
 
     eye: Point
@@ -74,11 +74,12 @@ class Camera:
 
         Args:
             lower, upper: opposite corners of the box [m].
-            azimuth: direction from the box to the eye in the ground plane, from the x axis to y [degrees].
+            azimuth: direction from the box to the eye in the ground plane, measured from the x axis towards
+                the y axis [degrees].
             elevation: angle of the eye above the horizon, -89 to 89 [degrees].
             fov_degrees: see `Camera`.
             margin: size of the view relative to the box, 1 to 10.
-            aspect: width over height of the image; with 1 the box fits images of any aspect.
+            aspect: width over height of the image; with 1, the box fits in images of any aspect.
         Raises: OptionError for a box without extent or numbers out of range.
         """
         low, high = np.array(as_point(lower, "lower")), np.array(as_point(upper, "upper"))
@@ -89,14 +90,15 @@ class Camera:
         half = math.tan(math.radians(as_number(fov_degrees, "fov_degrees", 1.0, 150.0)) / 2.0)
         half /= as_number(margin, "margin", 1.0, 10.0)
         ratio = as_number(aspect, "aspect", 0.05, 20.0)
-        # Tangents of half the view, right and down; the field of view belongs to the shorter side.
+        # Tangents of half the angle of view, horizontal and vertical. `fov_degrees` is the angle across the
+        # shorter side.
         reach = half * np.array([max(ratio, 1.0), max(1.0 / ratio, 1.0)])
         outward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
         target = (low + high) / 2.0
         probe = cls(tuple(target + outward), tuple(target), fov_degrees=fov_degrees)
         corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
         seen = (corners - target) @ probe.axes.T
-        # A corner at depth d + z is visible if |x| and |y| are at most reach * (d + z).
+        # From distance d, a corner (x, y, z) is visible if |x| and |y| are at most reach * (d + z).
         distance = float(((np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2]).max())
         return cls(tuple(target + distance * outward), tuple(target), fov_degrees=fov_degrees)
 
@@ -109,7 +111,7 @@ class Camera:
             lower, upper: opposite corners of the box [m].
             margin: size of the view relative to the box, 1 to 10.
             aspect: width over height of the image.
-        Raises: as `framing`.
+        Raises: the errors of `framing`.
 
         A camera that looks straight up or down is tilted slightly.
         """
@@ -126,7 +128,7 @@ class Camera:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """Unit vectors right, down and forward of the image, as rows, (3, 3)."""
+        """Unit vectors that point right, down and forward in the image, as rows (3, 3)."""
         forward = (np.array(self.target) - self.eye) / self.distance
         right = np.cross(forward, self.up)
         right /= np.linalg.norm(right)
@@ -140,8 +142,8 @@ class Camera:
     def matrix(self, width: int, height: int) -> NDArray[np.float64]:
         """Return the matrix (3, 4) that maps (x, y, z, 1) to (u d, v d, d).
 
-        u is the pixel to the right, v the pixel down, and d the depth [m]. The first pixel covers u and v
-        from 0 to 1.
+        u is measured from the left and v from the top of the image [pixels]; d is the depth [m]. The first
+        pixel covers u and v from 0 to 1.
         Args:
             width, height: size of the image [pixels].
         """

@@ -18,7 +18,7 @@ BoxOf = Callable[[Body], NDArray[np.float64]]
 """Function that returns the bounding box of a body as it is drawn, (2, 3) [m]."""
 
 LOOSE = 0.35
-"""Largest distance of a followed body from the image's centre [half of the shorter side]."""
+"""Largest distance of a followed body from the image's centre. 1 is half of the shorter side."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Orbit:
 
     Args:
         view: the camera at world time 0.
-        period: world time of one turn [s], counterclockwise seen from above; negative turns clockwise.
+        period: world time of one turn [s], counterclockwise seen from above; negative for clockwise.
     Raises: OptionError for a period that is 0 or not finite.
     """
 
@@ -58,12 +58,12 @@ class Orbit:
 class Follow:
     """A camera that follows a body and keeps its direction.
 
-    It follows smoothly, but the centre of the body stays within about a third of the distance from the
-    image's centre to its nearer edge. Times must ascend.
+    The movement is smoothed, but the centre of the body stays within about a third of the distance from the
+    image's centre to the nearer edge. The smoothing assumes that the times passed to `at` ascend.
 
     Args:
-        body: body to follow; an actor of the stage.
-        view: camera that gives direction, distance and angle. Its target is ignored.
+        body: body to follow. It must be an actor of the stage.
+        view: camera whose direction, distance and field of view are used. Its target is ignored.
         lag: time constant of the smoothing [s of world time], 0 to 10.
     Raises: OptionError for numbers out of range.
     """
@@ -78,7 +78,7 @@ class Follow:
         self._target = np.zeros(3)
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Return the camera at a time. A time before that of the last call restarts the smoothing.
+        """Return the camera at a time. If the time is earlier than in the last call, the smoothing restarts.
 
         Args:
             time: world time [s].

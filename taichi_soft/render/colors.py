@@ -24,7 +24,8 @@ PALETTE: tuple[Color, ...] = (
     (0.32, 0.62, 0.85),  # sky
     (0.66, 0.50, 0.38),  # clay
 )
-"""Body colours, sRGB from 0 to 1, of different hue and similar lightness; cycle through them."""
+"""Body colours, sRGB from 0 to 1, with different hues and similar lightness. After the last
+colour, begin again with the first."""
 
 RAMP: tuple[Color, ...] = (
     (0.30, 0.52, 0.80),
@@ -36,10 +37,11 @@ RAMP: tuple[Color, ...] = (
 """Colours of a `ColorScale` at equal steps, sRGB from 0 to 1."""
 
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0))
-"""Prefixes of units, largest first. A prefix is used for values from ten of its units on."""
+"""Prefixes of SI units and their factors, largest first. A prefix is used for values of at least ten times
+its factor."""
 
 FLIPPED: Color = (0.93, 0.10, 0.42)
-"""Colour of inverted tetrahedra, sRGB from 0 to 1, which `PALETTE` does not contain."""
+"""Colour of inverted tetrahedra, sRGB from 0 to 1. `PALETTE` does not contain it."""
 
 
 def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
@@ -60,7 +62,7 @@ def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
 
 
 def _places(values: ArrayLike, low: float, high: float) -> NDArray[np.float64]:
-    """Scale numbers from [low, high] to [0, 1]. Raises: as `colormap`."""
+    """Scale numbers from [low, high] to [0, 1], (n,). Raises: the errors of `colormap`."""
     numbers = as_array(values, "values", (None,))
     start, end = as_number(low, "low", -1e300, 1e300), as_number(high, "high", -1e300, 1e300)
     if not start < end:
@@ -70,12 +72,12 @@ def _places(values: ArrayLike, low: float, high: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class ColorScale:
-    """A colour scale of a quantity, and the labels of its bar.
+    """Colour scale of a quantity, with the labels of its bar.
 
     Args:
         quantity: name of the quantity, plain ASCII.
         low, high: the range, low < high, in `unit`.
-        unit: SI unit without a prefix, such as "Pa". The bar chooses the prefix.
+        unit: SI unit without a prefix, such as "Pa". The labels add a prefix.
     Raises: OptionError for an empty range or text that is not ASCII.
     """
 
@@ -92,7 +94,9 @@ class ColorScale:
         self.colors([self.low])
 
     def colors(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Map numbers to colours from blue (`low`) over yellow to red (`high`), bright enough for shading.
+        """Map numbers to colours from blue (`low`) over yellow to red (`high`).
+
+        All colours are bright enough for shaded surfaces.
 
         Args:
             values: (n,), one per vertex; values out of range are clamped.
@@ -104,7 +108,7 @@ class ColorScale:
         return np.stack(channels, axis=1).astype(np.float32)
 
     def ticks(self) -> tuple[str, str]:
-        """Return the labels of both ends, the upper one with its unit: ("0", "200 kPa")."""
+        """Return the labels of the lower and the upper end of the bar, for example ("0", "200 kPa")."""
         largest = max(abs(self.low), abs(self.high))
         prefix, factor = next(each for each in PREFIXES if largest >= 10 * each[1] or each is PREFIXES[-1])
         return f"{self.low / factor:.4g}", f"{self.high / factor:.4g} {prefix}{self.unit}"

@@ -19,13 +19,13 @@ Frame = NDArray[np.uint8]
 Found = tuple[int, set[tuple[int, int]]]
 """Number of frames, and the set of their sizes (width, height)."""
 
-# Colour tags that players read; the first filter converts the frames to match them.
+# Colour tags for players. The filter converts the frames to the colours that the tags declare.
 COLORS = (
     *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"),
     *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
 )
 CODECS = {
-    # The index comes first, so that browsers start playing before the download ends.
+    # The index is at the start of the file, so that browsers start playing before the download ends.
     ".mp4": ("-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-movflags", "+faststart"),
     ".webm": (
         *("-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"),
@@ -36,7 +36,7 @@ LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
 # With one palette per film and ordered dithering, pixels that do not move stay equal: later frames compress
 # well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers slow down the next one, 100
+GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers play the next possible rate, 100, too slowly
 
 
 @contextlib.contextmanager
@@ -68,7 +68,7 @@ class Container(ABC):
 
     @abstractmethod
     def finish(self) -> None:
-        """Complete the file. Raises: VideoError if that is impossible."""
+        """Complete the file. Raises: VideoError if the file cannot be completed."""
 
     @abstractmethod
     def measure(self) -> Found:
@@ -159,7 +159,7 @@ class Pictures(Container):
 
 
 def _frames_of(fps: float, size: tuple[int, int]) -> list[str]:
-    """Return the ffmpeg arguments that describe the raw frames in its pipe."""
+    """Return the ffmpeg arguments that describe the raw frames in the input pipe of ffmpeg."""
     rate = Fraction(fps).limit_denominator(100_000)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
     return [*raw, "-r", f"{rate.numerator}/{rate.denominator}", "-i", "pipe:0"]

@@ -11,7 +11,7 @@ from taichi_soft.core.package_data import DEMOS
 
 
 def demo_names() -> list[str]:
-    """List the demos that define a stage. Demos without a stage are separate programs."""
+    """List the names of the demos that define a stage. Demos without a stage are separate programs."""
     stages = (path for path in DEMOS.glob("[a-z]*.py") if "\ndef stage(" in path.read_text(encoding="utf-8"))
     return sorted(path.stem for path in stages)
 

@@ -13,29 +13,32 @@ from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
-# Larger coordinates [m] result from an explosion, and their products overflow in float32.
+# Limit of coordinates [m]. Larger values result from an explosion, and their products overflow in float32.
 FARTHEST = 1e7
 
 
 class Surface:
-    """Triangles over the vertices of a body. Set `positions`, and `color` if it changes, before each frame.
+    """Surface to draw: triangles over the vertices of a body.
+
+    Before each frame, set `positions`, and also `color` if it changes.
 
     Args:
-        positions: positions of all vertices of the body, including inner ones, (n, 3) [m]. Edges between
-            triangles that meet at more than 60 degrees here stay sharp; all others are shaded smooth.
+        positions: positions of all vertices of the body, including inner vertices, (n, 3) [m]. An edge
+            stays sharp if its triangles meet at more than 60 degrees in these positions. Other edges are
+            shaded smooth.
         triangles: vertex indices, (m, 3), counterclockwise seen from outside. Only a cloth is drawn from both
             sides. Shadows assume a closed surface.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
-        normals: unit normals for shading, (n, 3), instead of computed ones; set them with the positions
-            before each frame.
+        normals: unit normals for shading, (n, 3); None computes normals from the triangles. If you pass
+            normals, set them with the positions before each frame.
         texture: texture, multiplied by `color`; use white to leave it unchanged.
         uv: (n, 2), texture coordinates of the vertices: (0, 0) at the lower left, (1, 1) at the upper right;
             the texture repeats.
-        look: "matte", "jelly" or "cloth".
-            If a cloth has each triangle twice, once per side, the first one is its front.
+        look: "matte", "jelly" or "cloth". If a cloth has each triangle twice, once per side, the first of the
+            two is the front.
     Raises: OptionError for wrong shapes, an unknown look, a texture without `uv` or the reverse, positions
-        that are not finite (as after an explosion) or colours out of range; MeshError
-        for indices out of range.
+        that are not finite (as after an explosion) or colours out of range; MeshError for indices out of
+        range.
     """
 
     def __init__(
@@ -63,12 +66,13 @@ class Surface:
         if self.look is Look.CLOTH:
             corners, codes = _both_sides(corners)
         self.looks = codes
-        # Only vertices on the surface are projected and lit; one on a sharp edge is duplicated per side.
+        # Only vertices on the surface are projected and lit. A vertex on a sharp edge is stored once per
+        # side.
         if normals is None:
             self._used, self.triangles = split_at_creases(first, corners, DEFAULT_CREASE)
         else:
             self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
-            if self.look is Look.CLOTH:  # its back has separate vertices with opposite normals
+            if self.look is Look.CLOTH:  # the back has separate vertices with opposite normals
                 self._used = np.tile(self._used, 2)
                 self.triangles[codes == CLOTH_BACK] += self.vertex_count
         self.positions = first
@@ -89,7 +93,7 @@ class Surface:
     def of(
         cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0], look: Look | LookName = Look.MATTE
     ) -> Surface:
-        """Make the surface of a mesh, at rest until its `positions` are set.
+        """Make the surface of a mesh. The surface has its rest shape until you set `positions`.
 
         Args:
             mesh: a `TetMesh`, or a `ParticleMesh` with triangles.
@@ -105,9 +109,10 @@ class Surface:
 
     @property
     def positions(self) -> NDArray[np.float32]:
-        """Positions of the vertices on the surface, float32 (k, 3) [m], once per side of a sharp edge.
+        """Positions of the vertices on the surface, float32 (k, 3) [m].
 
-        Assign the positions of all n vertices of the body, (n, 3).
+        A vertex on a sharp edge occurs once per side. Assign the positions of all n vertices of the body,
+        (n, 3).
         """
         return self._positions
 
@@ -157,7 +162,7 @@ class Surface:
 def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
     """Return the front and then the back triangles of a sheet, and their look codes.
 
-    If a sheet contains a triangle twice, once per side, it is used once.
+    If the sheet contains a triangle twice, once per side, only the first of the two is used.
     """
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     front = triangles[np.sort(first)]

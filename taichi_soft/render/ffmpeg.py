@@ -20,9 +20,9 @@ QUIET = ("-hide_banner", "-nostdin", "-nostats", "-v", "error", "-y")
 
 
 def find_ffmpeg() -> str:
-    """Return the path of ffmpeg: $IMAGEIO_FFMPEG_EXE, or that in the package imageio-ffmpeg.
+    """Return the path of ffmpeg: $IMAGEIO_FFMPEG_EXE, or the program in the package imageio-ffmpeg.
 
-    Raises: MissingExtraError without that package; VideoError if it has no ffmpeg for this system.
+    Raises: MissingExtraError without this package; VideoError if the package has no ffmpeg for this system.
     """
     require_extra("film", "a .mp4, .webm or .gif film needs", "imageio_ffmpeg")
     from imageio_ffmpeg import get_ffmpeg_exe  # type: ignore[import-untyped, import-not-found]
@@ -39,13 +39,16 @@ def find_ffmpeg() -> str:
 class Ffmpeg:
     """A running ffmpeg that receives frames.
 
-    It reads frames from a pipe. The pipe closes when this process ends for any reason, and then ffmpeg ends
-    too. Ctrl-C in a terminal does not reach ffmpeg; this process handles it. ffmpeg inherits the priority of
+    ffmpeg reads the frames from a pipe. When this process ends for any reason, the pipe closes and ffmpeg
+    ends too. Ctrl-C in a terminal interrupts this process, but not ffmpeg. ffmpeg inherits the priority of
     this process.
     """
 
     def __init__(self, arguments: Sequence[str | Path]) -> None:
-        """Start ffmpeg with the options `QUIET`, then `arguments`. Raises: as `find_ffmpeg`; VideoError."""
+        """Start ffmpeg with the options `QUIET` and `arguments`.
+
+        Raises: VideoError if ffmpeg does not start, and the errors of `find_ffmpeg`.
+        """
         options: dict[str, Any] = {"start_new_session": True}
         if sys.platform == "win32":
             options = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.CREATE_NO_WINDOW}
@@ -85,7 +88,7 @@ class Ffmpeg:
     def kill(self) -> None:
         """Kill ffmpeg if it is running."""
         self._process.kill()
-        with contextlib.suppress(OSError):  # unread frames are lost
+        with contextlib.suppress(OSError):  # ffmpeg has not read all frames
             self._process.communicate()
         self._complaints.close()
 
@@ -98,16 +101,16 @@ class Ffmpeg:
 
 
 def run_ffmpeg(arguments: Sequence[str | Path]) -> None:
-    """Run ffmpeg with these arguments until it ends. Raises: as `Ffmpeg`."""
+    """Run ffmpeg with these arguments until it ends. Raises: VideoError, and the errors of `find_ffmpeg`."""
     Ffmpeg(arguments).finish()
 
 
 def count_frames(path: Path, list_file: Path) -> tuple[int, set[tuple[int, int]]]:
-    """Count the frames of a film that can be decoded, and list their sizes (width, height).
+    """Count the decodable frames of a film, and collect their sizes (width, height).
 
     Args:
         list_file: path for ffmpeg's list of frames, one line each.
-    Raises: as `Ffmpeg`; VideoError for a file that is not a film.
+    Raises: VideoError for a file that is not a film, and the errors of `find_ffmpeg`.
     """
     run_ffmpeg(["-i", path, "-map", "0:v:0", "-fps_mode", "passthrough", "-f", "framecrc", list_file])
     lines = list_file.read_text().splitlines()

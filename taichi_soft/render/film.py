@@ -30,9 +30,9 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class FilmReport:
-    """Figures of a film. Step times exclude drawing, writing and compiling.
+    """Measurements of a film. Step times exclude drawing, writing and compiling.
 
-    Kernels that only `Stage.act` calls compile at their first call, which counts as step time.
+    The compile time of kernels that only `Stage.act` calls counts as step time.
     """
 
     path: Path | None  # path of the film; None if nothing was written
@@ -45,13 +45,13 @@ class FilmReport:
 
     @property
     def real_time_factor(self) -> float:
-        """Simulated time over the time spent on steps; 0 with too few frames."""
+        """Simulated time divided by the time spent on steps; 0 if the film has only one frame."""
         if len(self.step_times) == 0:
             return 0.0
         return float(len(self.step_times) / (self.fps * self.slow) / self.step_times.sum())
 
     def _repr_html_(self) -> str:
-        """Return HTML for notebooks: the film and its figures."""
+        """Return HTML for notebooks: the film and a table of its measurements."""
         figures = {
             "film": f"{self.frames} frames, {self.frames / self.fps:.1f} s",
             "simulated": f"{self.simulated:.2f} s",
@@ -84,20 +84,21 @@ def film(
         path: path of the film, see `VideoWriter`; None draws and writes nothing.
         fps: frames per second.
         size: width and height [pixels].
-        seconds: world time to film [s]; None takes the stage's default.
+        seconds: world time to film [s]; None uses the stage's default.
         slow: slow-motion factor, 1 to 1000. The world makes the same steps; frames between two steps are
             interpolated linearly.
-        blur: subframes averaged while the shutter is open, 1 to 64; 1 turns motion blur off.
-        stats: also show the world's time [s] and the speed of this machine in each frame.
+        blur: number of subframes to average in each frame, 1 to 64; 1 turns motion blur off.
+        stats: True to also show the world's time [s] and the speed of this machine in each frame.
         on_frame: called with (frames made, total frames) after each frame.
-    Raises: VideoError or OptionError. Wrong arguments are refused before the world moves.
+    Raises: VideoError or OptionError. The arguments are checked before the world moves.
     """
     if not isinstance(stage, Stage):
         raise OptionError(f"stage must be a Stage, got {type(stage).__name__}")
     if not (on_frame is None or callable(on_frame)):
         raise OptionError(f"on_frame must be a function (frames made, total frames), got {on_frame!r}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
-    rate = as_positive(fps, "fps", "1/s") * as_number(slow, "slow", 1.0, 1000.0)  # per second of world time
+    # Frames per second of world time.
+    rate = as_positive(fps, "fps", "1/s") * as_number(slow, "slow", 1.0, 1000.0)
     shots = as_count(blur, "blur", 1, 64)
     frames = length * rate
     if frames > LARGEST_COUNT:

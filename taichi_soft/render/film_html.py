@@ -11,7 +11,7 @@ MIME_TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
 """MIME types of the film formats that browsers play."""
 
 LARGEST = 10_000_000
-"""Largest size of an embedded film [bytes], because a notebook is saved with its embedded files."""
+"""Largest size of an embedded film [bytes]. The file of the notebook grows by every embedded film."""
 
 
 def film_html(path: Path | None, figures: Mapping[str, str]) -> str:

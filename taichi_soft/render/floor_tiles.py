@@ -1,4 +1,4 @@
-"""Find the tiles of an image that may show a shadow on the floor. All others are copied from the backdrop."""
+"""Find the tiles of an image that can show a shadow on the floor. Others are copied from the backdrop."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from taichi_soft.render.kernel_types import TILE
 
 
 class FloorTiles:
-    """The area of the floor in each tile of an image, computed once per camera.
+    """Area of the floor that is visible in each tile of an image, computed once per camera.
 
     Args:
-        rays: maps (u, v, 1) to the direction through a pixel, (3, 3).
+        rays: matrix (3, 3) that maps (u, v, 1) to the direction through a pixel.
         eye: position of the camera [m].
         floor: height of the floor [m], or None.
     """
@@ -33,7 +33,7 @@ class FloorTiles:
         directions = corners @ rays.T  # (tiles, 4, 3)
         down = directions[..., 2] < -1e-6
         sees_floor = floor is not None and eye[2] > floor
-        # A tile that contains the horizon shows an unbounded area and always counts.
+        # A tile that contains the horizon shows an unbounded area, so it counts as shadowed by every shadow.
         self._unbounded = down.any(axis=1) & ~down.all(axis=1) & sees_floor
         self._bounded = down.all(axis=1) & sees_floor
         drop = (floor or 0.0) - eye[2]
@@ -41,7 +41,7 @@ class FloorTiles:
         self._hits = np.concatenate([hits, np.ones_like(hits[..., :1])], axis=-1)
 
     def shadowed(self, maps: Sequence[tuple[NDArray[np.float32], NDArray[np.bool_]]]) -> NDArray[np.int32]:
-        """Return 1 for tiles that may show a shadow, else 0, int32 (tiles,).
+        """Return 1 for tiles that can show a shadow, else 0, int32 (tiles,).
 
         Args:
             maps: pairs of a matrix (4, 4) from (x, y, z, 1) to texels, and the mask (n, n) of dark texels.
@@ -53,7 +53,7 @@ class FloorTiles:
                 continue
             texels = self._hits @ matrix[:2].T.astype(np.float64)
             low, high = texels.min(axis=1), texels.max(axis=1)
-            # The corners bound the area, because it is convex. Interpolation adds one texel.
+            # The area of a tile is convex, so its corners bound it. Interpolation widens shadows by a texel.
             across = (low[:, 0] <= columns[-1] + 2) & (high[:, 0] >= columns[0] - 1)
             along = (low[:, 1] <= rows[-1] + 2) & (high[:, 1] >= rows[0] - 1)
             touched |= self._unbounded | (self._bounded & across & along)

@@ -19,9 +19,10 @@ class SceneArrays:
     """Vertices and triangles of all surfaces, concatenated.
 
     Attributes:
-        positions, normals, colors: float32 (n, 3): [m], unit vectors, linear light.
+        positions, normals, colors: positions [m], unit normals and colours in linear light of the vertices,
+            each float32 (n, 3).
         triangles: vertex indices, int32 (m, 3), counterclockwise seen from outside.
-        looks: codes of the triangles, int32 (m,), see `look`.
+        looks: look codes of the triangles, int32 (m,), see `look`.
         textures: textures of all surfaces.
     """
 
@@ -39,7 +40,7 @@ class SceneArrays:
 
     @classmethod
     def of(cls, surfaces: Sequence[Surface]) -> SceneArrays:
-        """Collect the surfaces. An empty list gives one degenerate triangle, which is invisible.
+        """Concatenate the arrays of surfaces. An empty list gives one invisible, degenerate triangle.
 
         Raises: OptionError for anything that is not a `Surface`.
         """

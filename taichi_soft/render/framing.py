@@ -1,4 +1,4 @@
-"""Move a stage's camera so that it sees its bodies during the whole run."""
+"""Move the camera of a stage so that it sees all bodies during the whole run."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ def framed(
     seconds: float | None = None,
     orbit: float | None = None,
 ) -> Stage:
-    """Make a stage and move its camera along the line of sight until it sees the bodies at all times.
+    """Make a stage whose camera sees all bodies during the whole run. The direction of view is kept.
 
-    The stage is made twice: the first is run to its end, so its script may have side effects; the second is
+    `make_stage` is called twice. The first stage is run to its end, including its `act`. The second stage is
     returned in its initial state.
     Args:
         make_stage: function that returns the same stage at each call.
         aspect: width over height of the image.
-        seconds: world time to run [s]; None takes the stage's default.
+        seconds: world time to run [s]; None uses the stage's default.
         orbit: period of an orbiting camera [s of world time], see `Orbit`; None for a fixed camera.
-    Raises: OptionError for a stage with a moving camera or numbers out of range, before anything moves; and
-        every error of the stage's steps.
+    Raises: OptionError for a moving camera or numbers out of range, before the run; and the errors of the
+        stage's steps.
     """
     width = as_number(aspect, "aspect", 0.05, 20.0)
     if orbit is not None:
@@ -64,12 +64,12 @@ def framed(
 
 
 def _no_box(body: Body) -> Floats:
-    """Return a placeholder for cameras that do not use the box of a body."""
+    """Fail if a camera asks for the box of a body. An `Orbit` never asks for it."""
     raise AssertionError(body)
 
 
 def _box_of_run(stage: Stage, seconds: float | None) -> tuple[Floats, Floats]:
-    """Run the stage. Returns: the bounding box of its bodies over the whole run [m]."""
+    """Run the stage. Returns: lower and upper corner of the box of its bodies over the whole run [m]."""
     if not isinstance(stage.camera, Camera):
         raise OptionError(f"stage.camera must be a fixed Camera, got {type(stage.camera).__name__}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")

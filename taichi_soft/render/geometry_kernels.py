@@ -11,11 +11,11 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.render.kernel_types import TILE, int_rows, ints, matrix, row_vec3, rows
 
 PLANE = 12
-"""Numbers per triangle: three edges and the depth, each with a, b and c of a u + b v + c."""
+"""Number of coefficients per triangle: a, b and c of a u + b v + c, for three edges and the depth."""
 
 OVERLAP = 0.01
-"""Distance by which each triangle is enlarged [pixels]. It exceeds the rounding of edges, to prevent
-seams."""
+"""Distance by which each triangle is enlarged [pixels]. It exceeds the rounding errors of edges,
+which would leave seams."""
 
 
 @ti.kernel
@@ -58,13 +58,13 @@ def project_triangles(
     """Compute edges, depth and pixel box of each triangle, and count the triangles per tile.
 
     Args:
-        to_picture: maps (x, y, z, 1) to (u d, v d, d, q d); the largest q is visible.
+        to_picture: matrix from (x, y, z, 1) to (u d, v d, d, q d). Points with a larger q are in front.
         near: smallest d to draw.
-        planes: out (m, 12), the edges scaled to add up to one at the image's depth plane.
-        boxes: out (m, 4), first and last pixel right, first and last pixel down. The box is empty if the
+        planes: out (m, 12), coefficients, see `PLANE`. The sum of the edges at (u, v) is 1 / d.
+        boxes: out (m, 4), first and last column, first and last row [pixels]. The box is empty if the
             triangle faces away (its corners run clockwise in an image whose v points down) or is not visible.
-        tile_begin: out, running sum of the triangles in tiles 0 to i - 1, row by row.
-    Returns: the number of entries of all tiles.
+        tile_begin: out, entry i is the number of triangles in tiles 0 to i - 1. Tiles are counted row by row.
+    Returns: the number of triangles summed over all tiles.
     """
     for t in range(triangles.shape[0]):
         corners = ti.Matrix.zero(ti.f32, 3, 4)
@@ -82,7 +82,7 @@ def project_triangles(
         v2 = ti.Vector([corners[2, 0], corners[2, 1], corners[2, 2]])
         normal = (v1 - v0).cross(v2 - v0)
         determinant = normal.dot(v0)
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # converts to an integer without overflow
+        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # these convert to integers without overflow
         for i in range(3):
             j = (i + 1) % 3
             d, e = corners[i, 2], corners[j, 2]

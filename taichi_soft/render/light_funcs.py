@@ -16,12 +16,13 @@ SOFT_TAPS = 8
 """Width of the box filter for shadows on bodies [texels]."""
 
 LIFT = 0.7
-"""Shadow bias [texels]: offset of look-ups along the normal, and again towards the sun."""
+"""Shadow bias [texels]. Look-ups are shifted by this distance along the normal, and by the same distance
+towards the sun."""
 
 
 @ti.func
 def bilinear(map: ti.template(), size, u, v):
-    """Interpolate a (size, size) map at texel coordinates (u, v); it is 0 outside."""
+    """Interpolate a (size, size) map at texel coordinates (u, v). Returns: the value; 0 outside the map."""
     value = 0.0
     x, y = u - 0.5, v - 0.5
     if x > 0.0 and y > 0.0 and x < size - 1.0 and y < size - 1.0:
@@ -35,8 +36,9 @@ def bilinear(map: ti.template(), size, u, v):
 
 @ti.func
 def light_place(light: ti.template(), p):
-    """Return a point's texel coordinates and its height towards the light [m]; `light` has rows u, v,
-    -, q.
+    """Return the texel coordinates of a point in a shadow map, and its height towards the light [m].
+
+    `light` is the matrix of the map, see `shadows.ShadowMaps`.
     """
     row = [
         light[k, 0] * p.x + light[k, 1] * p.y + light[k, 2] * p.z + light[k, 3] for k in ti.static((0, 1, 3))
@@ -46,9 +48,9 @@ def light_place(light: ti.template(), p):
 
 @ti.func
 def box_average(depth: ti.template(), size, left, top, fu, fv, height):
-    """Return the fraction of a box of the shadow map that is not occluded above `height`.
+    """Return the lit fraction of a box of the shadow map. Texels are lit if no occluder is above `height`.
 
-    The box begins at (fu, fv) inside the texel (left, top).
+    The box has `SOFT_TAPS` texels per side and begins at (fu, fv) inside the texel (left, top).
     """
     lit = 0.0
     for j in range(SOFT_TAPS + 1):
@@ -63,8 +65,8 @@ def box_average(depth: ti.template(), size, left, top, fu, fv, height):
 def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
     """Return the fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the map.
 
-    The map holds back faces, so that a body does not shadow its own lit side; `LIFT` handles the rim of that
-    side.
+    The map contains only faces turned away from the sun, so that a body does not shadow its own lit side.
+    `LIFT` prevents false shadows at the rim of the lit side.
     """
     place = light_place(light, p + LIFT * texel * normal)
     u, v, height = place.x - 0.5 * SOFT_TAPS, place.y - 0.5 * SOFT_TAPS, place.z + LIFT * texel
@@ -72,7 +74,7 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
     fu, fv = u - left, v - top
     lit = 1.0
     if left >= 0 and top >= 0 and left + SOFT_TAPS < size and top + SOFT_TAPS < size:
-        # Sample nine texels first. If they agree, the texels between them agree too.
+        # Sample nine texels first. If they agree, assume the same of the texels between them.
         open_texels = 0
         for j in range(3):
             for i in range(3):
@@ -95,7 +97,7 @@ def floor_shadow(
     contact_place: ti.template(),
     contact: ti.template(),
 ):
-    """Return the fraction of light that a point of the floor loses to shadows, per colour."""
+    """Return the fraction of light that a point of the floor loses to shadows, for red, green and blue."""
     lack = ti.Vector([0.0, 0.0, 0.0])
     place = light_place(light, at)
     u, v = place.x / COARSE, place.y / COARSE
@@ -112,13 +114,13 @@ def floor_shadow(
 
 @ti.func
 def fifth_power(x):
-    """Return x^5: Schlick's increase of reflection towards grazing angles."""
+    """Return x^5, the increase of reflection towards grazing angles in Schlick's approximation."""
     return x * x * x * x * x
 
 
 @ti.func
 def mirrored(normal, view, sun, doublings: ti.template()):
-    """Return the specular highlight of the key light, 0 to 1. More doublings make it sharper."""
+    """Return the specular highlight of the key light, 0 to 1. More doublings sharpen the highlight."""
     half = sun + view
     shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
     for _ in ti.static(range(doublings)):
@@ -131,7 +133,7 @@ def surroundings(normal, sun, above):
     """Return the ambient and fill light on a surface of albedo 1.
 
     Args:
-        above: 0 on the floor, 1 well above it, where the underside is lit.
+        above: 0 on the floor, 1 well above the floor, where undersides receive the full light of the floor.
     """
     upward = 0.5 + 0.5 * normal.z
     below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
@@ -160,9 +162,9 @@ def smooth_rise(x):
 
 @ti.func
 def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
-    """Return the light of rubber.
+    """Return the light that rubber sends to the eye.
 
-    The arguments of all three materials are those of `glow` and its intermediate results.
+    The arguments are those of `glow` and intermediate results of `glow`.
     """
     total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
     total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
@@ -171,7 +173,10 @@ def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
 
 @ti.func
 def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
-    """Return the light of jelly: subsurface scattering, and light transmitted from behind."""
+    """Return the light that jelly sends to the eye, including scattered light and light from behind the body.
+
+    The arguments are those of `glow` and intermediate results of `glow`.
+    """
     facing = normal.dot(sun)
     # Thick parts have deeper colours than the rim.
     inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
@@ -190,13 +195,16 @@ def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
 
 @ti.func
 def cloth_glow(look, color, normal, sun, around, key, rim, openness):
-    """Return the light of cloth, which transmits some light from its other side."""
+    """Return the light that cloth sends to the eye, including light transmitted from the other side.
+
+    The arguments are those of `glow` and intermediate results of `glow`.
+    """
     own = color
     if look == CLOTH_BACK:
         own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
     facing = normal.dot(sun)
     straight, tint = facing, own
-    if facing < 0.0:  # transmitted light passes more threads, which colours it more
+    if facing < 0.0:  # transmitted light passes more threads, which tint it more
         straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
     total = tint * (key * straight) + own * dimmed(around, own, openness)
     return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)

@@ -19,8 +19,8 @@ FLOOR_LIGHT = vec3(0.33, 0.295, 0.25)
 # Matte: peak specular reflection of the key, and of the sky at grazing angles.
 HIGHLIGHT = 0.10
 RIM = 0.09
-# Jelly: peak specular reflection as for matte, light that wraps around the edge of the lit side, light that
-# remains in shadow, light transmitted to the far side.
+# Jelly: peak specular reflection of the key, and of the sky at grazing angles; light that wraps around the
+# edge of the lit side; light that remains in shadow; light transmitted to the far side.
 JELLY_HIGHLIGHT = 0.65
 JELLY_RIM = 0.55
 JELLY_WRAP = 0.55
@@ -36,13 +36,13 @@ CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
 HORIZON = vec3(0.93, 0.94, 0.95)  # colour that rims reflect
-POOL = 0.14  # extra brightness of the floor at the camera's target
+POOL = 0.14  # relative extra brightness of the floor at the camera's target
 
 # Direction to the key: over the camera's left shoulder. The fill comes from the right.
 SUN_ELEVATION = np.radians(52.0)
-SUN_AZIMUTH = np.radians(62.0)  # from the direction target to eye; positive is left in the image
+SUN_AZIMUTH = np.radians(62.0)  # angle to the direction from target to eye, positive to the left in the image
 
-# Fraction of light that the floor keeps in full shadow of the key, which is the light of the sky.
+# Fraction of light that remains on the floor in full shadow of the key: the light of the sky.
 SHADED = vec3(0.36, 0.40, 0.47)
-# Fraction of the remaining light that the floor keeps directly under a touching body.
+# Fraction of the light on the floor that is left directly under a touching body.
 CONTACT = 0.35

@@ -1,4 +1,4 @@
-"""Looks of bodies: matte, jelly, cloth."""
+"""Looks of bodies (matte, jelly or cloth) and their codes in kernels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Look(Choice):
 LookName: TypeAlias = Literal["matte", "jelly", "cloth"]
 
 MATTE, JELLY, CLOTH, CLOTH_BACK = range(4)
-"""Look codes in kernels; cloth has one for each side."""
+"""Look codes in kernels. A cloth has one code for each side."""
 
 CODES = {Look.MATTE: MATTE, Look.JELLY: JELLY, Look.CLOTH: CLOTH}
 """Look code of a surface's front, by look."""

@@ -16,7 +16,10 @@ _LIGHT = to_linear(np.arange(256, dtype=np.float32) / 255.0)
 
 
 def shutter_times(pictures: int) -> list[float]:
-    """Return the intervals before each subframe of a frame [frames]. The last subframe ends the frame."""
+    """Return the time to advance before each subframe, in durations of a frame.
+
+    The last subframe is at the end of the frame.
+    """
     if pictures == 1:
         return [1.0]
     return [1.0 - SHUTTER] + [SHUTTER / (pictures - 1)] * (pictures - 1)

@@ -12,18 +12,18 @@ from taichi_soft.render.raster import Raster
 Floats = NDArray[np.float32]
 
 REACH = 0.06
-"""Radius of occlusion [size of the scene]."""
+"""Radius of occlusion, as a fraction of the size of the scene."""
 
 
 class Occlusion:
-    """Ambient occlusion at half resolution; buffers are allocated once.
+    """Ambient occlusion of an image, computed at half its resolution.
 
-    Surfaces that are outside the image or hidden do not occlude.
+    The buffers are allocated once. Surfaces that are outside the image or hidden do not occlude.
 
     Attributes:
         depth: float32 (height / 2, width / 2), 1 / depth of the visible surface [1/m].
-        hidden: float32 of the same shape, occluded fraction of the surroundings, 0 to 1. It is valid only
-            in tiles with triangles.
+        hidden: float32, with the shape of `depth`, occluded fraction of the surroundings, 0 to 1. The values
+            are valid only in tiles with triangles.
     """
 
     def __init__(self, raster: Raster, reach: float) -> None:
@@ -39,9 +39,10 @@ class Occlusion:
         """Compute the occlusion of the image in the raster.
 
         Args:
-            rays: (3, 3), maps (u, v, 1) to the direction through a pixel; `lens` is its inverse.
-            focal: pixels per unit of tangent.
-            backdrop: plane of the floor's 1 / depth over the image.
+            rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
+            lens: inverse of `rays`.
+            focal: focal length [pixels].
+            backdrop: a, b and c of the floor's 1 / depth over the image, a u + b v + c.
         """
         raster = self._raster
         count = len(raster.samples)

@@ -2,8 +2,8 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Kernels for screen-space ambient occlusion, at half the image's width and height.
 
-On a plane in space, q = 1 / depth is linear over the image: a u + b v + c. So q alone gives the height of a
-point above the plane of a triangle.
+On a plane in space, q = 1 / depth is linear over the image: a u + b v + c. Therefore the height of a point
+above the plane of a triangle follows from (u, v) and q of the point.
 """
 
 import numpy as np
@@ -20,18 +20,18 @@ TAPS = 10
 """Number of depth samples around a point."""
 
 TURNS = 4
-"""Edge of a block [points]. Each point of a block rotates its taps by another angle, and the block is then
-averaged."""
+"""Edge of a block [points]. Each point of a block rotates its taps by another angle. The results are
+averaged over the block."""
 
 WIDEST = 64.0
 """Largest distance of a tap from its point [points]."""
 
 BIAS = 0.12
-"""Sine of the angle above a triangle's plane below which nothing occludes, because curved surfaces consist of
-flat triangles."""
+"""Sine of the smallest angle above a triangle's plane at which other surfaces occlude the triangle. Without
+this limit, the flat triangles of a curved surface would occlude each other."""
 
 STRENGTH = 10.0
-"""Strength of the occlusion, which never makes a surface black."""
+"""Factor in exp(-STRENGTH * occlusion), the fraction of the surroundings that stays visible."""
 
 ALIKE = 0.03
 """Relative difference of depth above which two points belong to different surfaces."""
@@ -40,11 +40,11 @@ ALIKE = 0.03
 def spiral_taps() -> NDArray[np.float32]:
     """Return offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
-    Each point of a block has one contiguous spiral of taps, which is denser inside.
+    The `TAPS` offsets of each point of a block are contiguous. They form a spiral that is denser inside.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
-    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # rotates by the golden angle
+    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # in steps of the golden angle
     radius = (k + 0.6) / TAPS
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     return places.reshape(-1, 2).astype(np.float32)
@@ -61,11 +61,13 @@ def gather_depth(
     depth: reals,
     out: rows,
 ):
-    """Store q of the first sample of every second pixel, and q of the floor in tiles without triangles.
+    """Store q = 1 / depth of the first sample of every second pixel.
+
+    In tiles without triangles, store q of the floor.
 
     Args:
-        backdrop: a, b, c of the floor's plane.
-        offset_u, offset_v: position of the first sample, from the centre of the pixel [pixels].
+        backdrop: a, b, c of q on the floor, which is a u + b v + c.
+        offset_u, offset_v: position of the first sample relative to the centre of the pixel [pixels].
         out: (height / 2, width / 2).
     """
     tiles_across = (width + TILE - 1) // TILE
@@ -98,10 +100,11 @@ def hidden_share(
     """Return the occluded fraction of the surroundings of point (i, j) on a triangle.
 
     Args:
-        rays: (3, 3), maps (u, v, 1) to the direction through a pixel; `lens` is its inverse.
-        plane: a, b, c of the triangle's q over the image.
+        rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
+        lens: inverse of `rays`.
+        plane: a, b, c of q = 1 / depth on the triangle, which is a u + b v + c.
         reach: distance beyond which nothing occludes [m].
-        focal: pixels per unit of tangent.
+        focal: focal length [pixels].
     """
     u, v = 2.0 * i + 0.5 + offset_u, 2.0 * j + 0.5 + offset_v
     q = plane.dot(ti.Vector([u, v, 1.0]))
@@ -150,10 +153,10 @@ def find_hidden(
     """Compute `hidden_share` of every second pixel that shows a body, in tiles with triangles.
 
     Args:
-        focal: pixels per unit of tangent.
+        focal: focal length [pixels].
         taps: see `spiral_taps`.
         q_map: result of `gather_depth`.
-        out: (height / 2, width / 2); 0 without a body.
+        out: (height / 2, width / 2); 0 at points without a body.
     """
     tiles_across = (width + TILE - 1) // TILE
     for tile in range(tile_begin.shape[0] - 1):

@@ -17,8 +17,8 @@ from taichi_soft.render.opencv import cv2
 Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 1 / 26  # height of a line of text [shorter side of the image]
-CAPTION = 0.8  # line height of captions [LINE], small because an image can have many
+LINE = 1 / 26  # height of a line of text, relative to the shorter side of the image
+CAPTION = 0.8  # line height of captions, relative to `LINE`; small because an image can have many captions
 SMALLEST_LINE = 13.0  # smallest height of a line [pixels]; smaller letters are illegible
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # space between lines and around the text [line heights]
@@ -56,7 +56,7 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
 def draw_legend(
     picture: Picture, entries: Sequence[tuple[Color, str]], *, corner: Corner | str = Corner.TOP_RIGHT
 ) -> Picture:
-    """Draw lines of text like `draw_text`, each after a swatch of its colour. Returns: the image.
+    """Draw lines of text like `draw_text`, each with a colour swatch in front. Returns: the image.
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
@@ -111,8 +111,8 @@ def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> P
     Args:
         picture: uint8 (height, width, 3).
         labels: n captions of plain ASCII text; a line break starts a second line.
-        places: (n, 2) or more columns, pixel right and down, see `Camera.project`. Captions are moved to stay
-            inside the image; a place that is NaN (behind the camera) gets no caption.
+        places: (n, 2) or more columns, pixels from the left and the top, see `Camera.project`. Captions are
+            moved to stay inside the image; a place that is NaN (behind the camera) gets no caption.
     Raises: OptionError for an invalid image, text or number of places.
     """
     captions = [str(label).split("\n") for label in labels]

@@ -27,7 +27,7 @@ class Prop:
     """A solid object drawn at a collider or a frame, such as a hand or a hook.
 
     Args:
-        surface: vertices and triangles in the axes of `place`, as `surface()` of a shape returns them.
+        surface: vertices and triangles in the frame of `place`, in the form that `Shape.surface` returns.
         place: collider or frame with which the prop moves.
         color: sRGB from 0 to 1.
     """
@@ -40,13 +40,13 @@ class Prop:
 class Scenery:
     """Surfaces of all colliders of a world except its floor, and of further props.
 
-    They are interpolated between the last two steps, like bodies. Call `remember` before each step.
+    The surfaces are interpolated between the last two steps, like bodies. Call `remember` before each step.
     """
 
     def __init__(
         self, world: World, props: Sequence[Prop] = (), colors: Mapping[Collider, Color] | None = None
     ) -> None:
-        """Make the surfaces; `colors` are those of highlighted colliders, sRGB from 0 to 1."""
+        """Make the surfaces. `colors` contains the colours of highlighted colliders, sRGB from 0 to 1."""
         given = colors or {}
         seen = [
             Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)
@@ -61,7 +61,7 @@ class Scenery:
         self._before = [_pose(prop) for prop in self._props]
 
     def at(self, alpha: float) -> list[Surface]:
-        """Return the surfaces, interpolated from their stored (0) to their current pose (1)."""
+        """Return the surfaces between their stored pose (`alpha` 0) and their current pose (`alpha` 1)."""
         for prop, surface, (start, turn) in zip(self._props, self._surfaces, self._before, strict=True):
             end, last_turn = _pose(prop)
             rotation = matrix_of(turned_by(turn, alpha * rotation_vector(turn, last_turn)))

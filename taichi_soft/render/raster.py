@@ -11,8 +11,8 @@ from taichi_soft.render.geometry_kernels import PLANE, project_triangles
 from taichi_soft.render.kernel_types import TILE, matrix
 from taichi_soft.render.raster_kernels import rasterize
 
-# Positions of samples inside a pixel [pixels]. Four samples form a rotated grid: no two have the same row or
-# column, which smooths nearly vertical and horizontal edges best.
+# Positions of samples inside a pixel [pixels]. Four samples form a rotated grid: no two are in the same row
+# or column, which smooths nearly vertical and horizontal edges best.
 CENTER = np.zeros((1, 2), dtype=np.float32)
 ROTATED_GRID = np.array([(-1, -3), (3, -1), (-3, 1), (1, 3)], dtype=np.float32) / 8.0
 
@@ -21,14 +21,16 @@ NOTHING_BEHIND = (0.0, 0.0, -NO_LIMIT)
 
 
 class Raster:
-    """Buffers of one image size, allocated once; the triangle lists grow with the scene.
+    """Finds the visible triangle and the depth of each sample of an image.
+
+    The buffers are allocated once. The lists of triangles grow with the scene.
 
     Attributes:
         depth: float32 (height * width * samples,), q of the visible triangle, see `project_triangles`.
         owner: int32 of the same length, index of the visible triangle or -1.
         planes: float32 (m, 12), edges and depth of the triangles of the last `draw`.
-        tile_begin: int32, running sum of triangles per tile. With `keep_empty_tiles`, `draw` does not clear
-            tiles without triangles.
+        tile_begin: int32 (tiles + 1,), entry i is the number of triangles in tiles 0 to i - 1. After `draw`
+            with `keep_empty_tiles`, `depth` and `owner` are valid only in tiles with triangles.
     """
 
     def __init__(self, width: int, height: int, samples: NDArray[np.float32]) -> None:
@@ -56,7 +58,7 @@ class Raster:
         Args:
             to_picture: (4, 4), see `project_triangles`.
             near: smallest depth drawn [m]; None for an orthographic projection, where every depth is 1.
-            backdrop: plane q = a u + b v + c that hides everything behind it.
+            backdrop: a, b and c of the plane q = a u + b v + c, which hides everything behind it.
             keep_empty_tiles: do not clear tiles without triangles, to save time.
         """
         if len(self.planes) != len(scene.triangles):

@@ -2,8 +2,8 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Find the nearest triangle of every sample of an image.
 
-Tiles are independent, and each processes its triangles in order, so the result is bit-identical for any
-number of threads.
+Tiles are independent, and the triangles of a tile are processed in order, so the result is bit-identical for
+any number of threads.
 """
 
 from taichi_soft.core.runtime import ti
@@ -19,7 +19,7 @@ def row_limits(slope, inv_slope, start, low, high):
 
 @ti.func
 def inverse(slope):
-    """Return 1 / slope; a slope of 0 counts as a tiny positive one."""
+    """Return 1 / slope; a slope of 0 counts as a tiny positive slope."""
     return 1.0 / ti.select(ti.abs(slope) < 1e-20, 1e-20, slope)
 
 
@@ -42,14 +42,15 @@ def rasterize(
     """Find the nearest triangle of each sample.
 
     Args:
-        samples: (s, 2), positions inside a pixel, from its centre [pixels].
+        samples: (s, 2), positions of the samples relative to the centre of a pixel [pixels].
         backdrop: a, b, c of the plane q = a u + b v + c that hides everything behind it.
         nearest: largest q that is drawn.
         clear_all: 1 to clear tiles without triangles too, 0 to skip them.
         tile_next: scratch, one entry per tile.
         tile_triangles: scratch, at least as long as the result of `project_triangles`.
-        depth: out, q of sample s of pixel p = v width + u at p * s_count + s; the largest is the nearest.
-        owner: out, the triangle of each sample, or -1.
+        depth: out, q of the nearest triangle, which has the largest q. Sample s of the pixel in column u and
+            row v has the index (v * width + u) * s_count + s.
+        owner: out, index of the nearest triangle at each sample, or -1.
     """
     tiles_across = (width + TILE - 1) // TILE
     ti.loop_config(serialize=True)
@@ -82,7 +83,7 @@ def rasterize(
             a1, b1, c1 = planes[t, 3], planes[t, 4], planes[t, 5]
             a2, b2, c2 = planes[t, 6], planes[t, 7], planes[t, 8]
             aq, bq, cq = planes[t, 9], planes[t, 10], planes[t, 11]
-            # If the innermost corner of a pixel is outside an edge, all its samples are outside.
+            # If the innermost corner of a pixel is outside an edge, all samples of the pixel are outside.
             m0 = c0 + 0.5 * (ti.abs(a0) + ti.abs(b0) + a0 + b0)
             m1 = c1 + 0.5 * (ti.abs(a1) + ti.abs(b1) + a1 + b1)
             m2 = c2 + 0.5 * (ti.abs(a2) + ti.abs(b2) + a2 + b2)

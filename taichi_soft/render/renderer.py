@@ -191,7 +191,10 @@ class Renderer:
         return picture
 
     def _floor_depth(self) -> tuple[float, float, float]:
-        """Return the plane of the floor's 1 / depth over the image, which hides surfaces below the floor."""
+        """Return a, b and c of the floor's 1 / depth over the image, a u + b v + c.
+
+        The raster hides surfaces behind this plane.
+        """
         if self.floor is None or self.camera.eye[2] <= self.floor:
             return NOTHING_BEHIND
         a, b, c = (float(x) / (self.floor - self.camera.eye[2]) for x in self._rays[2])
@@ -199,6 +202,6 @@ class Renderer:
 
 
 def _round_length(length: float) -> float:
-    """Round a length down to 1, 2 or 5 times a power of ten, and return it."""
+    """Round a length down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length)

@@ -44,8 +44,8 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
         path: file written by `World.save_recording`, by a frozen body or by a page of the gallery.
         picture: path for an image of the final state, .png; None draws nothing.
         steps: largest number of steps; None replays all.
-    Raises: SnapshotError for a damaged file, a file that is not a recording, or one from another version of
-        this package; VideoError if the image cannot be written.
+    Raises: SnapshotError for a damaged file, a file that is not a recording, or a recording from another
+        version of this package; VideoError if the image cannot be written.
     """
     target = None if picture is None else as_path(picture)
     most = math.inf if steps is None else as_count(steps, "steps", 0)
@@ -79,12 +79,12 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
 
 
 def _is_state(world: World, expected: str) -> bool:
-    """True if the state has this hash: that of `World`, or that printed by web pages."""
+    """True if `expected` is the `state_hash` of the world, or the `bodies_hash` that web pages record."""
     return expected in (world.state_hash(), world.bodies_hash())
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
-    """Build a world of the recorded structure. Returns: the world, and its assets and shapes by digest."""
+    """Build a world with the recorded structure. Returns: the world, and its assets and shapes by digest."""
     shapes: dict[str, Any] = {name: from_plain(data) for name, data in made_of["shapes"].items()}
     assets = {name: _asset(options) for name, options in made_of["assets"].items()}
     world = World(**made_of["world"])
@@ -107,7 +107,7 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
-    """Repeat a recorded call. Raises an error for calls that a recorder does not store."""
+    """Repeat a recorded call. Raises: SnapshotError for a call that recorders do not store."""
     handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
     if handle is None or not is_recorded(handle, name):
         raise SnapshotError(f"{name!r} of handle {serial} is not a call that recordings contain")
@@ -127,7 +127,7 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
 
 
 def _step(world: World, seconds: float, substeps: int | None, expected: str, pushes: list[Any]) -> str:
-    """Repeat a step. Returns: the hash of the state, in the form of the recorded hash."""
+    """Repeat a recorded step with its accelerations. Returns: `expected`, the recorded hash of the state."""
     rows = []
     for serial, data in pushes:
         body = handles_of(world).find(serial, Body)

@@ -46,7 +46,7 @@ def interpolate(vertex_rows: ti.template(), triangles: ti.template(), t, weights
 
 @ti.func
 def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.template(), t, u, v):
-    """Return the texture coordinates of the plane of triangle t at (u, v), also outside the triangle."""
+    """Return the texture coordinates of triangle t at (u, v), extrapolated outside the triangle."""
     weights = corner_weights(planes, t, u, v)
     a, b, c = (
         row_vec2(uvs, triangles[t, 0]),
@@ -58,8 +58,9 @@ def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.te
 
 @ti.func
 def seen_through(opaque: ti.template(), light_of_byte: ti.template(), rays: ti.template(), normal, x, y):
-    """Return the light of the image behind pixel (x, y), displaced by the refraction at a surface with this
-    normal.
+    """Return the light that a surface at pixel (x, y) transmits from the image behind it.
+
+    Refraction shifts the image, depending on the normal of the surface.
     """
     size = ti.Vector([opaque.shape[1], opaque.shape[0]])
     right = ti.Vector([rays[k, 0] for k in ti.static(range(3))]).normalized()
@@ -165,7 +166,7 @@ def shade(
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
                             look = looks[t]
-                            # The key can light the other side of a cloth.
+                            # The key light can shine on the other side of a cloth.
                             outward = n
                             if look >= CLOTH and n.dot(sun) < 0.0:
                                 outward = -n

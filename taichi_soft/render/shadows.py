@@ -1,4 +1,4 @@
-"""Shadow maps of a frame, seen from the sun, and from the floor upwards."""
+"""Shadow maps of a frame: one map seen from the sun, and one seen from the floor upwards."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from taichi_soft.render.raster import CENTER, Raster
 COARSE = int(COARSE_TEXELS)
 SIZE = 384  # texels per side of the sun's shadow map
 CONTACT_SIZE = 192  # texels per side of the contact map, seen from the floor
-# [size of the scene]: blur of shadows of occluders just above the floor and at `FAR_HEIGHT` or higher; that
-# height; blur and fade height of contact shadows.
+# Lengths relative to the size of the scene: blur of shadows cast from just above the floor, blur of shadows
+# cast from `FAR_HEIGHT` or higher, and `FAR_HEIGHT`; then blur and fade height of contact shadows.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
-SUNK = 0.05  # surfaces deeper than this below the floor cast no shadow on it [size of the scene]
-# Largest distance from the camera's target at which bodies cast shadows [camera distance]. A body that flies
-# away must not stretch the map.
+SUNK = 0.05  # surfaces below this depth cast no shadow on the floor [size of the scene]
+# Largest distance from the camera's target at which bodies cast shadows, relative to the distance of the
+# camera. This limit prevents a body that flies away from stretching the map.
 WITHIN = 3.0
 
 Floats = NDArray[np.float32]
@@ -38,13 +38,15 @@ class ShadowMaps:
 
     Attributes:
         sun: unit vector to the sun.
-        matrix: float32 (4, 4), maps (x, y, z, 1) to texel right, texel down, 1 and height to the sun [m].
+        matrix: float32 (4, 4), maps (x, y, z, 1) to texel column and row, 1 and height towards the sun [m].
         texel: edge of a texel [m].
-        depth: float32 (SIZE * SIZE,), height to the sun of the first back face [m].
+        depth: float32 (SIZE * SIZE,), height towards the sun of the uppermost back face [m].
         near_shadow: float32 (SIZE, SIZE), shadow of occluders just above the floor, 0 to 1.
-        far_shadow, far_height: float32 (SIZE / COARSE,) * 2, shadow of occluders high above the floor, and
-            their height times that shadow, 1 at `FAR_HEIGHT`.
-        contact_matrix, contact: the same seen from the floor upwards; strength of contact shadows, 0 to 1.
+        far_shadow: float32 (SIZE / COARSE, SIZE / COARSE), shadow of occluders high above the floor, 0 to 1.
+        far_height: float32 with the shape of `far_shadow`, `far_shadow` times the height of the occluders
+            [FAR_HEIGHT].
+        contact_matrix: like `matrix`, for the map seen from the floor upwards.
+        contact: float32 (CONTACT_SIZE, CONTACT_SIZE), strength of contact shadows, 0 to 1.
     """
 
     def __init__(self, camera: Camera, floor: float | None, scale: float) -> None:
@@ -88,7 +90,7 @@ class ShadowMaps:
 
     def _spread_sun(self, floor: float) -> None:
         """Blur the sun's map to get the floor's shadows."""
-        # Each row of texels meets the floor in one line, because the floor is level along a row.
+        # Rows of texels are horizontal, so the floor has the same height towards the sun along a row.
         down = (np.arange(0.5, SIZE)[:, None] - self.matrix[1, 3]) * self.texel
         height = self._raster.depth.reshape(SIZE, SIZE) - (floor - down * self._axes[1, 2]) / self.sun[2]
         height *= self.sun[2] / (FAR_HEIGHT * self._scale)
@@ -112,8 +114,9 @@ class ShadowMaps:
 
     @property
     def extents(self) -> list[tuple[Floats, NDArray[np.bool_]]]:
-        """Return the regions of the floor that may be dark: pairs of a matrix to texels and a mask of dark
-        texels.
+        """Regions of the floor that can be dark.
+
+        Each region is a matrix (4, 4) from (x, y, z, 1) to texels, and a mask of dark texels.
         """
         coarse = (self.matrix / np.array([[COARSE], [COARSE], [1.0], [1.0]])).astype(np.float32)
         return [(coarse, self.far_shadow > FAINTEST), (self.contact_matrix, self.contact > FAINTEST)]
@@ -122,10 +125,10 @@ class ShadowMaps:
 def _fit(
     axes: NDArray[np.float64], points: NDArray[np.floating], size: int, blur: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the matrix (4, 4) of a (size, size) map that contains points, and the edge of a texel [m].
+    """Return the matrix (4, 4) of a (size, size) map that contains `points`, and the edge of a texel [m].
 
     The line of sight is opposite to the last of `axes`. Texel sizes change in steps and texels are fixed in
-    the world, so that shadows do not crawl while a body moves. The map leaves a border of width
+    the world, so that shadows do not crawl while a body moves. The map has a border of three times
     `blur` around the points.
     """
     seen = points @ axes[:2].T.astype(np.float32)

@@ -14,7 +14,7 @@ UNSET = np.full(3, 102 / 255, dtype=np.float32)
 
 
 def texture_picture(visual: Any, count: int) -> Any:
-    """Return the texture of a mesh as a Pillow image, or None if it has none.
+    """Return the texture of a mesh as a Pillow image, or None if the mesh has no texture.
 
     Args:
         visual: `visual` of a trimesh mesh, or None.
@@ -28,7 +28,7 @@ def texture_picture(visual: Any, count: int) -> Any:
 
 
 def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
-    """Return vertex colours, sRGB from 0 to 1, (count, 3). A texture is multiplied by them.
+    """Return the vertex colours of a mesh, sRGB from 0 to 1, (count, 3). They tint the texture.
 
     Args:
         visual: `visual` of a trimesh mesh, or None.

@@ -32,15 +32,15 @@ class Actor:
 
         Actor(body, (0.9, 0.3, 0.2), look="jelly", label="25 kPa")
 
-    A body made by `SoftBodyAsset.from_surface` is drawn as the artist's mesh, in the colours and with the
-    texture of its file if it has any.
+    A body made by `SoftBodyAsset.from_surface` is drawn as the artist's mesh, with the colours and the
+    texture of the mesh file if there are any.
     """
 
     body: Body  # body of a built world
     color: Color = PALETTE[0]  # sRGB from 0 to 1; the first colour of `PALETTE` by default
     paint: Paint | None = None  # function that returns colours (n, 3) of all vertices, instead of `color`
     label: str = ""  # caption on the floor in front of the body, plain ASCII
-    world: World | None = None  # world of the body; None for the stage's
+    world: World | None = None  # world of the body; None for the world of the stage
     shift: ArrayLike = (0.0, 0.0, 0.0)  # offset of the drawn body from its position, (3,) [m]
     look: Look | LookName = Look.MATTE  # "matte", "jelly" or "cloth"
 
@@ -54,18 +54,18 @@ class Stage:
         film(stage, "balls.mp4")
 
     All colliders are drawn, level floors as a chequered plane. All texts must be plain ASCII. Keep them short
-    enough for a film of 480 pixels.
+    enough for a film that is 480 pixels wide.
     """
 
     title: str  # text in the corner
-    world: World  # built
+    world: World  # built world
     actors: list[Actor]  # bodies to draw; `act` may add some
     camera: Camera | Orbit | Follow  # fixed, orbiting a point, or following a body
-    step: FixedStep  # length of a step, its substeps, and the most steps of a frame
+    step: FixedStep  # length of a step, its substeps, and the largest number of steps of a frame
     seconds: float  # world time of a film [s]
     act: Callable[[World], object] | None = None  # called before every step, to move colliders, grab or throw
     props: list[Prop] = field(default_factory=list)  # solid objects that move with colliders or frames
-    caption: Callable[[], str] | None = None  # function that returns a further line of text for each frame
+    caption: Callable[[], str] | None = None  # function that returns another line of text for each frame
     scale: ColorScale | None = None  # meaning of the colours of bodies, drawn as a bar
     legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and their meaning
     collider_colors: dict[Collider, Color] = field(default_factory=dict)  # colours of highlighted colliders
@@ -81,7 +81,7 @@ class Stage:
         step: FixedStep | None = None,
         act: Callable[[World], object] | None = None,
     ) -> Stage:
-        """Make a stage from a world: bodies in different colours, all in view.
+        """Make a stage that shows all bodies of a world in different colours.
 
         You can change the returned stage before a film begins.
         Args:

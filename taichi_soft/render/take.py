@@ -22,7 +22,8 @@ class Take:
 
     Attributes:
         adapter: adapter that steps the world.
-        positions, normals: arrays of each actor, float32 (n, 3); normals are filled only for skins.
+        positions, normals: one array per actor, float32 (n, 3), in m and as unit vectors. Normals are filled
+            only for skins.
         times: time to step and read each frame [s].
     """
 
@@ -40,7 +41,7 @@ class Take:
             self.stage.act(world)
 
     def play(self, seconds: float) -> None:
-        """Advance by a world time [s], which can be 0, and read all positions."""
+        """Advance the world by `seconds` of world time, which can be 0, and read all positions."""
         start = time.perf_counter()
         if seconds > 0.0:
             self.adapter.advance(seconds)
@@ -61,12 +62,12 @@ class Take:
         self._spent += time.perf_counter() - start
 
     def end_frame(self) -> None:
-        """Record the time of the frame."""
+        """Append the time spent on this frame to `times`."""
         self.times.append(self._spent)
         self._spent = 0.0
 
     def camera(self) -> Camera:
-        """Return the current camera. Raises: OptionError if it follows a body that is not drawn."""
+        """Return the current camera. Raises: OptionError if the camera follows a body that is not drawn."""
         camera = self.stage.camera
         return camera if isinstance(camera, Camera) else camera.at(self.adapter.time, self._box_of)
 
@@ -78,7 +79,7 @@ class Take:
 
 
 def skins_of(actor: Actor) -> tuple[SkinMesh, ...]:
-    """Return the skins to draw instead of the body's surface; none if the actor has `paint`."""
+    """Return the skins to draw instead of the body's surface. An actor with `paint` has no skins to draw."""
     return () if actor.paint else actor.body.render_meshes
 
 

@@ -16,7 +16,7 @@ LARGEST = 16384
 """Largest edge of a texture [pixels]."""
 
 LEVEL = 4
-"""Numbers per mip level: index of the first texel, width, height, and number of smaller levels that
+"""Number of entries per mip level: index of the first texel, width, height, and number of smaller levels that
 follow."""
 
 
@@ -25,10 +25,10 @@ class Texture:
 
     Args:
         pixels: sRGB, uint8 (height, width, 3), the first row at the top.
-    Raises: OptionError for anything else.
+    Raises: OptionError for another type or shape.
 
     Attributes:
-        texels: uint8 (k, 3), the pixels of all levels, the largest first.
+        texels: uint8 (k, 3), the pixels of all levels, the largest level first.
         levels: int32 (l, 4), mip levels, see `LEVEL`.
     """
 
@@ -72,7 +72,7 @@ class SceneTextures:
 
     Attributes:
         uv: float32 (n, 2), texture coordinates of the vertices, from the lower left.
-        first_level: int32 (m,), largest mip level of each triangle's texture, or -1.
+        first_level: int32 (m,), index in `levels` of the largest mip level of each triangle's texture, or -1.
         texels, levels: see `Texture`.
     """
 

@@ -24,7 +24,7 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
     across, down = x - ti.floor(x), y - ti.floor(y)
     total = ti.Vector([0.0, 0.0, 0.0])
     for j, i in ti.static(ti.ndrange(2, 2)):
-        # The remainder is a valid index for any number, even NaN.
+        # The remainders are valid indices even if `uv` is NaN.
         at = start + (top + j) % height * width + (left + i) % width
         share = (across if i else 1.0 - across) * (down if j else 1.0 - down)
         total += share * texel_light(texels, decode, at)
@@ -35,7 +35,7 @@ def level_light(texels: ti.template(), levels: ti.template(), decode: ti.templat
 def texture_light(
     texels: ti.template(), levels: ti.template(), decode: ti.template(), first, uv, uv_right, uv_below
 ):
-    """Sample a texture at `uv` with trilinear filtering; `first` is its largest mip level.
+    """Sample a texture at `uv` with trilinear filtering; `first` is the largest mip level.
 
     Args:
         uv_right, uv_below: texture coordinates at the next pixels to the right and below.
@@ -44,7 +44,7 @@ def texture_light(
     right, below = (uv_right - uv) * size, (uv_below - uv) * size
     wide = ti.sqrt(ti.max(right.dot(right), below.dot(below)))  # [texels]
     steps = 0.0
-    if wide > 1.0:  # NaN takes the largest level
+    if wide > 1.0:  # NaN selects the largest level
         steps = ti.min(ti.log(wide) / ti.log(2.0), ti.f32(levels[first, 3]))
     finer = ti.math.clamp(ti.i32(steps), 0, levels[first, 3])
     coarser = ti.min(finer + 1, levels[first, 3])

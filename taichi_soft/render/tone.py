@@ -19,7 +19,7 @@ KNEE = 0.55
 """Linear light above which bright tones are compressed; colours between toe and knee are unchanged."""
 
 STEPS = 4096
-"""Length of the table for kernels."""
+"""Number of entries of the table that kernels use."""
 
 
 def tone_map(light: NDArray[np.floating]) -> Floats:

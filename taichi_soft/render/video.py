@@ -19,20 +19,20 @@ CONTAINERS: dict[str, type[Container]] = {".mp4": Stream, ".webm": Stream, ".gif
 
 
 class VideoWriter:
-    """Writes frames to a film, as a context manager. The suffix chooses the format.
+    """Context manager that writes frames to a film. The suffix of `path` chooses the format.
 
     Args:
         path: .mp4 (H.264), .webm (VP9), .gif, or .png for numbered images: `out/bounce.png` gives
             `out/bounce_0000.png` and so on. Browsers play all formats. A missing folder is created.
         fps: frames per second, above 0 to 240; at most 50 for .gif.
         size: (width, height) of the frames [pixels], both even for .webm and .mp4.
-    Raises: VideoError for a suffix, size or path that cannot be written; OptionError for other arguments,
-        and if the package with ffmpeg is missing (.png does not need it).
+    Raises: VideoError for a suffix, size or path that cannot be written; OptionError for other wrong
+        arguments, and if the package with ffmpeg is missing (.png does not need it).
 
     The film is written to a hidden folder next to `path`, read back, and moved to `path` only if it has every
-    frame. After an exception inside the `with`, an earlier film at `path` is unchanged. If the process is
-    killed, the next film in the same folder removes the hidden folder. Images left from a longer sequence of
-    the same name are removed.
+    frame. After an exception inside the `with` block, an earlier film at `path` is unchanged. If the process
+    is killed, the next film in the same folder removes the hidden folder. Images that remain from a longer
+    sequence of the same name are removed.
     """
 
     def __init__(self, path: str | Path, *, fps: float, size: tuple[int, int]) -> None:
@@ -89,7 +89,7 @@ class VideoWriter:
     def close(self) -> None:
         """Complete the film, verify it and move it to `path`. Further calls do nothing.
 
-        Raises: VideoError if there is no frame or a frame is missing. Then no file is left behind.
+        Raises: VideoError if there is no frame or a frame is missing. In this case no file is left behind.
         """
         if self._closed:
             return

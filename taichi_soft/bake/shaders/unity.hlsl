@@ -1,6 +1,6 @@
-// Plays a baked clip in Unity, in a Custom Function node of Shader Graph in the vertex stage: source this file, name
-// BakedVertex, inputs vertex (UV1, the second set, which is the pixel of a vertex), seconds, and the textures as
-// Bare Texture 2D. See metadata.json for the numbers.
+// Plays a baked clip in Unity. Use it in a Custom Function node of Shader Graph in the vertex stage, with this file
+// as source and the name BakedVertex. Its inputs are vertex (UV1, the second set, which is the pixel of a vertex),
+// seconds, and the textures as Bare Texture 2D. See metadata.json for the numbers.
 //
 // Import position_high.png, position_low.png and normal.png with sRGB off, Non-Power of 2 "None", no mip maps, no
 // compression, filter "Point", and a max size of at least their size.
@@ -35,7 +35,7 @@ float3 BakedNormal(Texture2D map, int3 pixel)
     return float3(-normal.x, normal.y, normal.z);
 }
 
-// seconds: since the clip began; it loops.
+// seconds is the time since the clip began. The clip loops.
 void BakedVertex_float(
     float2 vertex, float seconds, Texture2D high, Texture2D low, Texture2D map, out float3 position, out float3 normal)
 {

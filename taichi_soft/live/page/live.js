@@ -14,7 +14,7 @@ const send = request => {
   socket.send(request instanceof ArrayBuffer ? request : JSON.stringify(request));
 };
 
-// Sends only the newest value of each slider per screen frame. Other requests are sent after it.
+// Send only the newest value of each slider per screen frame. Send waiting values before any other request.
 const values = new Map();
 const sendValues = () => { values.forEach(send); values.clear(); };
 const ask = request => {
@@ -22,7 +22,7 @@ const ask = request => {
   else { sendValues(); send(request); }
 };
 
-// Latencies of the last moves [ms]: from a move of the hand to the frame after the first one that shows it.
+// Latencies of the last moves [ms]: from a move of the pointer until one screen frame after the move is drawn.
 const begun = new Map(), late = [];
 let pull = 0;
 

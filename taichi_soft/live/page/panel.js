@@ -67,7 +67,7 @@ export class Panel {
     };
   }
 
-  // Show the world's values on all sliders immediately, even on one that was just moved.
+  // Show the world's values on all sliders immediately, even on a slider that the user just moved.
   release() { for (const slider of this.sliders.values()) slider.touched = -PATIENCE; }
 
   async upload(limit) {
@@ -78,7 +78,7 @@ export class Panel {
     at("upload").value = "";
   }
 
-  // Warn of a material that needs more substeps than the slider's value, before it becomes unstable.
+  // Warn of a material that needs more substeps than the slider's value, before the bodies become unstable.
   warn() {
     const state = this.state, sliders = this.sliders;
     if (!state) return;

@@ -33,7 +33,7 @@ export class Room {
     this.scene.add(this.floor);
   }
 
-  // Aim the sun at a point. Shadows cover `reach` metres on each side of it.
+  // Aim the sun at a point. Shadows cover `reach` metres on each side of the point.
   aim(target, reach) {
     this.reach = reach;
     this.sun.target.position.set(...target);

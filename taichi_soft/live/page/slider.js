@@ -1,6 +1,6 @@
 import { quantity } from "./quantity.js";
 
-// Time for which a control keeps the user's value [ms], because the server confirms it some frames later.
+// Time for which a control keeps the user's value [ms]. The server confirms a value only some frames later.
 export const PATIENCE = 1500;
 
 export class Slider {

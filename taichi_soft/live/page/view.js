@@ -169,7 +169,7 @@ export class View {
     this.renderer.setScissorTest(true);
     const wide = width / this.shown.length;
     this.camera.aspect = wide / height;
-    // The field of view belongs to the shorter side, as in films.
+    // The field of view is the angle across the shorter side, as in films.
     const half = Math.tan(((this.fov ?? 40) * Math.PI) / 360);
     this.camera.fov = (360 / Math.PI) * Math.atan(this.camera.aspect < 1 ? half / this.camera.aspect : half);
     this.camera.updateProjectionMatrix();
@@ -200,7 +200,7 @@ export class View {
     return { place: i, pane: this.shown[i], caster };
   }
 
-  // Return the hit of a ray on a body, or null if it hits none or a collider hides the body.
+  // Return the hit of a ray on a body, or null if the ray hits no body or a collider hides the body.
   hit(pane, caster) {
     const { body, solids } = this.panes.get(pane) ?? {};
     if (!body) return null;
@@ -223,7 +223,7 @@ export class View {
     this.hand.grab(pane, origin.toArray(), direction.toArray());
   }
 
-  // Update the cursor over bodies that can be grabbed. This runs regularly, because bodies move too.
+  // Update the cursor over bodies that can be grabbed. Call this regularly, because bodies move under the pointer.
   point() {
     if (this.held || performance.now() < this.pointAt) return;
     this.pointAt = performance.now() + 60;
