@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from taichi_soft.bodies.asset import SoftBodyAsset
 
 MAX_DEPTH = 0.25
-"""Depth of a vertex in a collider above which a start is refused, over the mean edge of the surface or the
-smallest side of the body. Contact moves vertices out at once; deeper vertices could end too close to their
-neighbours."""
+"""Largest depth of a vertex in a collider at the start, relative to the mean edge of the surface or to the
+smallest side of the body, whichever is shorter. Contact moves vertices out in one step. Deeper vertices could
+end too close to their neighbours."""
 
 
 def require_clear(
     colliders: Sequence[Collider], asset: SoftBodyAsset, points: NDArray[np.float64], name: str
 ) -> None:
-    """Check that a body starts outside of all colliders that it can touch, or only slightly inside.
+    """Check that a body starts outside all colliders that it can touch, or at most slightly inside.
 
     Args:
         points: vertices of the body that are not pinned, (n, 3) [m].
         name: name of the body for the message.
-    Raises: OptionError with the deepest collider and the depth.
+    Raises: OptionError that names the collider in which the body starts deepest, and the depth.
     """
     if not len(points):
         return
@@ -37,7 +37,7 @@ def require_clear(
     for collider in colliders:
         contact, shape = asset.contact, collider.shape
         if contact.group & collider.mask and collider.group & contact.mask:
-            # Row vectors times the matrix of axes: from the world frame to the collider's frame.
+            # Multiplying row vectors by the matrix of axes converts them to the collider's frame.
             depths = shape.depths((points - collider.position) @ collider.rotation)
             depth = float(depths.max()) + collider.thickness
             if depth > deepest:
@@ -53,10 +53,11 @@ def require_clear(
 
 
 def free_points(asset: SoftBodyAsset, rows: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the outer vertices, or the hull points, that are not pinned, (n, 3) [m].
+    """Return the positions of a body's outer vertices that are not pinned, (n, 3) [m].
 
+    For a body with a hull, these are the hull points that are not pinned.
     Args:
-        rows: initial state of the body, (n, 8), see `SoftBodyAsset.placed`.
+        rows: initial state of the body, (k, 8), see `SoftBodyAsset.placed`.
     """
     hull = asset.bound_hull
     if hull is not None:

@@ -1,4 +1,4 @@
-"""A collider: a solid shape that bodies collide with. It stands still, or the game moves it."""
+"""A collider: a solid shape with which bodies collide. The game can move a collider."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ColliderRow:
 
     shape: Shape
     friction: float
-    restitution: float  # -1 for the elasticity of the bodies
+    restitution: float  # -1 if the elasticity of each body decides
     thickness: float
     group: int
     mask: int
@@ -43,7 +43,7 @@ class ColliderRow:
 
     @property
     def skin(self) -> float:
-        """Distance outside the shape at which contact begins, with the additional skin of the shape [m]."""
+        """Distance outside the shape at which contact begins [m]: thickness plus the skin of the shape."""
         return self.thickness + self.shape.seam
 
     @property
@@ -53,8 +53,9 @@ class ColliderRow:
         return lower, upper
 
     def swept_box(self, dt: float) -> tuple[Floats, Floats, Floats]:
-        """Return corners of the box swept in `dt` [s], (3,) [m] each, and the highest speed in it, (1,)
-        [m/s].
+        """Return the box that the collider sweeps in `dt` [s], and the highest speed of its points.
+
+        Returns: lower and upper corner of the box, (3,) [m] each; the speed, (1,) [m/s].
         """
         lower, upper = self.shape.bounds
         speed, spin = length_of(self.velocity), length_of(self.spin)
@@ -76,7 +77,7 @@ class ColliderRow:
 
     @property
     def constants(self) -> tuple[Any, ...]:
-        """All values except pose and motion."""
+        """All values that stay the same when the collider moves."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
         return (id(self.shape), self.offset, self.is_alive, *surface)
 
@@ -87,16 +88,16 @@ class ColliderSet(Protocol):
     on_jump: Callable[[Floats, Floats], None]
 
     def impulses(self) -> Floats:
-        """Return the impulse on each collider in the last step, (n, 6) [N s, N m s]."""
+        """Return impulse and angular impulse on each collider in the last step, (n, 6) [N s, N m s]."""
 
     def moved(self, row: ColliderRow) -> None:
         """Record that the pose or the motion of a collider changed."""
 
     def write(self, index: int) -> None:
-        """Update the fields after row `index` was added or removed."""
+        """Update the fields after the collider in row `index` was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of row `index` changed."""
+        """Update fields and settings after the friction of the collider in row `index` changed."""
 
 
 class Collider(Handle):
@@ -112,8 +113,9 @@ class Collider(Handle):
         return f"Collider({self.index}, {self.shape!r}{'' if self.is_alive else ', removed'})"
 
     def _colliders(self) -> ColliderSet:
-        """Return the set that contains the collider. Raises: StateError if the collider was removed, or its
-        world no longer exists.
+        """Return the set that contains the collider.
+
+        Raises: StateError if the collider was removed, or if its world no longer exists.
         """
         colliders = self._set()
         if colliders is None:
@@ -145,7 +147,7 @@ class Collider(Handle):
 
     @property
     def velocity(self) -> Floats:
-        """Velocity of the origin from the next step on, (3,) [m/s]; zero for a collider that `move_to`
+        """Velocity of the origin from the next step on, (3,) [m/s]. It is zero for a collider that `move_to`
         moves.
         """
         return np.array(self._row.velocity)
@@ -162,7 +164,7 @@ class Collider(Handle):
 
     @property
     def restitution(self) -> float | None:
-        """Coefficient of restitution for the centres of mass of bodies; None for their own elasticity."""
+        """Coefficient of restitution for the centres of mass of bodies; None if their elasticity decides."""
         return None if self._row.restitution < 0.0 else self._row.restitution
 
     @property
@@ -184,15 +186,16 @@ class Collider(Handle):
     def impulse(self) -> Floats:
         """Impulse that all bodies exerted on the collider in the last step, (3,) [N s].
 
-        Apply this impulse to the engine's rigid body. It acts one step late. To compensate, add half of its
-        effect to the velocity of the rigid body before the next step, whose impulse is about the same.
+        Apply this impulse to the engine's rigid body. The impulse acts one step late. To compensate, add half
+        of its velocity change to the rigid body before the next step, because the next impulse is similar.
         """
         return self._colliders().impulses()[self.index, :3]
 
     @property
     def angular_impulse(self) -> Floats:
-        """Angular impulse that all bodies exerted on the collider in the last step, about its position, (3,)
-        [N m s].
+        """Angular impulse that all bodies exerted on the collider in the last step, (3,) [N m s].
+
+        The reference point is the position of the collider.
         """
         return self._colliders().impulses()[self.index, 3:]
 
@@ -211,10 +214,10 @@ class Collider(Handle):
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Move the collider to a pose over the next step, in a straight line and with constant rotation, then
-        stop it.
+        """Move the collider to a pose during the next step, then stop it.
 
-        The collider pushes bodies in its path with the velocity of this motion.
+        The velocity and the angular velocity are constant during the step. The collider pushes bodies in its
+        path with this velocity.
         Args:
             position: new position of the collider's origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the current one.
@@ -226,7 +229,7 @@ class Collider(Handle):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Move the collider with this velocity until the next call.
+        """Move the collider with this velocity until the next call of `set_velocity` or `move_to`.
 
         Args:
             linear: velocity of the origin, (3,) [m/s].
@@ -240,8 +243,9 @@ class Collider(Handle):
 
     @recorded
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Move the collider to a pose at once. It pushes no bodies in between, but moves bodies at the new
-        pose out.
+        """Move the collider to a pose at once.
+
+        The collider pushes no bodies between the two poses. Bodies that overlap the new pose are moved out.
 
         Args:
             position: new position of the collider's origin, (3,) [m].
@@ -261,7 +265,7 @@ class Collider(Handle):
 
     @recorded
     def remove(self) -> None:
-        """Remove the collider from the world. Another collider can then use its place."""
+        """Remove the collider from the world. A collider that is added later can get the same index."""
         colliders = self._colliders()
         self._row.is_alive = False
         colliders.write(self.index)
@@ -273,5 +277,5 @@ def row_of(collider: Collider) -> ColliderRow:
 
 
 def rebind(collider: Collider, index: int, row: ColliderRow) -> None:
-    """Point a handle to another row."""
+    """Make a handle refer to another row."""
     collider.index, collider._row = index, row

@@ -16,7 +16,9 @@ from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vect
 
 
 def entry_of(collider: Collider) -> list[Any]:
-    """Return handle number, row and motion of a collider. A shape without a grid is included completely."""
+    """Return handle number, row and motion of a collider as plain data. A grid is not included, only the
+    digest of its shape.
+    """
     row = row_of(collider)
     target = None if row.target is None else [each.tolist() for each in row.target]
     motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
@@ -30,8 +32,8 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
     """Convert an entry to the row of a collider.
 
     Args:
-        shapes: known shapes by their digests.
-        room: number of grid samples that fit.
+        shapes: shapes that this world has had, by digest.
+        room: number of grid samples for which the world has memory.
     Raises: ValueError, SnapshotError or OptionError for an invalid entry.
     """
     _, is_alive, digest, plain, offset, surface, motion, target = entry

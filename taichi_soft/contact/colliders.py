@@ -32,15 +32,16 @@ from taichi_soft.core.serialisation import digest_of
 Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
-"""Largest number of grid samples for colliders added after `World.build`: 400 MB."""
+"""Largest `sample_room` of a world: number of grid samples for colliders that are added after `World.build`.
+These samples take 400 MB."""
 
 
 def ignore(lower: Floats, upper: Floats) -> None:
-    """Do nothing. This is the default of `Colliders.on_jump`."""
+    """Do nothing. This function is the default of `Colliders.on_jump`."""
 
 
 class Colliders(Slice):
-    """All colliders of a world, with the Python data behind `ColliderFields`."""
+    """All colliders of a world. Their data are stored in Python and copied to `ColliderFields`."""
 
     name = "colliders"
 
@@ -53,10 +54,10 @@ class Colliders(Slice):
         self.floor: Collider | None = None  # set by `World.build` in a world with colliders
         self._contact: ColliderFields | None = None
         self._body_count = 0
-        self._built_count = 0  # colliders at `World.build`, with the floor
-        self._impulses: Floats | None = None  # impulses in the last step, once read
-        # Called with the box (two corners [m]) in which a collider appears or vanishes, or from or to which
-        # it jumps.
+        self._built_count = 0  # number of colliders at `World.build`, including the floor
+        self._impulses: Floats | None = None  # impulses in the last step; None until they are read
+        # Called with two corners [m] of a collider's box, when the collider appears or disappears, when its
+        # friction changes, and before and after it jumps.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
         self._is_dirty = False  # True if poses or velocities must be written to the fields
         self._movers: list[ColliderRow] = []  # colliders with a velocity or a target
@@ -114,7 +115,7 @@ class Colliders(Slice):
         return self._handles[index]
 
     def _free_row(self) -> int:
-        """Return a row for a new collider. Raises: StateError if there is none."""
+        """Return the index of a free row for a new collider. Raises: StateError if no row is free."""
         for index, row in enumerate(self._rows):
             if not row.is_alive:
                 return index
@@ -128,8 +129,9 @@ class Colliders(Slice):
         return len(self._rows)
 
     def _free_samples(self, shape: Shape) -> int:
-        """Return the first row for the samples of a new collider's grid. Raises: StateError if they do not
-        fit.
+        """Return the first row for the grid samples of a new collider, 0 without a grid.
+
+        Raises: StateError if there are too few free rows in sequence.
         """
         needed = len(shape.samples)
         if self._contact is None or needed == 0:
@@ -149,7 +151,7 @@ class Colliders(Slice):
         return found
 
     def capacity(self, room: int, sample_room: int, *, soft: bool) -> ContactCapacity:
-        """Return the capacity for the present colliders and `room` more, with `sample_room` more samples.
+        """Return the capacity for the present colliders, `room` more colliders, `sample_room` more samples.
 
         The capacity is rounded up, so that similar worlds share kernels.
         """
@@ -176,7 +178,7 @@ class Colliders(Slice):
         self._is_dirty = True
 
     def write(self, index: int) -> None:
-        """Update the fields after row `index` was added or removed."""
+        """Update the fields after the collider in row `index` was added or removed."""
         if self._contact is None:
             return
         row = self._rows[index]
@@ -189,7 +191,7 @@ class Colliders(Slice):
         self.on_jump(*row.box)
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of row `index` changed."""
+        """Update fields and settings after the friction of the collider in row `index` changed."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
             self.context.apply_settings(replace(self.context.settings, friction=row.friction))
@@ -224,7 +226,7 @@ class Colliders(Slice):
     def prepare(self, dt: float) -> bool:
         """Write poses and motion of the colliders for the next step of `dt` [s] to the fields.
 
-        Returns: True if any pose or motion may differ from the last step.
+        Returns: True if any pose or motion can differ from the last step.
         """
         self._impulses = None
         if not (self._is_dirty or self._movers):
@@ -258,17 +260,16 @@ class Colliders(Slice):
         return tuple(self._handles)
 
     def entries(self) -> list[list[Any]]:
-        """Return handle number, row and motion of each collider. Shapes without a grid are included
-        completely.
-        """
+        """Return handle number, row and motion of each collider as plain data: see `entry_of`."""
         return [entry_of(handle) for handle in self._handles]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, ColliderRow]]:
-        """Read the rows from the result of `entries`, with the numbers of their handles.
+        """Return the handle number and the row of each collider in `entries`.
 
-        Raises: ValueError, SnapshotError or OptionError for an invalid entry, or if it does not fit.
+        Raises: ValueError, SnapshotError or OptionError for an invalid entry, or if the world has too little
+        capacity.
         """
         room = ContactCapacity() if self._contact is None else self._contact.capacity
         if len(entries) > room.colliders:
@@ -276,7 +277,7 @@ class Colliders(Slice):
         return [(int(entry[0]), read_row(entry, self.shapes, room.samples)) for entry in entries]
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raise a ValueError if an impulse on a constrained point is not finite."""
+        """Raise a ValueError if an impulse on a hull point is above `MAX_IMPULSE` or not finite."""
         if self._contact is not None and self._contact.capacity.hull:
             hull = self.context.built.state.hull
             is_held = rows_of(hull.held_by).max(axis=1) > 0
@@ -305,7 +306,7 @@ class Colliders(Slice):
         self._write_constants()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Add a collider, move it, read its impulse and remove it, so that nothing compiles later."""
+        """Add a collider, move it, read its impulse and remove it, so that no kernel compiles later."""
         if self._contact is None:
             return
         added: Collider | None = None
@@ -330,8 +331,9 @@ class Colliders(Slice):
             added.remove()
 
     def impulses(self) -> Floats:
-        """Return the impulse on each collider in the last step, (n, 6) [N s, N m s]; zero before the first
-        step.
+        """Return impulse and angular impulse on each collider in the last step, (n, 6) [N s, N m s].
+
+        All values are zero before the first step.
         """
         if self._impulses is None:
             rows = np.zeros((len(self._rows), 6), dtype=np.float32)

@@ -26,17 +26,20 @@ NO_COLLIDER = -1
 """Kind of a row whose collider was removed."""
 
 FOUND = 16
-"""Maximum number of triangles that a search keeps for one vertex: enough where three bodies meet."""
+"""Maximum number of triangles that a search stores for one vertex. This is enough for a vertex at which three
+bodies meet."""
 
 SLOTS = 8
-"""Slots for candidates of a body, per vertex. Most vertices have none, so that others can use more."""
+"""Number of slots for candidates of a body, per vertex. Most vertices have no candidates, so that other
+vertices of the body can use more slots than this."""
 
 PAIR_ROWS = 32
-"""Pairs of bodies whose impulses can be recorded, per body of an island. This is enough for all pairs of 65
-bodies, and in a larger island for 64 partners of each body."""
+"""Number of pairs of bodies whose impulses are recorded, per body of an island. This is enough for all pairs
+of 65 bodies. In a larger island, it is enough for 64 partners of each body."""
 
 MAX_PARTNERS = 32
-"""Bodies from which a body is moved apart at a time. A body that overlaps more of them touches no other."""
+"""Largest number of bodies from which a body is moved apart in a step. A body that overlaps more bodies than
+this has no contact with other bodies."""
 
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of range."""
@@ -47,10 +50,10 @@ MAX_IMPULSE = 1e30
 
 @dataclass(frozen=True)
 class ContactCapacity:
-    """Capacity for contact; all zero in a world without contact."""
+    """Capacity for contact. All values are 0 or False in a world without contact."""
 
     colliders: int = 0
-    samples: int = 0  # of the grids of height fields and meshes
+    samples: int = 0  # number of grid samples of height fields and meshes
     soft: bool = False  # True if bodies touch each other
     hull: bool = False  # True if any body has a hull
 
@@ -58,8 +61,8 @@ class ContactCapacity:
 class ColliderFields(FieldGroup):
     """Colliders, and contacts: one row for each pair of a body and a collider.
 
-    The row of body b and collider c is b * colliders + c. In a fixed step, a collider starts at `position`
-    and `rotation`, and moves with the constant `velocity` and `spin`.
+    The row of body b and collider c is b * n + c, with the capacity n for colliders. In a fixed step, a
+    collider starts at `position` and `rotation`, and moves with the constant `velocity` and `spin`.
     """
 
     owner, when = "contact", "has_contact"
@@ -67,72 +70,74 @@ class ColliderFields(FieldGroup):
     kind = declare(COLLIDER, ti.i32, native=True)  # a `ShapeKind`, or NO_COLLIDER
     parameters = declare(COLLIDER, ti.f32, 8, native=True)
     resolution = declare(COLLIDER, ti.i32, 3)
-    offset = declare(COLLIDER, ti.i32)  # row of its first sample
-    # Pose at the start of the step, and motion in it.
+    offset = declare(COLLIDER, ti.i32)  # row of the grid's first sample
+    # Pose at the start of the step, and motion during the step.
     position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
     rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
     velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
     surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
     filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
-    # Box around its path in the step.
+    # Box around the collider's path in the step.
     lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
     upper = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
-    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # upper bound for its fastest point
+    speed = declare(COLLIDER, ti.f32, unit="m/s", native=True)  # upper bound for the fastest point
     samples = declare(SAMPLE, ti.f32)
 
-    near = declare(CONTACT, ti.i32)  # colliders near a body, at the front of its rows
+    near = declare(CONTACT, ti.i32)  # colliders near a body, in the body's first rows
     near_count = declare(BODY, ti.i32, start=0)
-    reach = declare(BODY, ti.f32, unit="m")  # distance after which other colliders can be near
-    gone = declare(BODY, ti.f32, unit="m")  # farthest distance travelled since the last search for them
-    # Impulse on the collider in this step, and angular impulse about its position. Empty slots contain zeros:
-    # the total on a collider is the sum over all slots.
+    reach = declare(BODY, ti.f32, unit="m")  # distance travelled after which other colliders can be near
+    gone = declare(BODY, ti.f32, unit="m")  # distance travelled since the near colliders were listed
+    # Impulse on the collider in this step, and angular impulse about the collider's position. Empty slots
+    # contain zeros, so that the total on a collider is the sum over all slots.
     impulse = declare(CONTACT, ti.f32, 3, unit="N s", start=0, keep=CONTACT)
     angular_impulse = declare(CONTACT, ti.f32, 3, unit="N m s", start=0, keep=CONTACT)
-    normal_impulse = declare(CONTACT, ti.f32, 3, unit="N s")  # on the body in this substep
+    normal_impulse = declare(CONTACT, ti.f32, 3, unit="N s")  # on the body, in this substep
     # Sums over the particles of the body: normal impulse [N s]; normal impulse times the speed of the surface
     # along the normal [J]; normal impulse times the speed of approach [J].
     normal_impulse_rates = declare(CONTACT, ti.f32, 3)
-    # Speed at which the body can leave the collider, 0 without contact; its value before the step.
+    # Largest speed at which the body can leave the collider, 0 without contact. `prev_rebound` is the value
+    # of `rebound` before the step.
     rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
     prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
     body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
-    # Distance from all near colliders at the last search. Inner particles count as far away.
+    # Distance that a particle can travel after the last search without touching a collider. An inner particle
+    # that is not checked has the value `UNCHECKED`.
     particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)
 
     def __init__(self, capacity: Any, real: Any) -> None:
-        """Allocate; contents are zero."""
+        """Allocate the fields, filled with zeros."""
         super().__init__(capacity, real)
         self.capacity: ContactCapacity = capacity.contact
-        self.loader = Loader()  # of data that do not change when a collider moves
+        self.loader = Loader()  # for data that do not change when a collider moves
 
 
 class SoftContactFields(FieldGroup):
-    """Contact between bodies: a grid of vertices, and candidates.
+    """Contact between bodies: a grid of vertices, candidates and contacts.
 
-    Each body has its own part of the grid, which it fills again for each other body.
+    Each body has its own part of the grid, which is filled again for each other body.
     """
 
     owner, when = "contact", "has_soft_contact"
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
     cell_first = declare(GRID_CELL, ti.i32)
     item = declare(OUTER, ti.i32)  # rows of `outer_particle` near the other body
-    # The same rows in the order of their cells, and the positions of their particles.
+    # The rows in `item` in the order of their cells, and the positions of their particles.
     cell_item = declare(OUTER, ti.i32)
     cell_position = declare(OUTER, ti.f32, 3, unit="m")
-    # State at the last search: corners of the boxes of triangles, and positions.
+    # State at the last search: corners of the triangles' boxes, and positions of the particles.
     triangle_lower = declare(TRIANGLE, ti.f32, 3, unit="m")
     triangle_upper = declare(TRIANGLE, ti.f32, 3, unit="m")
     searched_position = declare(PARTICLE, ti.f32, 3, unit="m")
-    # Relative to the mean motion of the island: the distance up to which the results of a search are valid,
-    # and the distances that each body and each vertex are from their positions at that search.
+    # Displacements are relative to the mean motion of the island. The results of a search are valid for
+    # displacements up to `body_reach`.
     body_reach = declare(BODY, ti.f32, unit="m")
-    body_lost = declare(BODY, ti.f32, unit="m")  # the same, limited by triangles without a slot
-    body_gone = declare(BODY, ti.f32, unit="m")
-    particle_gone = declare(PARTICLE, ti.f32, unit="m")
+    body_lost = declare(BODY, ti.f32, unit="m")  # smallest gap to a triangle without a slot
+    body_gone = declare(BODY, ti.f32, unit="m")  # largest displacement of a vertex since the last search
+    particle_gone = declare(PARTICLE, ti.f32, unit="m")  # displacement since the last search
     found_count = declare(OUTER, ti.i32)
     found_triangle = declare(OUTER, ti.i32, each=FOUND)
-    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # at the last search
+    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # distance at the last search
     # Candidates of each body, vertex by vertex, without gaps. The last `LANES` rows are read, but never used.
     slot_count = declare(BODY, ti.i32, start=0)
     # Vertex and corners of the triangle.
@@ -140,43 +145,42 @@ class SoftContactFields(FieldGroup):
     slot_triangle = declare(OUTER, ti.i32, each=SLOTS)
     # Distance at the last search, minus the thickness.
     slot_spare = declare(OUTER, ti.f32, unit="m", each=SLOTS, beyond=LANES)
-    # Slots of the candidates that are near now. The rows after them are outdated.
+    # Slots of the candidates that can touch in this substep. The remaining rows of a body are outdated.
     near_slot = declare(OUTER, ti.i32, each=SLOTS, beyond=LANES)
-    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # distance minus thickness; or NO_CONTACT
-    slot_weights = declare(OUTER, ti.f32, 3, each=SLOTS)  # barycentric, of the nearest point
-    slot_normal = declare(OUTER, ti.f32, 3, each=SLOTS)  # from the triangle to the vertex
+    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # distance minus thickness, or NO_CONTACT
+    slot_weights = declare(OUTER, ti.f32, 3, each=SLOTS)  # barycentric coordinates of the nearest point
+    slot_normal = declare(OUTER, ti.f32, 3, each=SLOTS)  # contact normal, outward from the triangle
     slot_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=SLOTS)  # along the normal in this substep
-    slot_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=SLOTS)  # on the vertex
-    # Slots of the contacts of this substep, without gaps for each body. Between a search and the narrow
-    # phase, they are the contacts of the last substep. All other slots have no impulse.
+    slot_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=SLOTS)  # friction on the vertex
+    # Slots of the contacts in this substep, without gaps for each body. Between a search and the narrow
+    # phase, these rows list the contacts of the last substep. Slots that are not listed have no impulse.
     contact_count = declare(BODY, ti.i32, start=0)
     contact_slot = declare(OUTER, ti.i32, each=SLOTS)
-    # Terms of a contact that stay constant during the solver's sweeps: inverse masses of the vertex and the
-    # corners; 1 if the body of the vertex, or of the triangle, can move; normal of the triangle; fractions of
-    # the impulse that the corners get; height above the triangle times the gradients of the weights.
-    slot_inv_mass = declare(OUTER, ti.f32, 4, unit="1/kg", each=SLOTS)
-    slot_moves = declare(OUTER, ti.f32, 2, each=SLOTS)
-    slot_face = declare(OUTER, ti.f32, 3, each=SLOTS)
-    slot_shares = declare(OUTER, ti.f32, 3, each=SLOTS)
+    # Terms of a contact that stay constant during the solver's sweeps: see `precompute_contact`.
+    slot_inv_mass = declare(OUTER, ti.f32, 4, unit="1/kg", each=SLOTS)  # of the vertex and the three corners
+    slot_moves = declare(OUTER, ti.f32, 2, each=SLOTS)  # 1 if the vertex, or the triangle, can move
+    slot_face = declare(OUTER, ti.f32, 3, each=SLOTS)  # unit normal of the triangle
+    slot_shares = declare(OUTER, ti.f32, 3, each=SLOTS)  # fractions of the friction impulse on the corners
+    # Height of the vertex above the triangle, times the gradients of the barycentric coordinates.
     slot_levers = declare(OUTER, ti.f32, (3, 3), each=SLOTS)
     # Contact with the largest normal impulse on a particle at the end of the last step. The impulse is 0 if
-    # there was none.
+    # the particle had no contact.
     kept_triangle = declare(PARTICLE, ti.i32, keep=PARTICLE)
     kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MAX_IMPULSE)
     kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MAX_IMPULSE)
-    records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the rows below are filled
-    # Pairs of bodies, the smaller index first; zeros in a free row. Grouped by island.
+    records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the pairs below are recorded
+    # Pairs of bodies, grouped by island. The smaller index is first. A free row contains zeros.
     pair_bodies = declare(BODY, ti.i32, 2, each=PAIR_ROWS, start=0)
-    # Impulse on the second body in a step.
+    # Impulse on the second body of the pair in a step.
     pair_impulse = declare(BODY, ti.f32, 3, unit="N s", each=PAIR_ROWS, start=0)
     pairs_lost = declare(WORLD, ti.i32, start=0)  # 1 if pairs were lost because no row was free
     # Bodies placed inside each other: see `kernels/parting.py`.
-    partner_count = declare(BODY, ti.i32, start=0)  # bodies that it overlaps in this step
+    partner_count = declare(BODY, ti.i32, start=0)  # number of bodies that overlap the body in this step
     partner = declare(BODY, ti.i32, each=MAX_PARTNERS)
-    center = declare(BODY, ti.f32, 3, unit="m")  # of mass, after the step
-    displacement = declare(BODY, ti.f32, 3, unit="m")  # of the centre in the step
-    mean_velocity = declare(BODY, ti.f32, 3, unit="m/s")  # of the centre
-    size = declare(BODY, ti.f32, unit="m")  # largest side
+    center = declare(BODY, ti.f32, 3, unit="m")  # centre of mass after the step
+    displacement = declare(BODY, ti.f32, 3, unit="m")  # displacement of the centre in the step
+    mean_velocity = declare(BODY, ti.f32, 3, unit="m/s")  # velocity of the centre
+    size = declare(BODY, ti.f32, unit="m")  # largest side of the bounding box
     mobility = declare(BODY, ti.f32, unit="1/kg")  # inverse mass; 0 if pinned or not moving
     parting_shift = declare(BODY, ti.f32, 3, unit="m")  # sum of the displacements away from all partners
-    parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # change of velocity
+    parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # velocity change that stops the approach

@@ -1,9 +1,9 @@
-"""The Taichi fields of hulls: surfaces for contact, in place of the surfaces of the tetrahedra.
+"""The Taichi fields of hulls. A hull is a contact surface that replaces the surface of a body's tetrahedra.
 
 If any body of a world has a hull, these fields contain the contact surfaces of all bodies. For a body without
 a hull, this is the surface of its tetrahedra. The points of a hull are additional rows of the particle
-fields, after the particles of its body. Contact reads their positions like those of particles, and applies
-impulses and displacements to the particles that carry them.
+fields, after the particles of its body. Contact reads the positions of hull points like those of particles,
+and applies impulses and displacements to the particles that carry the points.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ TOUCHES = 4
 
 
 class HullFields(FieldGroup):
-    """Contact surfaces, and the carriers of their points: the particle itself, or four for a hull point."""
+    """Contact surfaces, and the carriers of their points. Four particles carry a hull point.
+
+    A particle is a point that carries itself.
+    """
 
     owner, when = "contact", "has_hulls"
     # Same meaning as the fields of the same names in `BodyFields`.
@@ -35,37 +38,38 @@ class HullFields(FieldGroup):
     body_points = declare(BODY, ti.i32, 2, start=LOADED)  # range of hull points; empty without a hull
     carriers = declare(PARTICLE, ti.i32, 4, start=LOADED)
     weights = declare(PARTICLE, ti.f32, 4, start=LOADED)
-    # Contacts with colliders in a substep, without gaps for each body: normal and velocity of the collider's
-    # surface; smallest allowed speed of the point along the normal, relative to the surface; signed distance
-    # from the surface at the end of the path from `touch_start` with `touch_start_velocity`.
+    # Contacts of hull points with colliders in a substep, without gaps for each body.
     touch_point = declare(OUTER, ti.i32, each=TOUCHES)
     touch_collider = declare(OUTER, ti.i32, each=TOUCHES)
-    touch_normal = declare(OUTER, ti.f32, 3, each=TOUCHES)
-    touch_surface = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)
+    touch_normal = declare(OUTER, ti.f32, 3, each=TOUCHES)  # normal of the collider's surface
+    touch_surface = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)  # velocity of that surface
+    # Smallest allowed speed of the point along the normal, relative to the surface.
     touch_allowed = declare(OUTER, ti.f32, unit="m/s", each=TOUCHES)
+    # Signed distance from the surface at the end of the path that starts at `touch_start` with
+    # `touch_start_velocity`.
     touch_beyond = declare(OUTER, ti.f32, unit="m", each=TOUCHES)
     touch_start = declare(OUTER, ti.f32, 3, unit="m", each=TOUCHES)
     touch_start_velocity = declare(OUTER, ti.f32, 3, unit="m/s", each=TOUCHES)
     touch_inv_mass = declare(OUTER, ti.f32, unit="1/kg", each=TOUCHES)  # inverse mass of the point
     touch_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=TOUCHES)  # impulse on the point
     touch_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=TOUCHES)
-    # Indices plus 1 of up to two colliders that a point touched in the last substep, 0 for none; and their
-    # impulses on the point. Without a collider, the impulses are undefined.
+    # Indices plus 1 of up to two colliders that a point touched in the last substep; 0 for none. The fields
+    # below contain the impulses of these colliders on the point, and are undefined without a collider.
     held_by = declare(PARTICLE, ti.i32, 2, start=0, keep=PARTICLE)
     held_normal_impulse = declare(PARTICLE, ti.f32, 2, unit="N s", keep=PARTICLE)
     held_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
     held_second_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
-    # For each contact between bodies: velocity that an impulse of 1 N s at one corner of the triangle gives
-    # another corner.
+    # For each contact between bodies: speed that an impulse of 1 N s at one corner of the triangle gives to
+    # each corner.
     slot_mobility = declare(OUTER, ti.f32, (3, 3), unit="1/kg", each=SLOTS, when="has_soft_contact")
 
     @property
     def held_impulses(self) -> list[Any]:
-        """Fields of the impulses with which a substep starts."""
+        """Fields of the impulses from which the contact solver starts in a substep."""
         return [self.held_normal_impulse, self.held_friction_impulse, self.held_second_friction_impulse]
 
     def load(self, loader: Loader, scene: Scene) -> None:
-        """Fill from `scene`."""
+        """Fill the fields from `scene`."""
         points, outer, triangles = [], np.zeros(scene.outer_count), np.zeros((scene.triangle_count, 3))
         used_outer, used_triangles = [], []
         carriers = np.repeat(np.arange(self.carriers.shape[0])[:, None], 4, axis=1)
@@ -92,9 +96,10 @@ class HullFields(FieldGroup):
 def touching_rows(
     body: BodyArrays, place: Ranges
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]:
-    """Contact surface of a body, numbered from its first particle.
+    """Return the contact surface of a body. Indices count from the first particle of the body.
 
-    Returns: particles (k,), triangles (t, 3); carriers of its hull points (h, 4), and their weights (h, 4).
+    Returns: particles, (k,); triangles, (t, 3); carriers of the hull points, (h, 4); weights of the carriers,
+    (h, 4).
     """
     hull = body.hull
     if hull is None:

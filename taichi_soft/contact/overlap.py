@@ -1,5 +1,5 @@
-"""Check that a body does not start inside another, for callers who prefer an error to moving the two
-apart.
+"""Check that a body does not start inside another body. The check raises an error, for callers who do not
+want overlapping bodies to be moved apart.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 INSET = 0.02
-"""Depth, over the mean edge, above which bodies overlap. Contact itself moves shallower bodies apart."""
+"""Depth, relative to the mean edge, above which bodies count as overlapping. At smaller depths, contact moves
+the bodies apart."""
 
 RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
-"""Axes as rows. The third is the direction of the ray that decides whether a point is inside. The ray meets
-no edge or vertex of usual meshes."""
+"""Three perpendicular axes as rows. The third axis is the direction of the ray that decides whether a point
+is inside. A ray in this direction meets no edge or vertex of usual meshes."""
 
 CHUNK = 1 << 19
 """Number of pairs of points and triangles that are compared at once."""
@@ -40,7 +41,7 @@ class Placed(NamedTuple):
 
     @property
     def corners(self) -> Floats:
-        """Corners of the triangles with which the body touches others, (t, 3, 3) [m]."""
+        """Corners of the triangles of the body's contact surface, (t, 3, 3) [m]."""
         hull = self.asset.bound_hull
         if hull is not None:
             return np.asarray(self.asset.touching_points(self.positions)[hull.triangles])
@@ -48,9 +49,9 @@ class Placed(NamedTuple):
 
 
 def require_apart(body: Placed, others: Iterable[Placed]) -> None:
-    """Check that a body starts outside of all other bodies that it can touch.
+    """Check that a body starts outside all other bodies that it can touch.
 
-    Raises: OptionError with the other body that `body` overlaps deepest, and the depth.
+    Raises: OptionError that names the body with the deepest overlap, and the depth.
     """
     deepest, which = 0.0, None
     for other in others:
@@ -67,8 +68,9 @@ def require_apart(body: Placed, others: Iterable[Placed]) -> None:
 
 
 def _depth(body: Placed, other: Placed) -> float:
-    """Return the largest depth of a vertex or tetrahedron centre of `body` in `other` [m]; 0 if none is
-    inside.
+    """Return the largest depth of a vertex or tetrahedron centre of `body` in `other` [m].
+
+    The result is 0 if no vertex and no centre is inside.
     """
     if not len(other.tets):
         return 0.0
@@ -89,7 +91,11 @@ def _depth(body: Placed, other: Placed) -> float:
 
 
 def _is_inside(points: Floats, corners: Floats) -> NDArray[np.bool_]:
-    """Return True for each point from which a ray leaves a closed surface more often than it enters it."""
+    """Return True for each point inside a closed surface, (n,).
+
+    A ray from such a point leaves the surface more often than it enters the surface.
+    Args: points: (n, 3) [m]. corners: corners of the triangles of the surface, (t, 3, 3) [m].
+    """
     seen = corners @ RAY.T - (points @ RAY.T)[:, None, None]
     x, y, z = np.moveaxis(seen, -1, 0)
     areas = np.roll(x, -1, axis=-1) * np.roll(y, -2, axis=-1) - np.roll(x, -2, axis=-1) * np.roll(

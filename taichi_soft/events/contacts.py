@@ -17,10 +17,10 @@ from taichi_soft.events.kinds import ContactBegan, ContactEnded
 
 CONTACT_PAUSE = 0.05
 """Time without an impulse [s] after which a contact ends. Single vertices of a body that rests, rolls or
-slides leave and touch the ground repeatedly; a hop of this duration is 3 mm high."""
+slides leave the ground and touch it again. A hop of this duration is 3 mm high."""
 
 Key = tuple[int, int, int]
-"""Row of `read_touches`: index of a body, kind of the other object, index of that collider or body."""
+"""Row of `read_touches`: index of a body, kind of the other object, index of the other object."""
 
 Vector = tuple[float, float, float]
 
@@ -30,8 +30,8 @@ class _Contact:
     a: SoftBody
     b: Collider | SoftBody
     began: float  # [s], start of the first step with an impulse
-    touched: float  # [s], end of the last step with an impulse, or in which both objects rested
-    pause: float = 0.0  # [s] without an impulse since then, while either object moved
+    touched: float  # [s], end of the last step with an impulse or with both objects at rest
+    pause: float = 0.0  # [s] time since `touched` in which either object moved
     impulse: Vector = (0.0, 0.0, 0.0)  # [N s]
 
     def add(self, impulse: Vector, time: float) -> None:
@@ -41,7 +41,10 @@ class _Contact:
         self.touched, self.pause = time, 0.0
 
     def skip(self, dt: float, time: float, is_moving: bool) -> None:
-        """Count a step without an impulse as pause if either object moves; else the contact continues."""
+        """Count a step without an impulse as pause if either object moves.
+
+        Otherwise, the contact continues.
+        """
         if is_moving:
             self.pause += dt
         else:
@@ -70,12 +73,13 @@ class Contacts:
         time: float,
         dt: float,
     ) -> tuple[list[ContactBegan], list[ContactEnded]]:
-        """Update the contacts after a step. Returns: those that began and those that ended, sorted by key.
+        """Update the contacts after a step.
 
+        Returns: events of the contacts that began, and of the contacts that ended, each sorted by key.
         Args:
-            touches: impulse that the first of each touching pair gave the second [N s].
+            touches: impulse of the first object of each touching pair on the second object [N s].
             handles: returns the two handles of a pair.
-            moving: indices of the bodies that move; between resting objects a contact continues.
+            moving: indices of the bodies that move. A contact between resting objects continues.
             step, time, dt: index of the step; its end [s]; its length [s].
         """
         ended = []

@@ -1,6 +1,7 @@
-"""State on which the events of later steps depend. A snapshot stores it separately from the world's state.
+"""State on which the events of later steps depend.
 
-The two are separate because two worlds in lockstep can record different events.
+A snapshot stores this state separately from the state of the world, because two worlds in lockstep can record
+different events.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
 
 CONTACT_WIDTH = 11
-"""Columns of a contact: key (3), both serial numbers, began, touched, pause [s], impulse (3) [N s]."""
+"""Number of columns of a contact: key (3), serial numbers of both objects (2), `began`, `touched` and `pause`
+[s] (3), impulse [N s] (3)."""
 
 _KINDS = {kind.__name__: kind for kind in STRESS_KINDS}
 
@@ -39,12 +41,12 @@ class WatchEntry:
     kind: type[Event]
     serial: int  # serial number of the body
     threshold: float  # [Pa]
-    is_above: bytes  # one bit for each tetrahedron above the threshold, in kernel order
+    is_above: bytes  # one bit for each tetrahedron in kernel order, 1 above the threshold
 
 
 @dataclass
 class EventState:
-    """State on which later events depend. A field is None if events that need it are not recorded."""
+    """State on which later events depend. A field is None if no recorded event depends on it."""
 
     status: NDArray[np.int32] | None  # status of the body in each slot, after the last step
     contacts: NDArray[np.float64] | None  # active contacts, (k, CONTACT_WIDTH)
@@ -63,7 +65,7 @@ class EventState:
     def of(cls, plain: Any, slots: int) -> EventState:
         """Restore a state from `plain` data, for a world with `slots` slots.
 
-        Raises: ValueError for invalid values; for data of another form, KeyError or TypeError too.
+        Raises: ValueError for invalid values; ValueError, KeyError or TypeError for another data structure.
         """
         status, contacts = plain["status"], from_plain(plain["contacts"])
         if status is not None:

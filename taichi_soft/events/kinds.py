@@ -23,14 +23,14 @@ class Event:
     """An event in a fixed step."""
 
     step: int  # index of the step, from 0
-    time: float  # [s], at the end of that step
+    time: float  # end of that step [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Released(Event):
-    """`Body.set_level` with `release=True` released handles without vertices at the new level.
+    """`Body.set_level` with `release=True` released handles that have no vertices at the new level.
 
-    It happens between steps: `step` is the coming step, and `time` its start.
+    The release happens between steps: `step` is the next step, and `time` is the start of that step.
     """
 
     body: SoftBody  # body whose level of detail changed
@@ -39,14 +39,14 @@ class Released(Event):
 
 @dataclass(frozen=True, eq=False)
 class ContactBegan(Event):
-    """A body began to touch a collider (the floor is one) or another body.
+    """A body began to touch another body or a collider, such as the floor.
 
     `a` is always a soft body. `isinstance(event.b, Collider)` is True for a collider.
     """
 
     a: SoftBody  # the body; of two bodies, the one with the smaller index
     b: Collider | SoftBody  # the collider, or the other body
-    impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; an impact can continue in the next step
+    impulse: Floats  # (3,) impulse on `b` in that step [N s]; an impact can continue in the next step
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,33 +55,34 @@ class ContactEnded(Event):
 
     a: SoftBody  # as in `ContactBegan`
     b: Collider | SoftBody  # as in `ContactBegan`
-    impulse: Floats  # (3,) that `a` gave `b` in total [N s]; none is counted while bodies sleep
-    duration: float  # [s] from the first step with an impulse to the end of the last, or of sleep
+    impulse: Floats  # (3,) total impulse on `b` [N s], except impulses during sleep
+    duration: float  # [s] from the first to the last impulse, or to the end of a rest after the last impulse
 
 
 @dataclass(frozen=True, eq=False)
 class StressExceeded(Event):
-    """Tetrahedra exceeded the von Mises stress given to `Body.watch_stress`.
+    """Tetrahedra exceeded the von Mises stress that was passed to `Body.watch_stress`.
 
-    They are sent only for bodies on which `watch_stress` was called.
+    These events are sent only for bodies on which `watch_stress` was called.
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) that newly exceed the given stress, ascending
+    tetrahedra: Ints  # (k,) tetrahedra that newly exceed the stress, ascending
     stress: Floats  # (k,) von Mises stress [Pa], see `Body.tet_stress`
 
 
 @dataclass(frozen=True, eq=False)
 class TearCandidates(Event):
-    """Tetrahedra exceeded the tensile stress given to `Body.watch_tearing`: tears start there (Rankine).
+    """Tetrahedra exceeded the tensile stress that was passed to `Body.watch_tearing`.
 
-    They are sent only for bodies on which `watch_tearing` was called. They do not tear the body: see `Torn`.
+    By Rankine's criterion, tears start in these tetrahedra. The events are sent only for bodies on which
+    `watch_tearing` was called. An event does not tear the body: see `Torn`.
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) that newly exceed the given stress, ascending
+    tetrahedra: Ints  # (k,) tetrahedra that newly exceed the stress, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
-    normals: Floats  # (k, 3) direction of that stress, which is the normal of the tear; either sign
+    normals: Floats  # (k, 3) direction of that stress, normal to the tear; the sign is arbitrary
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +107,16 @@ class Froze(Event):
 
     @property
     def failure(self) -> Failure | None:
-        """Cause of the failure: `body.failure`, computed on first access; None once the body moves again."""
+        """Cause of the failure, see `Body.failure`; None once the body moves again.
+
+        The cause is computed on first access.
+        """
         return self.body.failure
 
 
 @dataclass(frozen=True, eq=False)
 class Torn(Event):
-    """A body with `Tearing` tore after that step. `Body.cut` sends no event, because the caller knows."""
+    """A body with `Tearing` tore after a step. `Body.cut` sends no event: its caller knows of the cut."""
 
     body: SoftBody  # the largest piece; see `Body.topology_version`
     pieces: tuple[SoftBody, ...]  # new bodies, the largest first; () if the body stays connected

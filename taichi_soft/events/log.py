@@ -14,7 +14,7 @@ from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
 MAX_EVENTS = 10_000
-"""Largest number of events in the queue. Beyond it, the oldest are dropped."""
+"""Largest number of events in the queue. If more events are recorded, the oldest events are dropped."""
 
 _DRAIN_HINT = "call drain_events in every frame, or record fewer kinds"
 
@@ -42,10 +42,10 @@ class EventLog:
         self._kinds: frozenset[type[Event]] = frozenset()
         self._is_recording = False
         self._waiting: deque[Event] = deque()
-        self._delivered = 0  # events in the queue that listeners have received
+        self._delivered = 0  # number of queued events that listeners have received
         self._listeners: list[Listener] = []
         self._is_draining = False
-        self._has_warned = False  # True once a loss was reported since the last drain
+        self._has_warned = False  # True if a loss was reported since the last drain
         self.dropped = 0
 
     def record(self, kinds: Iterable[type[Event]]) -> None:
@@ -58,7 +58,10 @@ class EventLog:
         self._record(recorded)
 
     def _kinds_of(self, kind: Any) -> frozenset[type[Event]]:
-        """Kinds of events that are `kind` or subclasses of it. Raises: see `World.record_events`."""
+        """Return the kinds of events that are `kind` or a subclass of `kind`.
+
+        Raises: see `World.record_events`.
+        """
         is_class = isinstance(kind, type) and issubclass(kind, Event)
         kinds = frozenset(part for part in KINDS if is_class and issubclass(part, kind))
         if not kinds:
@@ -124,7 +127,7 @@ class EventLog:
         return self._observer.save(self._kinds)
 
     def drop_since(self, step: int) -> None:
-        """Drop the queued events of `step`, which was undone, and of later steps."""
+        """Drop the queued events of `step` and of later steps, because these steps were undone."""
         while self._waiting and self._waiting[-1].step >= step:
             self._waiting.pop()
         self._delivered = min(self._delivered, len(self._waiting))
@@ -132,7 +135,7 @@ class EventLog:
     def restore(self, saved: EventState, step: int, lookup: HandleLookup) -> None:
         """Continue after a restored step.
 
-        Args: saved: stored with that step. lookup: handles that the caller holds.
+        Args: saved: state that was stored with the step. lookup: lookup of handles that the caller holds.
         """
         self._observer.restore(self._kinds, saved, step, lookup)
 
@@ -141,7 +144,7 @@ class EventLog:
 
         Args:
             step, time, dt: index of the step; its end [s]; its length [s].
-        Returns: the reason for lost events, at the first loss since a drain; otherwise "".
+        Returns: the reason why events were lost, if this is the first loss since a drain; otherwise "".
         """
         if not self._kinds:
             return ""
@@ -175,10 +178,13 @@ class EventLog:
         return [self._waiting.popleft() for _ in range(delivered)]
 
     def _notify(self, events: list[Event]) -> None:
-        """Send events to all listeners. Raises: the first exception of a listener, after all were called."""
+        """Send events to all listeners.
+
+        Raises: the first exception of a listener, after all listeners were called.
+        """
         self._delivered += len(events)
         self._listeners = [listener for listener in self._listeners if listener.is_active]
-        listeners, errors = tuple(self._listeners), []  # listeners added meanwhile receive later events only
+        listeners, errors = tuple(self._listeners), []  # new listeners receive only later events
         for event in events:
             for listener in listeners:
                 if listener.is_active and isinstance(event, listener.kind):

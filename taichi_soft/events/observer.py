@@ -32,12 +32,12 @@ from taichi_soft.events.watched_stress import StressWatches
 
 
 def touch_rows(room: ContactCapacity, bodies: int) -> int:
-    """Largest number of pairs that can touch in a step."""
+    """Return the largest number of touching pairs that can be read after a step."""
     return bodies * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
 
 
 class Observer:
-    """Finds events by comparing each step with the one before."""
+    """Finds events by comparing the state after each step with the state before the step."""
 
     def __init__(
         self,
@@ -61,10 +61,10 @@ class Observer:
         room = state.capacity.contact
         rows = touch_rows(room, len(slots))
         self._read = np.zeros(len(slots) + 2, dtype=np.int32)  # `status` of `read_touches`
-        self._status = self._read[:-2]  # of each slot, after the last step
+        self._status = self._read[:-2]  # status of the body in each slot after the last step
         self._pairs = np.zeros((rows, 3), dtype=np.int32)
         self._impulses = np.zeros((rows, 3), dtype=np.float32)
-        self.lost_touches = False  # True if more pairs touched in the last step than fit into the rows
+        self.lost_touches = False  # True if too many pairs touched in the last step to record all of them
 
     @property
     def has_contacts(self) -> bool:
@@ -83,7 +83,10 @@ class Observer:
             self._sleepers = self._sleeping()
 
     def warm_up(self) -> None:
-        """Read stresses and touches without recording. Reading clears the touches."""
+        """Read stresses and touches without recording events, so that the kernels are compiled.
+
+        Reading clears the touches.
+        """
         self.stress.warm_up()
         pairs, impulses = np.empty_like(self._pairs), np.empty_like(self._impulses)
         read_touches(self._state, len(self._slots), self._read.copy(), pairs, impulses)
@@ -93,7 +96,10 @@ class Observer:
         self._frozen.append(body)
 
     def events(self, kinds: frozenset[type[Event]], step: int, time: float, dt: float) -> Iterator[Event]:
-        """Yield the events of some kinds in the step that ends at `time` [s], in the order of `KINDS`."""
+        """Yield the events of these kinds in a step, in the order of `KINDS`.
+
+        Args: step, time, dt: index of the step; its end [s]; its length [s].
+        """
         if kinds & (CONTACT_KINDS | SLEEP_KINDS):
             self._read_step()
         else:
@@ -136,7 +142,12 @@ class Observer:
     def restore(
         self, kinds: frozenset[type[Event]], saved: EventState, step: int, lookup: HandleLookup
     ) -> None:
-        """Continue after a restored step, from the state of those kinds that were stored with it."""
+        """Continue after a restored step.
+
+        Args:
+            kinds: kinds of events that are recorded now.
+            saved: state of the kinds that were recorded when `step` was stored.
+        """
         self._frozen = []
         if kinds & CONTACT_KINDS and saved.contacts is not None:
             self._contacts.restore(saved.contacts, lookup)
@@ -167,6 +178,6 @@ class Observer:
         return body, other
 
     def _sleeping(self) -> dict[int, SoftBody]:
-        """Sleeping bodies by their slots, ascending."""
+        """Return the sleeping bodies by slot, in ascending order of the slots."""
         slots = np.flatnonzero(self._status == ASLEEP).tolist()
         return {slot: body for slot in slots if (body := self._slots[slot]) is not None}

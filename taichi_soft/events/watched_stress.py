@@ -1,4 +1,4 @@
-"""Find the tetrahedra of watched bodies that exceed a stress in a step."""
+"""Find the tetrahedra of watched bodies whose stress newly exceeds a threshold in a step."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from taichi_soft.events.event_state import HandleLookup, WatchEntry
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 
 RESET_FRACTION = 0.9
-"""Fraction of a threshold below which the stress must fall before the tetrahedron can exceed it again.
-Without it, a tetrahedron that vibrates about the threshold would exceed it in every other step."""
+"""Fraction of a threshold below which the stress of a tetrahedron must fall before the tetrahedron can exceed
+the threshold again. Otherwise, a tetrahedron that vibrates about the threshold would exceed the threshold in
+every other step."""
 
 VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 """Columns of `read_stress`."""
@@ -30,10 +31,13 @@ VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 class _Watch:
     body: SoftBody
     threshold: float  # [Pa]
-    is_above: NDArray[np.bool_]  # (m,) in kernel order
+    is_above: NDArray[np.bool_]  # (m,) True for tetrahedra above the threshold, in kernel order
 
     def newly_above(self, stress: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Rows of the tetrahedra that newly exceed the threshold. Args: stress: (m,) [Pa]."""
+        """Return the rows of the tetrahedra that newly exceed the threshold, and update `is_above`.
+
+        Args: stress: (m,) [Pa].
+        """
         above = stress > self.threshold
         new = np.flatnonzero(above & ~self.is_above)
         self.is_above &= stress >= RESET_FRACTION * self.threshold
@@ -62,13 +66,16 @@ class StressWatches:
             self._watches[kind, body] = _Watch(body, threshold, self._none_above(body))
         self._arrange()
         if len(self._blocks):
-            self._evaluate()  # so that the kernel is compiled before the game's next step
+            self._evaluate()  # compile the kernel now, not in the game's next step
 
     def _none_above(self, body: SoftBody) -> NDArray[np.bool_]:
         return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)
 
     def renew(self, body: SoftBody) -> None:
-        """Update the watches of a body that lost tetrahedra. Tetrahedra above a threshold count as new."""
+        """Reset the watches of a body that lost tetrahedra.
+
+        Tetrahedra that are still above a threshold count as newly above the threshold.
+        """
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:
                 self.set(kind, body, watch.threshold)
@@ -83,7 +90,10 @@ class StressWatches:
         ]
 
     def restore(self, entries: list[WatchEntry], lookup: HandleLookup) -> None:
-        """Continue from an earlier state. Later watches stay, and tetrahedra above them count as new."""
+        """Restore the watches of an earlier state. Watches that were set later remain.
+
+        Tetrahedra above the threshold of a later watch count as newly above the threshold.
+        """
         if not entries and not self._watches:
             return
         for (_, body), watch in self._watches.items():
@@ -115,14 +125,17 @@ class StressWatches:
         read_stress(self._state, self._program, self._blocks, self._limits, self._read)
 
     def warm_up(self) -> None:
-        """Evaluate the stress of one block without recording it, so that the kernel is compiled."""
+        """Evaluate the stress of one block without recording events, so that the kernel is compiled."""
         read_stress(
             *(self._state, self._program, np.zeros(1, np.int32), np.zeros(1, np.float32)),
             np.empty((LANES, 5), np.float32),
         )
 
     def events(self, kind: type[Event], step: int, time: float) -> Iterator[Event]:
-        """Yield events of one kind in the order of bodies, from the stress that `update` evaluated."""
+        """Yield the events of one kind, body by body, from the stress that `update` evaluated.
+
+        Args: step, time: index of the step; its end [s].
+        """
         for body, span in self._ranges.items():
             watch = self._watches.get((kind, body))
             if watch is None:

@@ -1,8 +1,8 @@
 """Cut bodies along the faces of their tetrahedra (thesis chapter 7).
 
 Tetrahedra are connected only by common particles, so a cut duplicates particles and changes no tetrahedron.
-A copy starts with the position and velocity of its original. The tetrahedra around a particle determine its
-mass. Mass, momentum and elastic energy are therefore conserved.
+A copy starts with the position and velocity of the original particle. The tetrahedra around a particle
+determine the particle's mass. Mass, momentum and elastic energy are therefore conserved.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertice
 Floats = NDArray[np.float64]
 
 MIN_FRAGMENT = 0.02
-"""Smallest fraction of the body's volume at which a piece that is torn off gets its own slot."""
+"""Smallest volume of a torn-off piece that becomes a new body, relative to the volume of the asset. Smaller
+pieces stay in the body."""
 
 
 def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
@@ -65,7 +66,7 @@ def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
 def require_cuttable(body: SoftBody) -> None:
     """Check that a body can be cut.
 
-    Raises: OptionError if its asset does not allow cuts; StateError if the body cannot be cut now.
+    Raises: OptionError if the body's asset does not allow cuts; StateError if the body cannot be cut now.
     """
     context = context_of(body)
     if body.asset.spare_vertices == 0:
@@ -84,7 +85,10 @@ def require_cuttable(body: SoftBody) -> None:
 
 
 def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
-    """Return corners (3, 3) [m] (for a plane, its point three times), the normal, and True for a plane."""
+    """Convert the plane or the triangle of a cut to arrays. Raises: OptionError.
+
+    Returns: three corners, (3, 3) [m], which are all the same point for a plane; normal; True for a plane.
+    """
     if (plane is None) == (triangle is None):
         raise OptionError("pass plane=(point, normal) or triangle=(3, 3), one of the two")
     if triangle is not None:
@@ -103,7 +107,10 @@ def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
 
 
 def _crosses(corners: Floats, normal: Floats, is_plane: bool, a: Floats, b: Floats) -> NDArray[np.bool_]:
-    """True for each segment a-b that crosses the blade, (f,). Args: a, b: end points (f, 3) [m]."""
+    """Return True for each segment that crosses the plane or the triangle, (f,).
+
+    Args: a, b: end points of the segments, (f, 3) [m].
+    """
     height_a, height_b = (a - corners[0]) @ normal, (b - corners[0]) @ normal
     passes = (height_a > 0) != (height_b > 0)
     if is_plane:
@@ -133,7 +140,8 @@ def divide(
 
     Args:
         is_cut: (f,), True for each of `faces` that is cut.
-        keeps_fragments: True to leave small pieces, and pieces for which no slot is free, in the body.
+        keeps_fragments: True to keep small pieces, and pieces for which no slot is free, in the body.
+    Raises: StateError if too few slots are free or a piece does not fit into a slot.
     """
     context, mesh = context_of(body), body.mesh
     assert isinstance(mesh, TetMesh), "other meshes were refused before"
@@ -164,7 +172,10 @@ def divide(
 def _piece(
     body: SoftBody, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> _Piece:
-    """Create the piece that has the given tetrahedra."""
+    """Create the piece that consists of the tetrahedra in `rows`.
+
+    Args: tets, vertices: mesh after the cut, with the original of each vertex.
+    """
     before = record_of(body).description
     assert isinstance(before.mesh, TetMesh)
     used, corners = np.unique(tets[rows], return_inverse=True)
@@ -197,7 +208,10 @@ def require_room(context: Context, slot: int, arrays: BodyArrays) -> None:
 def _write_pieces(
     context: Context, body: SoftBody, pieces: list[_Piece], slots: list[int]
 ) -> tuple[SoftBody, ...]:
-    """Write the first piece into the body's slot, and the others, which are returned, into free slots."""
+    """Write the first piece into the body's slot and the other pieces into free slots.
+
+    Returns: handles of the other pieces.
+    """
     built = context.built
     state = built.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
@@ -247,17 +261,25 @@ def warm_up(context: Context, state: BodyFields, slot: int) -> None:
 def refill_slot(
     context: Context, state: BodyFields, slot: int, level: int = 0, part: BodyArrays | None = None
 ) -> None:
-    """Write an asset's body at rest into a slot that held another body; at a `level`, or only a `part`."""
+    """Write the asset of a slot, at rest, into the slot. Call this if the slot had a different body before.
+
+    Args:
+        level: level of detail of the asset.
+        part: arrays to write in place of those of the whole asset.
+    """
     asset = context.slots.assets[slot].levels[level]
     arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
-    _write_kind(state, slot, asset)  # the previous body can have had another material
+    _write_kind(state, slot, asset)  # the last body in the slot can have had another material
     context.layout.bodies[slot] = arrays
 
 
 def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    """Write the constants of an asset if they differ between its levels of detail, or after a cut."""
+    """Write the constants of an asset into a slot, if they can differ from those of the slot's last body.
+
+    They can differ if the asset has several levels of detail or can be cut.
+    """
     if context.slots.assets[slot].coarser or asset.spare_vertices:
         _write_kind(state, slot, asset)
 
@@ -267,7 +289,7 @@ def _write_kind(state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
 
 
 def kind_numbers(state: BodyFields, asset: SoftBodyAsset) -> NDArray[np.float32]:
-    """Row of an asset for `write_kind`."""
+    """Return the row of an asset for `write_kind`, (7,)."""
     row = [*asset.surface_row[:2], *asset.kind_row(is_implicit=state.capacity.implicit)]
     return np.array(row, dtype=np.float32)
 
@@ -282,12 +304,13 @@ def write_slot(
     model_of: int,
     inverses: NDArray[np.float32] | None,
 ) -> None:
-    """Write a body into a slot while it moves.
+    """Write a body with its motion into a slot.
 
     Args:
-        motion: rows of its vertices, as in `read_motion`.
-        status, model_of: as in `write_body`.
-        inverses: current inverse rest shapes (m, 3, 3), if plasticity can have changed them.
+        motion: rows of the body's vertices, see `read_motion`.
+        status: status of the body, such as `ACTIVE`.
+        model_of: see `write_body`.
+        inverses: current inverse rest shapes, (m, 3, 3), if plasticity can have changed them; otherwise None.
     """
     write_body(state, slot, status, model_of, motion, *body_rows(arrays, inverses))
     write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
@@ -296,7 +319,7 @@ def write_slot(
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:
-    """Return the arguments of `write_body` that follow `motion`. Args: as in `write_slot`."""
+    """Return the arguments of `write_body` that follow `motion`. For the parameters, see `write_slot`."""
     first = _float_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
     present = first if inverses is None else _float_blocks(np.swapaxes(inverses, 1, 2), 9)
     return (

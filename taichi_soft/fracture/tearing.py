@@ -21,12 +21,12 @@ from taichi_soft.meshing.splitting import InnerFaces
 Floats = NDArray[np.float64]
 
 _WORST_FRACTION = 0.9
-"""Fraction of the largest stress from which a face tears. The other faces wait for the next step, after the
-tear has redistributed the load."""
+"""Smallest stress of a face that tears in a step, relative to the largest stress. The other faces are checked
+again in the next step, after the tear has redistributed the load."""
 
 _TIP_FACTOR = 2.0
-"""Factor on the stress at the end of a tear, because the tetrahedra are too coarse to resolve the peak. With
-it, a tear continues before another one begins."""
+"""Factor on the stress at the end of a tear, where the tetrahedra are too coarse to resolve the peak. Because
+of this factor, a tear continues before another tear begins."""
 
 
 class Tears(Slice):
@@ -46,7 +46,7 @@ class Tears(Slice):
         return len(self._limits) > 0
 
     def activate(self, state: BodyFields, program: Program) -> None:
-        """Start checking in a world that is being built, if any of its assets can tear."""
+        """Start to check the bodies of a world that is being built, if any asset can tear."""
         slots = self.context.slots
         if any(asset.tearing for asset in slots.kinds):
             self._limits = np.zeros(len(slots.slots), dtype=np.float32)
@@ -56,14 +56,14 @@ class Tears(Slice):
                 self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
-        """Start checking a body if it can tear, and stop checking the previous body of its slot."""
+        """Check a body in later steps if it can tear, in place of the previous body of its slot."""
         if not self.is_active:
             return
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
     def is_exhausted(self, body: SoftBody) -> bool:
-        """True if a body could tear but has no spare vertices left for it."""
+        """True if a body could tear but has no spare vertices left for a tear."""
         return body.asset.tearing is not None and bool(self._limits[body.index] == 0.0)
 
     def stop(self, body: SoftBody) -> None:
@@ -71,7 +71,7 @@ class Tears(Slice):
         self._limits[body.index] = 0.0
 
     def entries(self) -> list[list[Any]]:
-        """Slots of the bodies that could tear but have no spare vertices left."""
+        """Return the slot of each body that could tear but has no spare vertices left."""
         return [
             [body.index]
             for body in self.context.slots.occupants
@@ -85,21 +85,21 @@ class Tears(Slice):
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[int]:
-        """Read the slots of `entries`. Raises: ValueError for a slot without a body."""
+        """Return the slots in `entries`. Raises: ValueError for a slot without a body that can tear."""
         slots = [below(slot, len(vertex_counts)) for (slot,) in entries]
         if slots and not (self.is_active and all(vertex_counts[slot] for slot in slots)):
             raise ValueError("slots of tears without a body that can tear")
         return slots
 
     def restore(self, read: Any) -> None:
-        """Check all bodies that can tear except the ones in `read`."""
+        """Check all bodies that can tear, except the bodies in the slots of `read`."""
         for body in self.context.slots.occupants:
             self.watch(body)
             if body.index in read:
                 self.stop(body)
 
     def tear(self) -> Iterator[tuple[SoftBody, tuple[SoftBody, ...]]]:
-        """Tear bodies overloaded in the last step. Yields: each torn body, with the pieces it lost."""
+        """Tear the bodies that the last step overloaded. Yields: each torn body, and its separated pieces."""
         if not self.is_active:
             return
         built = self.context.built
@@ -127,7 +127,7 @@ def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1
     corners = _corners(mesh.tets, faces)
-    # Splitting a pinned vertex opens nothing, because its copies are pinned at the same position.
+    # Splitting a pinned vertex opens no gap, because its copies are pinned at the same position.
     overloaded = (pull > tearing.stress) & ~np.isin(corners, body.pinned).any(axis=1)
     if not overloaded.any():
         return ()
@@ -144,7 +144,7 @@ def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
 
 
 def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
-    """Vertices of each face, (f, 3)."""
+    """Return the vertices of each face, (f, 3)."""
     return np.asarray(tets[faces.tets[:, :1], faces.corners[:, 0]])
 
 
@@ -156,9 +156,12 @@ def _select_faces(
     axis: Floats,
     most: int,
 ) -> list[int]:
-    """Select the faces that tear: those with the largest normal stress, without common vertices.
+    """Return the rows of the faces that tear: those with the largest normal stress, without common vertices.
 
-    Args: pull: (f,) largest principal stress [Pa], zero for faces that must not tear.
+    Args:
+        pull: (f,) largest principal stress [Pa], zero for faces that must not tear.
+        axis: (f, 3) direction of this stress.
+        most: largest number of faces.
     """
     overloaded = np.flatnonzero((pull > 0.0) & (pull >= _WORST_FRACTION * pull.max()))
     corners = _corners(tets, faces)

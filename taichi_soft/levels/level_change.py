@@ -1,9 +1,10 @@
 """Change the level of detail of a body, which then continues with more or fewer tetrahedra.
 
-`Passage` maps the positions and velocities after and before the last step, by the same scheme as a skin.
-If the body is free, a shift of its position and a rigid motion added to its velocities then preserve centre
-of mass, momentum and angular momentum to round-off. Deformation finer than the new mesh is lost, with its
-energy. A body that is held stays held at the corresponding vertices of the new mesh.
+`Passage` maps the positions and velocities before and after the last step to the new mesh, by the same scheme
+as a skin. If the body is free, its positions are then shifted and a rigid motion is added to its velocities.
+This preserves centre of mass, momentum and angular momentum to round-off. Deformation that is finer than the
+new mesh is lost with its energy. A body that is held stays held at the corresponding vertices of the new
+mesh.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
 
 
 def reason_against_level_change(body: SoftBody, *, may_release: bool = False) -> str:
-    """Reason why the level of a body cannot change now, with a fix; "" if it can change.
+    """Return the reason why the level of a body cannot change now, with a fix; "" if the level can change.
 
     Args: may_release: True to release handles that the other level cannot keep.
     Raises: StateError if the body or its world was removed.
@@ -106,9 +107,9 @@ def reason_against_level_change(body: SoftBody, *, may_release: bool = False) ->
 def _reattach(
     body: SoftBody, over: Passage, level: int, *, may_release: bool
 ) -> tuple[list[Handle], Ints, Reattachments]:
-    """Find the vertices that stay held at another level, and release the handles that would hold none.
+    """Find the vertices that stay held at another level, and release the handles that cannot be kept there.
 
-    Returns: the released handles; the vertices that will be pinned; the attachments that will hold them.
+    Returns: the released handles; the vertices that will be pinned; the attachments with their vertices.
 
     Raises: StateError if an attachment would hold nothing and `may_release` is False.
     """
@@ -117,7 +118,7 @@ def _reattach(
         if each.prevents_levels and isinstance(each, Numbered):
             released += each.holding(body)
             each.release_body(body)
-    while True:  # a release leaves fewer pinned vertices, so that other attachments can lose theirs
+    while True:  # each release unpins vertices, so that other attachments can lose all vertices
         finest = _finest_held(body)
         held = _nearest_at(body, finest, level)
         reattachments = reattachments_at(body, over, held)
@@ -136,7 +137,13 @@ def _reattach(
 
 
 def _mapped_rows(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:
-    """Rows of `read_motion` for the vertices of the new level. Args: held: vertices that are pinned."""
+    """Return the rows of `read_motion` for the vertices of the new level, (m, MOTION_WIDTH).
+
+    Args:
+        motion: rows of the old level.
+        masses: masses of the new level's vertices, (m,) [kg].
+        held: vertices of the new level that will be pinned.
+    """
     is_pinned, nearest = motion[:, INV_MASS] == 0.0, np.full(len(masses), -1, dtype=np.int32)
     if len(held):
         sources = np.flatnonzero(is_pinned)
@@ -148,7 +155,7 @@ def _mapped_rows(over: Passage, motion: Floats, masses: Floats, held: Ints) -> F
 
 
 def _finest_held(body: SoftBody) -> Ints | None:
-    """Vertices of the finest level that correspond to the vertices pinned now; None if none is pinned."""
+    """Return the vertices of the finest level that correspond to the pinned vertices; None without any."""
     record, present = record_of(body), body.pinned.astype(np.int64)
     if not len(present):
         return None
@@ -156,12 +163,12 @@ def _finest_held(body: SoftBody) -> Ints | None:
         return present
     if record.held is not None and np.array_equal(_nearest_at(body, record.held, record.level), present):
         return record.held
-    # The pinned vertices have changed since then: use the nearest ones of the finest level.
+    # The pinned vertices have changed since `record.held` was stored: find the nearest vertices again.
     return passage(body.asset, record.level, 0).nearest(present)
 
 
 def _nearest_at(body: SoftBody, finest: Ints | None, level: int) -> Ints:
-    """Vertices of a level that are nearest to the given ones of the finest level, ascending."""
+    """Return the vertices of `level` that are nearest to the vertices `finest` of level 0, ascending."""
     if finest is None:
         return np.zeros(0, dtype=np.int64)
     return np.unique(finest if level == 0 else passage(body.asset, 0, level).nearest(finest))

@@ -20,7 +20,7 @@ Ints = NDArray[np.int64]
 class Passage:
     """Map of deformations from one level of detail to another.
 
-    The map is linear, exact for rigid motions, and of second order, as for a skin: see `bodies.skin`.
+    The map is linear, exact for rigid motions and accurate to second order, like a skin: see `bodies.skin`.
     """
 
     def __init__(self, source: SoftBodyAsset, target: SoftBodyAsset) -> None:
@@ -32,8 +32,8 @@ class Passage:
         interpolated = (coordinates[:, :, None] * mesh.vertices[corners]).sum(axis=1)
         offsets = (2.0 * targets - interpolated)[:, None] - mesh.vertices[corners]
         sources, begins, weights = _weights(mesh, corners, coordinates, 0.5 * offsets)
-        self.vertices = source.mesh.vertices, targets  # of source and target, at rest [m]
-        # Source vertices and weights; those of each target vertex start at `begins`.
+        self.vertices = source.mesh.vertices, targets  # source and target vertices at rest [m]
+        # Source vertices and weights. The entries of target vertex i start at row `begins[i]`.
         self.rows: dict[str, NDArray[Any]] = {
             "sources": sources.astype(np.int32),
             "begins": begins.astype(np.int32),
@@ -41,13 +41,13 @@ class Passage:
         }
 
     def nearest(self, vertices: Ints) -> Ints:
-        """Nearest target vertex of each given source vertex, at rest."""
+        """Return the nearest target vertex of each source vertex in `vertices`, at rest."""
         source, target = self.vertices
         squared_distances = ((source[vertices, None] - target) ** 2).sum(axis=2)
         return np.asarray(squared_distances.argmin(axis=1))
 
     def nearest_sources(self, targets: Ints, sources: Ints) -> Ints:
-        """Nearest of the given source vertices for each given target vertex, at rest."""
+        """Return for each target vertex in `targets` the row in `sources` of the nearest vertex, at rest."""
         source, target = self.vertices
         squared_distances = ((target[targets, None] - source[sources]) ** 2).sum(axis=2)
         return np.asarray(squared_distances.argmin(axis=1))
@@ -58,15 +58,15 @@ def _weights(
 ) -> tuple[Ints, Ints, Floats]:
     """Return source vertices (e,), the first row of each of the k target vertices (k,), and weights (e,).
 
-    Each corner of the source tetrahedron contributes its barycentric coordinate, and its gradient from
-    `gradient_rows` times the offset.
+    Each corner of the source tetrahedron contributes its barycentric coordinate. It also contributes its
+    gradient from `gradient_rows`, multiplied by the offset.
 
     Args: coordinates: (k, 4) barycentric coordinates. offsets: (k, 4, 3) offsets from the corners [m].
     """
     neighbours, first, gradients = gradient_rows(mesh)
     n, corner = len(mesh.vertices), corners.ravel().astype(np.int64)
     counts = np.diff(first)[corner]
-    pair = np.repeat(np.arange(len(corner)), counts)  # (corner, neighbour of that corner)
+    pair = np.repeat(np.arange(len(corner)), counts)  # corner of each pair of a corner and a neighbour
     gradient_row = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + first[corner[pair]]
     along = (gradients[gradient_row] * (coordinates[:, :, None] * offsets).reshape(-1, 3)[pair]).sum(axis=1)
     own = coordinates.ravel() - np.bincount(pair, along, len(corner))
@@ -94,7 +94,7 @@ def passage(asset: SoftBodyAsset, source: int, target: int) -> Passage:
 
 
 def prepare(asset: SoftBodyAsset) -> None:
-    """Create all maps and arrays that a change of level needs, because creating them is slow."""
+    """Create all maps and arrays for changes of level in advance, because creating them is slow."""
     for source in range(len(asset.levels)):
         for target in range(len(asset.levels)):
             if source != target:

@@ -1,7 +1,7 @@
-"""Attachments of a body whose level changes: frames hold the nearest vertices of the new mesh.
+"""Keep the attachments of a body when its level changes: frames hold the nearest vertices of the new mesh.
 
-`level_change` pins the vertices that are nearest to the pinned vertices of the old mesh. Each of them then
-belongs to the attachment that held its nearest pinned vertex before.
+`level_change` pins the vertices of the new mesh that are nearest to the pinned vertices of the old mesh. Each
+new pinned vertex then belongs to the attachment that held the nearest old pinned vertex.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ Reattachments = list[tuple[Any, NDArray[np.int32]]]
 
 
 def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments:
-    """Find the vertices that each attachment of a body will hold at another level; there can be none.
+    """Return the attachments of a body, each with the vertices that it will hold at another level.
 
-    Args: held: vertices of that level that will be pinned.
+    An attachment can have no vertices at that level.
+    Args: held: vertices of the other level that will be pinned.
     """
     attachments = context_of(body).of(Frames).holding(body)
     if not attachments:
@@ -40,10 +41,12 @@ def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments
 
 
 def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats) -> None:
-    """Write each vertex's target in its frame, and its reaction of the last step, to rows of `read_motion`.
+    """Write the targets and the reactions of attached vertices to `rows`.
 
-    An attachment's load is divided evenly among its vertices. This keeps the force, and the torque
+    A target is a position in the frame of the attachment. The total reaction of an attachment in the last
+    step is divided evenly among its new vertices. This preserves the force exactly and the torque
     approximately.
+    Args: motion, rows: rows of `read_motion` for the old and the new mesh.
     """
     for attachment, particles in reattachments:
         frame = attachment.frame
@@ -54,6 +57,6 @@ def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats) ->
 
 
 def update_handles(reattachments: Reattachments) -> None:
-    """Store the new vertices in the handles."""
+    """Store the new vertices in the attachments."""
     for attachment, particles in reattachments:
         attachment.particles = particles

@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoint:
-    """The point of all surfaces that is closest to a given point."""
+    """The point on the surfaces that is closest to a given point."""
 
-    body: SoftBody  # body that has the point
+    body: SoftBody  # body on whose surface the closest point lies
     triangle: int | None  # row of body.surface; None for a body without triangles
     vertices: NDArray[np.int32]  # (3,) corners of that triangle, or the nearest vertex three times
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
@@ -38,7 +38,10 @@ def find_closest_point(
     max_distance: float,
     bodies: Iterable[SoftBody] | None,
 ) -> ClosestPoint | None:
-    """Find the closest point of all surfaces, or None. Raises: OptionError, see `World.closest_point`."""
+    """Return the point on the surfaces that is closest to `point`, None if no surface is in range.
+
+    Raises: OptionError, see `World.closest_point`.
+    """
     query = np.empty(4, dtype=np.float32)
     query[:3] = as_vector(point, "point", "m")
     limit = as_max_distance(max_distance)

@@ -1,7 +1,7 @@
-"""Kernels for queries between steps: rays, closest points, overlaps. They do not change the motion.
+"""Kernels for queries between steps: rays, closest points, overlaps. Queries do not change the motion.
 
-Bodies are tested in ascending order, and only a strictly nearer result replaces the best one. In a tie, the
-first face of the first body is therefore returned, for any number of threads.
+Bodies are tested in ascending order, and only a strictly nearer result replaces the best result. In a tie,
+the first face of the first body is therefore returned, for any number of threads.
 """
 
 from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_result
@@ -13,7 +13,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def axes_across(d):
-    """Two axes that complete a unit vector to a right-handed frame, by Duff et al. 2017."""
+    """Return two axes that form a right-handed frame with the unit vector `d` (Duff et al. 2017)."""
     sign = ti.select(d.z < 0.0, -1.0, 1.0)
     s = -1.0 / (sign + d.z)
     right = ti.Vector([1.0 + sign * d.x * d.x * s, sign * d.x * d.y * s, -sign * d.x])
@@ -22,7 +22,11 @@ def axes_across(d):
 
 @ti.func
 def entry_of(lower, upper, inv_direction):
-    """Distance along a ray from the origin to a box [m]; larger than any ray's limit if it misses."""
+    """Return the distance along a ray from its origin to a box [m].
+
+    If the ray misses the box, the result is larger than the limit of any ray.
+    Args: lower, upper: corners of the box relative to the ray's origin [m].
+    """
     slack = 2e-6 * ti.max(ti.abs(lower).max(), ti.abs(upper).max())
     one, other = (lower - slack) * inv_direction, (upper + slack) * inv_direction
     near, far = ti.min(one, other).max(), ti.max(one, other).min()
@@ -42,7 +46,7 @@ def find_hits(
     Args:
         bodies: bodies to test, ascending.
         rays: (n, 8): origin [m], unit direction, largest distance [m], 1 to ignore back faces.
-        hits: (n, 12), see `write_result`; the row of a ray that hits nothing stays unchanged.
+        hits: (n, 12), see `write_result`. The row of a ray that hits nothing stays unchanged.
     """
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
@@ -83,13 +87,13 @@ def find_closest(
     query: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Find the closest point of all surfaces.
+    """Find the point on the surfaces that is closest to a given point.
 
     Args:
         bodies: bodies to test, ascending.
-        query: (4,): point [m] and square of the largest distance [m^2].
-        found: (1, 13): columns of `write_result`, then 1 if the point is inside, else 0. Unchanged if nothing
-            is in range.
+        query: (4,): given point [m] and square of the largest distance [m^2].
+        found: (1, 13): columns of `write_result`, then 1 if the given point is inside the body, else 0. The
+            row stays unchanged if no surface is in range.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -118,7 +122,7 @@ def find_closest(
 
 @ti.func
 def shape_contains(size, is_box, x):
-    """True if a point, in the shape's own axes about its centre, lies in the shape or on its surface."""
+    """True if the point `x` lies in a shape or on its surface. `x` is in the frame of the shape [m]."""
     beyond = (ti.abs(x) - 0.5 * size).max()
     if is_box == 0:
         beyond = x.dot(x) - size.x * size.x
@@ -127,7 +131,7 @@ def shape_contains(size, is_box, x):
 
 @ti.func
 def shape_touches(size, is_box, a, b, c):
-    """True if a triangle, in the shape's own axes about its centre, touches the shape."""
+    """True if a triangle touches a shape. The corners of the triangle are in the frame of the shape."""
     touches = False
     if is_box != 0:
         touches = triangle_touches_box(a, b, c, 0.5 * size)
@@ -151,10 +155,10 @@ def find_overlaps(
 
     Args:
         bodies: indices of the bodies to test.
-        shape: (5, 3): row 0 is the centre [m], rows 1 to 3 are the axes of the box, and row 4 is its size [m]
-            or, in each column, the sphere's radius [m].
-        first_vertex: start in `inside` of each body that overlaps; unchanged for others.
-        inside: 1 for each vertex, in the caller's order, that lies in the shape; unchanged for others.
+        shape: (5, 3): row 0 is the centre [m], rows 1 to 3 are the axes of the box, and row 4 is the size of
+            the box [m]. For a sphere, each column of row 4 is the radius [m].
+        first_vertex: receives the first row in `inside` of each body that overlaps the shape.
+        inside: receives 1 for each vertex in the shape. Vertices are in the caller's order.
     """
     ti.loop_config(serialize=True)
     for row in range(bodies.shape[0]):

@@ -23,11 +23,11 @@ class Overlap:
     """A body that touches a shape."""
 
     body: SoftBody  # the body that overlaps the shape
-    vertices: NDArray[np.int32]  # inside the shape, ascending; empty if only a face or the interior overlaps
+    vertices: NDArray[np.int32]  # vertices in the shape, ascending; empty if only faces or the inside overlap
 
 
 MIN_SIZE = 1e-9
-"""Smallest size of a shape [m]: squares of smaller lengths underflow in float32."""
+"""Smallest size of a shape [m]. The squares of smaller lengths underflow in float32."""
 
 
 def find_in_sphere(
@@ -37,7 +37,7 @@ def find_in_sphere(
     radius: float,
     bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
-    """Find the bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
+    """Return the bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = np.eye(3)
@@ -53,7 +53,7 @@ def find_in_box(
     rotation: Any,
     bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
-    """Find the bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
+    """Return the bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = as_rotation(rotation).T

@@ -15,7 +15,7 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 _UNLIMITED = 3e38
-"""Limit used instead of infinity, which the kernels do not handle [m or m^2]."""
+"""Limit that replaces infinity [m or m^2]. The kernels do not handle infinity."""
 
 
 def as_max_distance(max_distance: float) -> float:
@@ -29,7 +29,10 @@ def as_max_distance(max_distance: float) -> float:
 
 
 def next_above(limit: float) -> float:
-    """Next float32 above a limit: kernels accept only smaller distances, and the limit itself must count."""
+    """Return the next float32 above `limit`.
+
+    Kernels accept only distances below their limit, but a distance equal to `limit` must count too.
+    """
     return float(np.nextafter(np.float32(min(limit, _UNLIMITED)), np.float32(np.inf)))
 
 

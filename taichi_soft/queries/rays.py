@@ -57,7 +57,7 @@ def cast_ray(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHit | None:
-    """Find the first hit of one ray, or None. Raises: OptionError, see `World.raycast`."""
+    """Return the first hit of a ray, None if it hits nothing. Raises: OptionError, see `World.raycast`."""
     rays = np.empty((1, 8), dtype=np.float32)
     rays[0, :3] = as_vector(origin, "origin", "m")
     rays[0, 3:6] = _unit_directions(as_array(direction, "direction", (3,))[None], "direction")
@@ -79,7 +79,7 @@ def cast_rays(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHits:
-    """Find the first hit of each ray. Raises: OptionError, see `World.raycasts`."""
+    """Return the first hit of each ray. Raises: OptionError, see `World.raycasts`."""
     starts = as_array(origins, "origins", (None, 3), "m")
     vectors = as_array(directions, "directions", (len(starts), 3))
     if len(starts) and not np.abs(starts).max() < POSITION_LIMIT:
@@ -102,7 +102,7 @@ def _hits(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> NDArray[np.float32]:
-    """Results of `write_result`, one row for each ray; body -1 for a ray that hits nothing."""
+    """Return a row of `write_result` for each ray, (n, 12). The body is -1 for a ray that hits nothing."""
     if not isinstance(cull_back, (bool, np.bool_)):
         raise OptionError(f"cull_back must be True or False, got {cull_back!r}")
     rays[:, 6] = next_above(as_max_distance(max_distance))
@@ -115,7 +115,8 @@ def _hits(
 
 
 _MIN_PARALLEL_RAYS = 32
-"""Fewest rays for which several threads are used: waking the threads costs as much as about 30 rays."""
+"""Smallest number of rays for which several threads are used. Waking the threads takes as long as about 30
+rays."""
 
 
 def _unit_directions(rows: Floats, name: str) -> Floats:

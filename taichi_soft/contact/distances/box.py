@@ -1,4 +1,4 @@
-"""A box centred on the origin, with edges along the axes."""
+"""Signed distance from a box centred on the origin, with edges along the axes."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
@@ -6,9 +6,9 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def box_distance(parameters, x):
-    """Return signed distance [m] and normal; inside the box, the normal of the nearest face.
+    """Return signed distance [m] and normal. Inside the box, the normal is that of the nearest face.
 
-    Parameters: half of each edge (3) [m].
+    Parameters: half of each edge length (3) [m].
     """
     side = ti.Vector([0.0, 0.0, 0.0])
     for i in ti.static(range(3)):

@@ -21,8 +21,10 @@ def _grid_distance(
     offset: ti.i32,
     x: ti.math.vec3,
 ) -> ti.math.vec4:
-    """Return normal and distance from a solid with a grid. This is a separate function because its code is
-    longer than that of all other solids together.
+    """Return the normal (x, y, z) and the signed distance (w) [m] from a solid with a grid.
+
+    This is a `real_func`, so that its code is not copied to each call: it is longer than the code of all
+    other solids together.
     """
     distance, normal = ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
     if kind == ShapeKind.MESH:
@@ -34,11 +36,10 @@ def _grid_distance(
 
 @ti.func
 def signed_distance(samples: ti.template(), kind, parameters, resolution, offset, x):
-    """Return the distance of a point from the surface of a solid, negative inside, and the outward unit
-    normal there.
+    """Return the signed distance of a point from a solid, and the unit normal of the surface.
 
-    The distance is exact for plane, sphere, box and capsule. For a height field or a mesh it is a lower
-    bound, so that a ray can always advance by it: see `height_field_distance` and `mesh_distance`.
+    The distance is exact for planes, spheres, boxes and capsules. For height fields and meshes, the distance
+    is a lower bound by which a ray can always advance: see `height_field_distance` and `mesh_distance`.
     Args:
         samples: f32 field with the grids of all solids, one after the other.
         kind: a `ShapeKind`.
@@ -46,7 +47,7 @@ def signed_distance(samples: ti.template(), kind, parameters, resolution, offset
         resolution: number of nodes of the solid's grid along each axis, ivec3.
         offset: row of the solid's first sample in `samples`.
         x: point in the frame of the solid, f32 [m].
-    Returns: distance [m] and normal, of length 1 for every x.
+    Returns: distance [m], negative inside; outward normal, of length 1 for every `x`.
     """
     distance, normal = plane_distance(parameters, x)
     if kind == ShapeKind.SPHERE:

@@ -8,14 +8,13 @@ RESTITUTION_SPEED = 0.5
 
 @ti.func
 def resolve_floor(x, v, h, floor):
-    """Return position and velocity of a particle after contact. In this substep it moved to x with velocity
-    v.
+    """Return position and velocity of a particle after contact with the floor in a substep.
 
-    The impulse acts before the drift, so it also shortens the path. Otherwise a particle held by friction
+    The impulse acts before the drift, so it also shortens the path. Otherwise, a particle held by friction
     would creep.
     Args:
-        x: new position [m].
-        v: new velocity [m/s].
+        x: position after the drift, without contact [m].
+        v: velocity during the drift, without contact [m/s].
         h: substep [s].
         floor: height [m], restitution 0 to 1, friction coefficient 0 or more.
     """

@@ -1,7 +1,8 @@
-"""Ground given by heights on a regular grid, with two triangles per cell, solid down to infinity.
+"""Signed distance from ground that is defined by heights on a regular grid, with two triangles per cell.
 
-Within half a cell of the ground, distances are exact: from the triangles around the nearest node. Farther
-away they are lower bounds, so that a ray can advance by them on ground of any slope.
+The ground is solid down to infinity. Within half a cell of the ground, the distance is exact: it is computed
+from the triangles around the nearest node. Farther away, the distance is a lower bound, so that a ray can
+advance by it over ground of any slope.
 """
 
 from taichi_soft.contact.distances.direction import length_and_direction
@@ -10,7 +11,7 @@ from taichi_soft.core.runtime import ti
 
 NEAREST = 1e-3
 """Distance from the ground, in cells, below which rounding makes the direction from the ground inaccurate.
-The normal of the ground is used instead."""
+The distance function then returns the normal of the ground."""
 
 
 @ti.func
@@ -20,13 +21,13 @@ def _height(samples: ti.template(), resolution, offset, i, j):
 
 @ti.func
 def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
-    """Return height and normal of the ground at (u, v), in cells from the first node."""
+    """Return the height [m] and the normal of the ground at (u, v), in cells from the first node."""
     i = ti.max(0, ti.min(resolution[0] - 2, int(u)))
     j = ti.max(0, ti.min(resolution[1] - 2, int(v)))
     s, t = u - i, v - j
     near = _height(samples, resolution, offset, i, j)
     far = _height(samples, resolution, offset, i + 1, j + 1)
-    # The diagonal of a cell runs from its first node to its last.
+    # The diagonal of a cell runs from the cell's first node to its last node.
     side = _height(samples, resolution, offset, i + int(s >= t), j + int(s < t))
     rise = ti.Vector([far - side, side - near])
     if s >= t:
@@ -37,7 +38,7 @@ def _ground(samples: ti.template(), resolution, offset, u, v, spacing):
 
 @ti.func
 def _range_round_node(samples: ti.template(), resolution, offset, i, j):
-    """Return the lowest and the highest height of the nodes of the four cells around node (i, j)."""
+    """Return the smallest and the largest height of the nodes of the four cells around node (i, j) [m]."""
     low = _height(samples, resolution, offset, i, j)
     high = low
     for k in range(9):
@@ -50,23 +51,22 @@ def _range_round_node(samples: ti.template(), resolution, offset, i, j):
 
 @ti.func
 def _vector_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, p, longest):
-    """Return the vector to p from the nearest point of the four cells around node (i, j), if it is shorter
-    than `longest`.
+    """Return the vector to `p` from the nearest point of the four cells around node (i, j) [m].
 
-    p is relative to the node (i, j).
+    `p` is relative to the node. The result is (0, 0, longest) if the vector is not shorter than `longest`.
     """
     vector = ti.Vector([0.0, 0.0, longest])
     base = _height(samples, resolution, offset, i, j)
     own_a, own_b = i - int(p[0] < 0.0), j - int(p[1] < 0.0)
     for k in range(8):
-        # Check the cell below p first, then those of the other cells that can contain a nearer point.
+        # Check the cell below p first, then only the other cells that can contain a nearer point.
         turn_a, turn_b, is_upper = k // 4, k // 2 % 2, k % 2
         a = own_a + turn_a * (2 * (i - own_a) - 1)
         b = own_b + turn_b * (2 * (j - own_b) - 1)
         beside = ti.Vector([turn_a * p[0], turn_b * p[1]])
         is_cell = a >= 0 and b >= 0 and a < resolution[0] - 1 and b < resolution[1] - 1
         if is_cell and beside.norm_sqr() < vector.norm_sqr():
-            c, d = a + 1 - is_upper, b + is_upper  # the corner next to the diagonal
+            c, d = a + 1 - is_upper, b + is_upper  # the corner that is not on the diagonal
             first = ti.Vector([(a - i) * spacing, (b - j) * spacing, 0.0])
             side = ti.Vector([(c - i) * spacing, (d - j) * spacing, 0.0])
             first[2] = _height(samples, resolution, offset, a, b) - base
@@ -83,10 +83,11 @@ def _vector_from_ground(samples: ti.template(), resolution, offset, i, j, spacin
 def height_field_distance(samples: ti.template(), parameters, resolution, offset, x):
     """Return a lower bound of the signed distance [m], and the normal.
 
-    Nothing is solid outside the rectangle. Outside it and above the border, the bound is at least the
-    distance from the border. Outside it and below the border, the bound is at least half a cell, so that
-    bodies touch no walls there and adjacent fields join without a seam.
-    Parameters: spacing, lowest and highest node [m], cosine of the steepest slope.
+    Nothing is solid outside the rectangle. For a point outside, the bound combines the horizontal distance
+    from the rectangle with the bound at the rectangle's nearest point. If this nearest point is below ground,
+    half a cell or more is used as its bound. Bodies therefore touch no walls, and adjacent fields join
+    without a seam.
+    Parameters: spacing [m]; height of the lowest and of the highest node [m]; cosine of the steepest slope.
     """
     spacing, lowest, highest, cosine = parameters[0], parameters[1], parameters[2], parameters[3]
     last = ti.Vector([ti.cast(resolution[0] - 1, ti.f32), ti.cast(resolution[1] - 1, ti.f32)])
@@ -102,7 +103,7 @@ def height_field_distance(samples: ti.template(), parameters, resolution, offset
     side, ground_gap, field_gap = 1.0, x[2] - high, x[2] - highest
     if x[2] < height:
         side, ground_gap, field_gap = -1.0, low - x[2], lowest - x[2]
-    # All ground outside the four cells around the nearest node is at least this far away.
+    # All ground outside the four cells around the nearest node is at least `border` away.
     off_node = ti.Vector([u[0] - i, u[1] - j])
     border = spacing * (1.0 - ti.max(ti.abs(off_node[0]), ti.abs(off_node[1])))
     distance = ti.max(border, field_gap, ti.abs(x[2] - height) * cosine)
@@ -121,8 +122,8 @@ def height_field_distance(samples: ti.template(), parameters, resolution, offset
         slanted = length_and_direction(outwards + distance * normal, across)[1]
         if side < 0.0:
             distance, slanted = ti.max(distance, 0.5 * spacing), across
-        # All of the rectangle lies at 90 degrees or more from `outwards`, seen from the rectangle's nearest
-        # point.
+        # The two distances combine at right angles: at the rectangle's nearest point, all directions into the
+        # rectangle are at 90 degrees or more from `outwards`.
         distance = ti.sqrt(away * away + distance * distance)
         side, normal = 1.0, slanted
     return side * distance, normal

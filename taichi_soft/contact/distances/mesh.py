@@ -1,19 +1,22 @@
-"""A solid given by its signed distance on a grid. The mesh itself is not needed."""
+"""Signed distance from a solid, interpolated on a grid. The mesh of the solid is not needed."""
 
 from taichi_soft.contact.distances.direction import length_and_direction
 from taichi_soft.core.runtime import ti
 
 MARGIN = 2
-"""Smallest distance between the box of a mesh and the border of its grid, in cells."""
+"""Smallest distance between the bounding box of a mesh and the border of its grid, in cells."""
 
 FLATTEST = 1e-3
-"""Gradient of the distance, per cell, below which it has no direction, for example at the centre of a
-solid."""
+"""Smallest slope of the interpolated distance at which a normal is computed. The slope is about 1 near the
+surface, and can be 0 elsewhere, for example at the centre of a solid."""
 
 
 @ti.func
 def _interpolated(samples: ti.template(), resolution, offset, u):
-    """Return the trilinear value at u (in cells from the first node), and its gradient per cell."""
+    """Interpolate the samples trilinearly at `u`, in cells from the first node.
+
+    Returns: the interpolated distance [m], and its gradient [m per cell].
+    """
     base = ti.Vector([0, 0, 0])
     for axis in ti.static(range(3)):
         base[axis] = ti.max(0, ti.min(resolution[axis] - 2, int(u[axis])))
@@ -39,13 +42,13 @@ def _interpolated(samples: ti.template(), resolution, offset, u):
 
 @ti.func
 def mesh_distance(samples: ti.template(), parameters, resolution, offset, x):
-    """Return signed distance [m] and normal, accurate to a fraction of a cell.
+    """Return the signed distance [m], accurate to a fraction of a cell, and the normal.
 
     Interpolated distances are slightly too long near edges and corners: a step by the distance ends at most a
-    tenth of a cell inside the solid. Outside the grid, the distance combines the path to the grid and the
-    distance from there. The two meet at an angle of 90 degrees or more, because the solid's box lies `MARGIN`
-    cells inside the grid.
-    Parameters: first node of the grid (3), cell [m].
+    tenth of a cell inside the solid. Outside the grid, the distance combines the distance to the grid with
+    the interpolated distance at the grid's nearest point. The two paths meet at an angle of 90 degrees or
+    more, because the solid's box lies `MARGIN` cells inside the grid.
+    Parameters: position of the grid's first node (3) [m]; distance between neighbouring nodes [m].
     """
     cell = parameters[3]
     low = ti.Vector([parameters[0], parameters[1], parameters[2]])

@@ -3,13 +3,13 @@
 from taichi_soft.core.runtime import ti
 
 FLATTEST_SQUARED = 1e-8
-"""Square of height over length below which float32 cannot resolve the normal of a triangle. The triangle then
-counts as its edges."""
+"""Squared ratio of a triangle's height to its length below which float32 cannot resolve the normal. Such a
+triangle is treated as three segments."""
 
 
 @ti.func
 def nearest_on_segment(p, a, b):
-    """Return the point of the segment from a to b nearest to p. The segment can have zero length."""
+    """Return the point nearest to `p` on the segment from `a` to `b`, which can have zero length."""
     along = b - a
     t = (p - a).dot(along) / ti.max(along.dot(along), 1e-30)
     return a + ti.max(0.0, ti.min(1.0, t)) * along
@@ -17,7 +17,7 @@ def nearest_on_segment(p, a, b):
 
 @ti.func
 def nearest_on_triangle(p, a, b, c):
-    """Return the point of the triangle abc nearest to p. The triangle can be degenerate."""
+    """Return the point nearest to `p` on the triangle `a`, `b`, `c`, which can be degenerate."""
     normal = (b - a).cross(c - a)
     squared = normal.dot(normal)
     longest = ti.max((b - a).dot(b - a), (c - a).dot(c - a))

@@ -1,4 +1,4 @@
-"""Numbers for the kinds of solids in kernels."""
+"""Numbers by which kernels distinguish the kinds of solids."""
 
 from enum import IntEnum
 
@@ -15,4 +15,4 @@ class ShapeKind(IntEnum):
 
 
 CONVEX = frozenset({ShapeKind.PLANE, ShapeKind.SPHERE, ShapeKind.BOX, ShapeKind.CAPSULE})
-"""Kinds of convex solids, whose signed distances are convex too: see `first_touch`."""
+"""Kinds of convex solids. The signed distance from a convex solid is a convex function: see `first_touch`."""

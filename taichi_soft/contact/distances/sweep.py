@@ -1,7 +1,7 @@
 """Find the first point at which a particle's path touches a collider, by sphere tracing (Hart 1996).
 
-A convex solid lies behind the tangent plane at its nearest point. So the particle can advance to that plane,
-and touches nothing if its path ends in front of the plane.
+A convex solid lies behind the tangent plane at its nearest point. The particle can therefore advance to that
+plane, and touches nothing if its path ends in front of the plane.
 
 Groups of fields: reads colliders.
 """
@@ -11,19 +11,20 @@ from taichi_soft.contact.distances.shape_kind import CONVEX
 from taichi_soft.core.runtime import ti
 
 TOUCHING = 1e-5
-"""Distance from a surface within which a particle rests on it [m]: a few float32 spacings at 10 m."""
+"""Largest distance of a resting particle from a surface [m]. It is a few float32 spacings at 10 m."""
 
 MAX_STEPS = 16
-"""Largest number of steps along a path. Each step is at least this fraction of the path, so that a path along
-the surface ends too. At 30 m/s and 240 substeps per second a step is 8 mm."""
+"""Largest number of steps along a path near a solid that is not convex. Each step is at least 1/16 of the
+path, so that a search along the surface ends too. At 30 m/s and 240 substeps per second, this is 8 mm. Near a
+convex solid, steps can be as short as 1/256 of the path."""
 
 NO_TOUCH = 2.0
-"""Fraction of the path that is returned if the path touches nothing."""
+"""Value that is returned in place of a fraction from 0 to 1 if the path touches nothing."""
 
 
 @ti.func
 def rests_at(distance):
-    """True if a particle at this distance [m] from a surface rests on it, and need not move.
+    """True if a particle at this distance [m] from a surface rests on the surface, and need not be moved.
 
     Moving the particle exactly onto the surface in every substep would also move it along the surface,
     because of rounding. Particles held by friction would then creep and excite vibrations.
@@ -33,8 +34,9 @@ def rests_at(distance):
 
 @ti.func
 def distance_from(colliders: ti.template(), c, x):
-    """Return a lower bound of a point's distance from a collider's skin [m], negative inside. The point is in
-    the collider's frame.
+    """Return a lower bound of a point's distance from a collider's skin [m], negative inside.
+
+    Args: x: the point in the collider's frame [m].
     """
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
@@ -44,15 +46,15 @@ def distance_from(colliders: ti.template(), c, x):
 
 @ti.func
 def first_touch(colliders: ti.template(), c, start, end, slack):
-    """Find how a path meets a collider. All lengths and directions are in the collider's frame [m].
+    """Find the first touch of a path with a collider. Points and directions are in the collider's frame [m].
 
     Args:
-        slack: distance behind the resting position at which the path can end without a touch.
+        slack: distance that the path can end behind the resting position without a touch.
     Returns:
-        part: fraction of the path, 0 to 1, at the first touch, or `NO_TOUCH`.
-        distance: distance from the surface there, negative if the path starts inside [m].
-        beyond: distance of `end` from the tangent plane there, negative [m].
-        normal: normal of the surface there.
+        part: fraction of the path, 0 to 1, at the first touch; `NO_TOUCH` without a touch.
+        distance: distance from the surface at the touch, negative if the path starts inside [m].
+        beyond: signed distance of `end` from the tangent plane at the touch, negative behind it [m].
+        normal: normal of the surface at the touch.
     """
     path = end - start
     length = ti.max(path.norm(), 1e-30)
@@ -83,5 +85,5 @@ def first_touch(colliders: ti.template(), c, start, end, slack):
             if part == 1.0:
                 part, is_open = NO_TOUCH, 0
             else:
-                part = ti.min(part + step, 1.0)  # check the end too: the last step could pass it
+                part = ti.min(part + step, 1.0)  # do not step over the end of the path
     return part, distance, beyond, normal

@@ -1,8 +1,8 @@
 """Broad phase: find the vertices of an island that are near triangles of other bodies or of the same body.
 
-If the boxes of two bodies overlap, the vertices of the first that can be near the second are sorted into a
-grid, which each triangle of the second queries. The candidates of a body stay valid until one of its vertices
-has travelled farther than the margin of the body.
+If the boxes of two bodies overlap, the vertices of the first body that can be near the second body are sorted
+into a grid. Each triangle of the second body then queries this grid. The candidates of a body stay valid
+until one of its vertices has travelled farther than the margin of the body.
 
 Groups of fields: reads hull, islands; writes soft.
 """
@@ -33,7 +33,7 @@ from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
 SEARCH_MARGIN = 1.25
-"""Search margin over the path of the body's fastest vertex until the end of the step."""
+"""Ratio of the search margin to the path of the body's fastest vertex until the end of the step."""
 
 
 SELF_DISTANCE = 1.5
@@ -66,10 +66,10 @@ def _search_triangle(
     margin,
     thickness,
 ):
-    """Add a triangle of `other` to the candidates of the vertices of `body` within `margin` [m] of it.
+    """Add a triangle of `other` to the candidates of the vertices of `body` that are within `margin` [m].
 
-    The grid spans from `lowest` to `highest`. Particles in a joint between the two bodies are skipped, so
-    that contact does not act against the joint.
+    The grid spans from `lowest` to `highest`. If `is_joined` is 1, particles in a joint are skipped, so that
+    contact does not act against the joint.
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
@@ -107,11 +107,12 @@ def _search_triangle(
 
 @ti.func
 def _search_pair(state: ti.template(), body, other, margin, thickness):
-    """Find vertices of `body` within `margin` [m] of triangles of `other`. The bodies touch at `thickness`
-    [m].
+    """Find the vertices of `body` within `margin` [m] of triangles of `other`.
+
+    The bodies touch at a distance of `thickness` [m].
     """
     outer = state.touching.body_outer[body]
-    table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
+    table = ti.Vector([4 * outer[0] + body, outer[0]])  # first rows of `body` in `cell_first` and `item`
     count, lowest, highest, cells, cell = fill_grid(state, table, body, other, margin)
     if count > 0:
         is_joined = are_joined(state, body, other)
@@ -176,9 +177,9 @@ def has_contact_pairs(state: ti.template(), island):
 
 @ti.func
 def is_outdated(state: ti.template(), island, impact_speed, h):
-    """1 if a vertex can travel farther than the margin of its body in the next substep.
+    """1 if a vertex can leave the margin of its body in the next substep.
 
-    Exploding bodies are ignored, so that they cause no searches for others.
+    Exploding bodies are ignored, so that they cause no searches for other bodies.
     Args:
         impact_speed: speed that the island's bodies can gain from impacts [m/s].
         h: substep [s].
@@ -200,12 +201,12 @@ def is_outdated(state: ti.template(), island, impact_speed, h):
 def begin_search(
     state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32
 ):
-    """Update the boxes and the margin of a body for `search_body`. If `forgets` is 1, clear its candidates
-    first.
+    """Update the boxes and the margin of a body before `search_body`.
 
     Args:
         impact_speed: speed that the body can gain from impacts [m/s].
         h, left: substep, and time until the end of the step [s].
+        forgets: 1 to clear the candidates of the body first.
     """
     if forgets == 1:
         clear_candidates(state, body)
@@ -220,10 +221,10 @@ def begin_search(
 
 @ti.real_func
 def update_displacement(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
-    """Update the distance that each vertex has travelled since the last search, without the displacement
-    `shared` by the island [m].
+    """Update the distance of each vertex from its position at the last search.
 
-    The distance is measured between two positions. The length of the path would grow even in a heap at rest.
+    This distance is used because the length of the path would grow even in a heap at rest.
+    Args: shared: displacement of the whole island, which does not count [m].
     """
     particles = state.body_particles[body]
     farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0] & ROW_BITS
@@ -243,7 +244,7 @@ def update_displacement(state: ti.template(), body: ti.i32, shared: ti.math.vec3
                 state.soft.particle_gone[first + lane] = travelled[lane]
                 lane = row_behind(lane)
         farthest = ti.max(farthest, travelled)
-        first = (first + LANES) & ROW_BITS  # as in `row_behind`, block by block
+        first = (first + LANES) & ROW_BITS  # like `row_behind`, but by a block
     state.soft.body_gone[body] = farthest.max()
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):

@@ -1,4 +1,4 @@
-"""Candidates: the triangles near each vertex. The list stays valid until a body has moved too far.
+"""Lists of candidates: the triangles near each vertex. A list stays valid until its body has moved too far.
 
 Groups of fields: reads hull; writes soft.
 """
@@ -13,10 +13,10 @@ SHORTEST, LONGEST = 0.1, 0.3
 
 @ti.real_func
 def clear_candidates(state: ti.template(), body: ti.i32):
-    """Clear the candidates of a body's vertices, and store the impulses of its contacts for the next search.
+    """Clear the candidates of a body's vertices, and store the impulses of its contacts.
 
-    Contacts start from these impulses after the search. Without them, bodies would sag a little in each step,
-    and a heap would never come to rest.
+    After the next search, contacts start from these impulses. Otherwise, bodies would sag a little in each
+    step, and a heap would never come to rest.
     """
     outer = state.touching.body_outer[body]
     vertex = outer[0]
@@ -37,7 +37,7 @@ def clear_candidates(state: ti.template(), body: ti.i32):
 
 @ti.func
 def _farthest_found(soft: ti.template(), k):
-    """Return the row of the farthest triangle found for a vertex."""
+    """Return the row in `found_triangle` of the farthest triangle that the search found for a vertex."""
     farthest = k * FOUND
     row = farthest + 1
     while row < k * FOUND + soft.found_count[k]:
@@ -49,9 +49,10 @@ def _farthest_found(soft: ti.template(), k):
 
 @ti.func
 def insert_candidate(soft: ti.template(), k, triangle, distance):
-    """Insert a triangle into the list of nearest triangles of a vertex.
+    """Insert a triangle into the list of a vertex. A full list drops the farthest triangle.
 
-    Returns: the distance of the triangle that did not fit [m].
+    Args: k: row of the vertex. distance: distance of the triangle from the vertex [m].
+    Returns: distance of the dropped triangle [m]; `NO_CONTACT` if no triangle was dropped.
     """
     row, lost = k * FOUND + soft.found_count[k], ti.cast(NO_CONTACT, ti.f32)
     if soft.found_count[k] == FOUND:
@@ -67,10 +68,11 @@ def insert_candidate(soft: ti.template(), k, triangle, distance):
 
 @ti.func
 def record_lost(state: ti.template(), body, distance, thickness):
-    """Record that a triangle `distance` [m] from a vertex of a body did not fit into its list.
+    """Record that the list of a vertex dropped a triangle, so that the next search starts early enough.
 
-    Bodies touch at `thickness` [m]. The body must be searched again before it has moved by the rest of
-    `distance`.
+    Args:
+        distance: distance between the vertex and the triangle [m].
+        thickness: distance at which the bodies touch [m].
     """
     allowance = ti.max(distance - thickness, 2.0 * SHORTEST * state.body_surface[body].z)
     state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], allowance)
@@ -78,13 +80,11 @@ def record_lost(state: ti.template(), body, distance, thickness):
 
 @ti.func
 def list_candidates(state: ti.template(), body, thickness):
-    """Convert the triangles found for the vertices of a body to candidates, and restore the impulses of their
-    contacts.
+    """Make the triangles that the search found for a body its candidates, and restore contact impulses.
 
-    If there are more triangles than slots of the body, the vertices with the most triangles drop their
-    farthest.
+    If the body has too few slots, each vertex keeps at most its `SLOTS` nearest triangles.
     Args:
-        thickness: largest thickness at which the body touches another [m].
+        thickness: largest distance at which the body touches another body [m].
     """
     outer = state.touching.body_outer[body]
     total, vertex = 0, outer[0]

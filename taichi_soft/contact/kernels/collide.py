@@ -14,13 +14,13 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MAX_TOUCHES = 4
-"""Largest number of colliders that a particle can touch in succession in a substep. Then the particle
-stops."""
+"""Largest number of successive touches of a particle with colliders in a substep. After the last one, the
+particle stops."""
 
 
 INNER_CHECK_PATH = 2.0
 """Path of a body's fastest particle in the rest of the step, in mean edges, above which inner particles are
-checked too. Hard impacts drive inner particles past stopped outer ones."""
+checked too. In a hard impact, inner particles can move past outer particles that have stopped."""
 
 UNCHECKED = 1e30
 """Clearance of inner particles that are not checked [m]."""
@@ -28,17 +28,18 @@ UNCHECKED = 1e30
 
 @ti.func
 def set_travelled(state: ti.template(), body, travelled):
-    """Store the distance that a body has travelled since its near colliders were listed [m]."""
+    """Store the distance [m] that a body has travelled since its near colliders were listed."""
     state.colliders.gone[body] = travelled
 
 
 @ti.func
 def react_on_collider(state: ti.template(), row, arm, impulse):
-    """Apply the opposite of a particle's impulse to a collider.
+    """Apply the reaction of a particle's impulse to a collider.
 
     Args:
         row: row of the pair of body and collider.
-        arm: from the collider's position to the particle [m].
+        arm: vector from the collider's position to the particle [m].
+        impulse: impulse on the particle [N s].
     """
     state.colliders.impulse[row] = state.colliders.impulse[row] - impulse
     state.colliders.angular_impulse[row] = state.colliders.angular_impulse[row] - arm.cross(impulse)
@@ -46,19 +47,19 @@ def react_on_collider(state: ti.template(), row, arm, impulse):
 
 @ti.func
 def in_frame(colliders: ti.template(), c, x, time):
-    """Return a point in the frame that a collider has `time` [s] after the start of the step."""
+    """Transform the point `x` to the frame of a collider, `time` [s] after the start of the step."""
     position = colliders.position[c] + colliders.velocity[c] * time
     return turned_back(spun(colliders.rotation[c], colliders.spin[c] * time), x - position)
 
 
 @ti.func
 def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
-    """Reduce the clearance of particles to their distance from one collider minus the distance by which it
-    can approach [m].
+    """Limit the clearance of each particle by its distance from one collider.
 
+    The distance that the collider can approach until the end of the step is subtracted.
     Args:
-        first, end: rows of outer particles if `outer_only` is 1, otherwise particles.
-        since, left: time since the start of the step, and until its end [s].
+        first, end: range of rows in `outer_particle` if `outer_only` is 1; otherwise, range of particles.
+        since, left: time since the start of the step, and until the end of the step [s].
     """
     colliders = state.colliders
     kind, parameters = colliders.kind[c], colliders.parameters[c]
@@ -66,7 +67,7 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
     position = colliders.position[c] + colliders.velocity[c] * since
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
     margin = colliders.surface[c].z + colliders.speed[c] * left
-    # Fast path for planes: most bodies are near the floor only.
+    # Fast path for planes, because most bodies are near no collider except the floor.
     plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
     is_plane = kind == ShapeKind.PLANE
     for k in range(first, end):
@@ -83,9 +84,10 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
 
 @ti.func
 def _stays_clear(colliders: ti.template(), c, lower, upper, since, left):
-    """True if a collider stays clear of a box until the end of the step.
+    """True if a collider stays outside the box from `lower` to `upper` until the end of the step.
 
-    This also works for planes, which have infinite boxes, because distance functions are lower bounds.
+    The test compares the distance of the box's centre with half of the box's diagonal. It also works for
+    planes, whose own boxes are infinite.
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
     distance = distance_from(colliders, c, in_frame(colliders, c, center, since))
@@ -98,7 +100,7 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
     them.
 
     Args:
-        since, left: time since the start of the step, and until its end [s].
+        since, left: time since the start of the step, and until the end of the step [s].
     """
     outer, particles = state.touching.body_outer[body], state.body_particles[body]
     first = state.particle_position[state.touching.outer_particle[outer[0]]]
@@ -135,14 +137,15 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 
 @ti.func
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
-    """Store the clearance of each particle from the first `count` near colliders, 1 or more.
+    """Store the clearance of each particle from the `count` near colliders, which is 1 or more.
 
-    Planes stop all particles. Otherwise inner particles of a folding body could move below the floor.
+    All particles are checked against planes. Otherwise, inner particles of a folding body could move below
+    the floor.
     """
     colliders, outer, particles = state.colliders, state.touching.body_outer[body], state.body_particles[body]
     for p in range(particles[0], particles[1]):
         colliders.particle_clearance[p] = UNCHECKED
-    touches_by_points = False  # the hull's points collide, not the particles
+    touches_by_points = False  # True if hull points collide instead of particles
     if ti.static(state.capacity.contact.hull):
         touches_by_points = state.hull.body_points[body][0] < state.hull.body_points[body][1]
     if is_deep and not touches_by_points:
@@ -150,7 +153,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
             if colliders.kind[colliders.near[row + i]] != ShapeKind.PLANE:
                 _measure_clearance(state, colliders.near[row + i], particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
-            if colliders.particle_clearance[p] < 0.0:  # entered unchecked: do not eject it at once
+            if colliders.particle_clearance[p] < 0.0:  # do not eject particles that entered unchecked
                 colliders.particle_clearance[p] = UNCHECKED
     for k in range(outer[0], outer[1]):
         colliders.particle_clearance[state.touching.outer_particle[k]] = reach
@@ -179,10 +182,10 @@ def clear_contacts(state: ti.template(), body: ti.i32):
 
 @ti.func
 def collide_particle(state: ti.template(), body, p, h, since):
-    """Collide a particle on the path along which its velocity has just moved it.
+    """Collide a particle with the near colliders on its path in this substep.
 
-    A particle that touches nothing is not changed, so the result does not depend on which colliders are
-    listed.
+    Call this after the drift has moved the particle along the path. A particle that touches nothing is not
+    changed, so the result does not depend on which colliders are listed.
     Args:
         h: substep [s].
         since: time from the start of the fixed step to the start of the substep [s].
@@ -196,7 +199,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
     while is_open == 1:
         earliest, which = ti.cast(NO_TOUCH, ti.f32), -1
         distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
-        # After a touch, the path lies in the surface up to rounding. This is not a second touch.
+        # After a touch, the path follows the surface up to rounding, which must not count as a second touch.
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.colliders.near_count[body]):
             c = state.colliders.near[row + k]
@@ -240,7 +243,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
                 add_normal_impulse(
                     state.colliders, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
                 )
-            # The path also shifts without a change of v, which changes the angular momentum.
+            # Shifting the end of the path changes the angular momentum even if v stays the same.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
             state.colliders.impulse[row + c] = state.colliders.impulse[row + c] + impulse
             moment = state.colliders.angular_impulse[row + c] + angular_impulse

@@ -7,8 +7,8 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 20
-"""Numbers per row of `write_collider_motion`: position, quaternion, velocity, angular velocity, both corners
-of the swept box, highest speed."""
+"""Number of columns of `write_collider_motion`: position, quaternion, velocity, angular velocity, lower and
+upper corner of the swept box, highest speed."""
 
 
 @ti.func
@@ -33,7 +33,7 @@ def write_collider_motion(colliders: ti.template(), rows: ti.types.ndarray(dtype
 
 @ti.kernel
 def write_samples(colliders: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write the grid of one solid, starting at row `begin`."""
+    """Write the grid samples of one solid to the rows from `begin` on."""
     for i in range(samples.shape[0]):
         colliders.samples[begin + i] = samples[i]
 
@@ -42,7 +42,10 @@ def write_samples(colliders: ti.template(), begin: ti.i32, samples: ti.types.nda
 def sum_collider_impulses(
     colliders: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):
-    """Sum the impulses of all bodies on each collider in the last step, (n, 6) [N s, N m s]."""
+    """Sum the impulses of all bodies on each collider in the last step.
+
+    Args: out: receives impulse and angular impulse on each collider, (n, 6) [N s, N m s].
+    """
     ti.loop_config(serialize=True)
     for c in range(out.shape[0]):
         linear, angular = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
@@ -59,7 +62,7 @@ def sum_collider_impulses(
 
 @ti.kernel
 def forget_collider(colliders: ti.template(), body_count: ti.i32, c: ti.i32):
-    """Clear the impulses and rebound speeds in row `c` before another collider uses it."""
+    """Clear the impulses and rebound speeds of collider `c`, before another collider gets this index."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
         row = body * colliders.capacity.colliders + c

@@ -1,9 +1,9 @@
 """Contact solver for the bodies of an island: apply impulses between a vertex and a triangle, pair by pair.
 
-An impulse removes the part of the pair's approach that would close the gap within the substep, and friction
-reduces its sliding. The method is projected Gauss-Seidel over velocities, warm-started with the impulses of
-the last substep. Impulses are equal and opposite. Penetration is corrected by positions, without changing
-velocities.
+The normal impulse removes the part of a pair's approach that would close its gap within the substep. Friction
+reduces the sliding of the pair. The method is projected Gauss-Seidel over velocities, warm-started with the
+impulses of the last substep. Impulses are equal and opposite. Penetration is corrected by changing positions,
+not velocities.
 
 Groups of fields: reads hull, islands; writes soft.
 """
@@ -20,14 +20,15 @@ from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 3
-"""Sweeps over all contacts in a substep. Because of the warm start, eight sweeps do not make heaps calmer."""
+"""Number of sweeps over all contacts in a substep. Because of the warm start, eight sweeps do not make heaps
+calmer."""
 
 POSITION_CORRECTION = 0.2
 """Fraction of a penetration that is corrected in each substep."""
 
 CONTACT_SLOP = 0.25
-"""Fraction of the thickness by which a pair can be too close without a correction. Pairs at rest stay within
-it. Correcting the whole depth would act against the forces that press the pair together, and excite
+"""Penetration, relative to the thickness, that is not corrected. Pairs at rest stay below this limit.
+Correcting the whole depth would act against the forces that press the pair together, and excite
 vibrations."""
 
 
@@ -35,10 +36,11 @@ vibrations."""
 def precompute_contact(state: ti.template(), slot):
     """Compute the terms of a contact that stay constant during the solver's sweeps.
 
-    Friction acts at the vertex, as if the triangle extended to the vertex. With b and g the vertex's
-    barycentric coordinates and their gradients, n the triangle's normal and s the height above it, the
-    triangle's velocity there is sum b v - s sum g (n.v), as in a rigid rotation. Distributing the impulse in
-    the same proportions conserves the angular momentum of the pair at any distance.
+    Friction acts at the vertex, as if the triangle extended to the vertex. The velocity of the triangle there
+    is sum b v - s sum g (n.v), as in a rigid rotation. The symbols are the barycentric coordinates b of the
+    vertex, their gradients g, the velocities v of the corners, the normal n of the triangle and the height s
+    of the vertex above the triangle. Distributing the impulse in the same proportions conserves the angular
+    momentum of the pair at any distance.
     """
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     a, b, c = (
@@ -91,7 +93,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
     The normal impulse removes any approach that would close the gap within `h` [s]. The first sweep repeats
     the impulses of the last substep.
 
-    Returns: 1 if the two are pressed together.
+    Returns: 1 if the vertex and the triangle are pressed together, else 0.
     """
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
@@ -147,7 +149,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
-    """Solve one contact in one sweep. In the last sweep, also correct its penetration."""
+    """Solve one contact in one sweep. In the last sweep, also correct the penetration of the contact."""
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     mine = state.body_surface[state.particle_body[p]]
     theirs = state.body_surface[state.particle_body[corners[0]]]

@@ -1,20 +1,21 @@
-"""Signed distance of a closed mesh at the nodes of a grid. The unit is the cell; node (i, j, k) is at
-(i, j, k).
+"""Signed distance of a closed mesh at the nodes of a grid. The unit of all lengths is the cell, so that node
+(i, j, k) is at (i, j, k).
 """
 
 from taichi_soft.contact.distances.nearest_point import nearest_on_triangle
 from taichi_soft.core.runtime import ti
 
 STEPS = 4096
-"""Lattice steps per cell, to which x and y of the vertices are rounded. With integers, a line along z through
-a node passes an edge on the same side for both triangles of the edge, so that each crossing counts exactly
-once."""
+"""Number of lattice steps per cell. The coordinates x and y of vertices are rounded to integer steps. A line
+along z through a node therefore passes an edge on the same side for both triangles of the edge, so that each
+crossing counts exactly once."""
 
 
 @ti.func
 def _side(ax, ay, bx, by, x, y):
-    """Return twice the area of a, b and (x, y), and whether (x, y) is left of ab. If the area is 0, a point
-    slightly to the right decides.
+    """Return twice the signed area of the triangle a, b, (x, y), and True if (x, y) is left of the line ab.
+
+    If the area is 0, the result is that of a point slightly to the right of (x, y).
     """
     area = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     is_left = area > 0
@@ -29,12 +30,12 @@ def accumulate_crossings(
     heights: ti.types.ndarray(dtype=ti.f64, ndim=2),
     crossings: ti.types.ndarray(dtype=ti.i32, ndim=3),
 ):
-    """Count for each node the crossings of the surface with the segment to the next node up.
+    """Count the crossings of the surface with the segment from each node to the next node above.
 
     Args:
         lattice: x and y of the corners of each triangle in steps, (f, 3, 2).
         heights: z of the corners in cells, (f, 3).
-        crossings: (nx, ny, nz), zeros; receives +1 if the segment leaves the solid, -1 if it enters.
+        crossings: zeros, (nx, ny, nz). Each crossing adds 1 if the segment leaves the solid, -1 if it enters.
     """
     for f in range(lattice.shape[0]):
         ax, ay, bx, by = lattice[f, 0, 0], lattice[f, 0, 1], lattice[f, 1, 0], lattice[f, 1, 1]
@@ -47,19 +48,19 @@ def accumulate_crossings(
                 area_a, left_a = _side(bx, by, cx, cy, x, y)
                 area_b, left_b = _side(cx, cy, ax, ay, x, y)
                 area_c, left_c = _side(ax, ay, bx, by, x, y)
-                # A triangle seen edge-on has no area; its neighbours count the crossing.
+                # A triangle seen edge-on has no area. Its neighbours count the crossing.
                 is_seen = area_a + area_b + area_c != 0
                 if is_seen and left_a == left_b and left_b == left_c:
                     a, b, c = ti.cast(area_a, ti.f64), ti.cast(area_b, ti.f64), ti.cast(area_c, ti.f64)
                     z = (a * heights[f, 0] + b * heights[f, 1] + c * heights[f, 2]) / (a + b + c)
                     below = ti.cast(ti.ceil(z), ti.i32) - 1
-                    # Integer sums do not depend on the order.
+                    # Sums of integers do not depend on the order of the threads.
                     ti.atomic_add(crossings[i, j, below], ti.select(left_a, 1, -1))
 
 
 @ti.func
 def _box_gap_squared(boxes: ti.template(), node, p):
-    """Return the squared distance of p from a box of the tree; 0 inside."""
+    """Return the squared distance of `p` from a box of the tree, 0 inside the box."""
     squared = 0.0
     for axis in ti.static(range(3)):
         gap = ti.max(boxes[node, axis] - p[axis], p[axis] - boxes[node, 3 + axis], 0.0)
@@ -74,9 +75,7 @@ def _corner(corners: ti.template(), f, k):
 
 @ti.func
 def _nearest_squared(corners: ti.template(), boxes: ti.template(), p, reach_squared):
-    """Return the squared distance of p from the nearest triangle, or `reach_squared` if no triangle is
-    nearer.
-    """
+    """Return the squared distance of `p` from the nearest triangle, at most `reach_squared`."""
     leaves = boxes.shape[0] // 2
     nearest = reach_squared
     node = 1
@@ -104,12 +103,12 @@ def compute_grid_distances(
     windings: ti.types.ndarray(dtype=ti.i32, ndim=3),
     distances: ti.types.ndarray(dtype=ti.f32, ndim=3),
 ):
-    """Compute exact distances of all nodes from the nearest triangle, negative inside.
+    """Compute the exact distance of each node from the nearest triangle, negative inside.
 
     Args:
         corners: corners of the triangles, (f, 3, 3).
         boxes: boxes of a binary tree over the triangles, (2 n, 6), see `triangle_tree`.
-        windings: crossings of each segment; receives the winding number of the surface around each node.
+        windings: crossings from `accumulate_crossings`. Receives the winding number around each node.
         distances: receives the distances, (nx, ny, nz).
     """
     for row in range(distances.shape[0] * distances.shape[1]):

@@ -1,11 +1,11 @@
 """Collide hull points with colliders, by impulses on the particles that carry the points.
 
-Many points share carriers: an impulse that stops one point also changes the velocities of its neighbours, and
-can throw them up. So all contacts of a body are solved together, by the same method as contacts between
-bodies: projected Gauss-Seidel over velocities, warm-started with the impulses of the last substep. The
-accumulated impulse of a contact is bounded, not each increment: the sum never pulls, and friction stays
-within Coulomb's cone. So a sweep can revert an impulse that another contact made unnecessary, and points at
-rest stay at rest.
+Many points share carriers. An impulse that stops one point therefore also changes the velocities of its
+neighbours, and can throw them up. All contacts of a body are solved together, by the same method as contacts
+between bodies: projected Gauss-Seidel over velocities, warm-started with the impulses of the last substep.
+The solver bounds the accumulated impulse of a contact, not each increment: the sum never pulls, and friction
+stays within Coulomb's cone. A sweep can therefore revert an impulse that another contact made unnecessary,
+and points at rest stay at rest.
 
 Remaining penetration is corrected by changing positions, not velocities.
 
@@ -28,23 +28,23 @@ from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 3
-"""Sweeps over all contacts of a body in a substep, alternately forwards and backwards."""
+"""Number of sweeps over all contacts of a body in a substep. Forward and backward sweeps alternate."""
 
 POSITION_CORRECTION = 0.3
-"""Fraction of the depth beyond `TOUCHING` that is corrected at each point in a substep. Neighbours with the
-same carriers move too."""
+"""Fraction of the depth beyond `TOUCHING` that is corrected at each point in a substep. A correction also
+moves neighbouring points with the same carriers."""
 
 
 @ti.func
 def clear_warm_start(state: ti.template(), body):
-    """Clear the impulses with which the contacts of a hull with colliders start."""
+    """Clear the impulses from which the contacts of a body's hull with colliders start."""
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
         state.hull.held_by[p] = ti.Vector.zero(ti.i32, 2)
 
 
 @ti.func
 def clear_warm_start_if_free(state: ti.template(), body):
-    """Clear the impulses of the warm start before a step, if nothing touched the body in the last step.
+    """Clear the impulses of the warm start before a step, if no collider touched the body in the last step.
 
     Call this before the impulses of the last step are cleared.
     """
@@ -58,7 +58,10 @@ def clear_warm_start_if_free(state: ti.template(), body):
 
 @ti.func
 def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
-    """Store the contact of a point with the near collider at index `k`. Returns: 1 if they can touch."""
+    """Store the contact of a hull point with the near collider at index `k`, if the two can touch.
+
+    Returns: 1 if the contact was stored, else 0.
+    """
     c = state.colliders.near[body * state.colliders.capacity.colliders + k]
     a = in_frame(state.colliders, c, x, since)
     b = in_frame(state.colliders, c, x + h * v, since + h)
@@ -72,7 +75,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
         centre = state.colliders.position[c] + state.colliders.velocity[c] * after
         surface_velocity = state.colliders.velocity[c] + spin.cross(x + h * v - beyond * n - centre)
         approach = n.dot(surface_velocity - v)
-        # Allow an approach up to the surface. A resting point does not move.
+        # Allow an approach until the point touches the surface. A point at rest is not allowed to approach.
         allowed = ti.select(distance <= TOUCHING, 0.0, ti.min((0.5 * TOUCHING - beyond) / h - approach, 0.0))
         if approach > RESTITUTION_SPEED and surface.y > 0.0:
             allowed = surface.y * approach
@@ -95,7 +98,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
 
 @ti.func
 def _list_touches(state: ti.template(), body, h, since, travelled):
-    """List the contacts of a body's points with colliders, and return their number."""
+    """List the contacts of a body's hull points with colliders. Returns: the number of contacts."""
     first = state.touching.body_outer[body][0] * TOUCHES
     count = 0
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
@@ -117,7 +120,7 @@ def _list_touches(state: ti.template(), body, h, since, travelled):
 
 @ti.func
 def _solve_touch(state: ti.template(), row):
-    """Solve the contact in `row`, once per sweep."""
+    """Solve the contact in `row` for one sweep."""
     p, n = state.hull.touch_point[row], state.hull.touch_normal[row]
     m, friction = (
         state.hull.touch_inv_mass[row],
@@ -140,9 +143,9 @@ def _solve_touch(state: ti.template(), row):
 
 @ti.func
 def _correct_penetration(state: ti.template(), row, h):
-    """Move a point out of a collider if it would be inside after the drift.
+    """Move a hull point out of a collider, if the point would be inside after the drift.
 
-    Returns: the angular momentum that this adds to its body [N m s].
+    Returns: the angular momentum that the correction adds to the body [N m s].
     """
     p, n = state.hull.touch_point[row], state.hull.touch_normal[row]
     x, v = motion_of(state, p)
@@ -157,11 +160,11 @@ def _correct_penetration(state: ti.template(), row, h):
 
 @ti.func
 def _store_impulse(state: ti.template(), body, row, turn, time):
-    """Add the impulse of a contact to its collider, and store it for the next substep.
+    """Add the impulse of a contact to the impulses on its collider, and store it for the next substep.
 
     Args:
-        turn: angular momentum that moving the point out added to the body [N m s].
-        time: time of the impulse since the start of the step [s].
+        turn: angular momentum that `_correct_penetration` added to the body [N m s].
+        time: time from the start of the step to the impulse [s].
     """
     p, c, n = state.hull.touch_point[row], state.hull.touch_collider[row], state.hull.touch_normal[row]
     pair = body * state.colliders.capacity.colliders + c

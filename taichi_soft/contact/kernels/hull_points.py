@@ -1,7 +1,7 @@
-"""Hull points: compute their positions and velocities from the particles that carry them, and distribute
-impulses to these particles.
+"""Compute positions and velocities of hull points from the particles that carry them, and distribute impulses
+to these particles.
 
-In a world without hulls, each particle is a point and carries itself.
+In a world without hulls, each particle is a point that carries itself.
 
 Groups of fields: reads hull, joints.
 """
@@ -12,7 +12,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def motion_of(state: ti.template(), p):
-    """Return position [m] and velocity [m/s] of a particle, or of a hull point from its carriers."""
+    """Return position [m] and velocity [m/s] of a particle or a hull point."""
     x, v = state.particle_position[p], state.particle_velocity[p]
     if ti.static(state.capacity.contact.hull):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
@@ -38,7 +38,7 @@ def inv_mass_at(state: ti.template(), p):
 
 @ti.real_func
 def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
-    """Return the speed that an impulse of 1 N s at one hull point gives to another point of the same body
+    """Return the speed that an impulse of 1 N s at hull point `p` gives to hull point `q` of the same body
     [m/s].
     """
     mobility = ti.cast(0.0, ti.f32)
@@ -62,9 +62,7 @@ def apply_point_impulse(state: ti.template(), p, impulse):
 
 @ti.func
 def shift_point(state: ti.template(), p, impulse):
-    """Displace the carriers of a hull point by the distance that they would move in 1 s after an impulse
-    [N s].
-    """
+    """Displace the carriers of a hull point as far as an `impulse` [N s] would move them in 1 s."""
     who, weights = state.hull.carriers[p], state.hull.weights[p]
     for k in range(4):
         change = weights[k] * inv_mass_of(state, who[k]) * impulse
@@ -99,14 +97,14 @@ def is_held(state: ti.template(), p):
 
 @ti.func
 def has_hull(state: ti.template(), body):
-    """True if a body has a hull, with which it touches others."""
+    """True if a body has a hull, which is then its contact surface."""
     points = state.hull.body_points[body]
     return points[0] < points[1]
 
 
 @ti.func
 def place_points(state: ti.template(), body):
-    """Update the positions of hull points from their carriers."""
+    """Update the positions of a body's hull points from their carriers."""
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x, _ = motion_of(state, p)
@@ -117,7 +115,7 @@ def place_points(state: ti.template(), body):
 def update_points(state: ti.template(), body, common):
     """Update the positions and speeds of a body's hull points from their carriers.
 
-    Returns: the highest speed [m/s], and the highest speed relative to the `common` velocity.
+    Returns: the highest speed [m/s]; the highest speed relative to the `common` velocity [m/s].
     """
     speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     if ti.static(state.capacity.contact.hull):

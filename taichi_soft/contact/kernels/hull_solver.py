@@ -1,7 +1,7 @@
 """Apply impulses between hull points and triangles of hull points, as `contact_solver` does for particles.
 
-A particle is a point that carries itself. Corners of a triangle can share carriers. An impulse at one corner
-then also moves the others, by `HullFields.slot_mobility`.
+A particle is a point that carries itself. The corners of a triangle can share carriers. An impulse at one
+corner then also changes the velocities of the other corners, according to `HullFields.slot_mobility`.
 
 Groups of fields: writes hull, soft.
 """
@@ -33,8 +33,9 @@ def precompute_mobility(state: ti.template(), slot, p, corners):
 
 @ti.func
 def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
-    """Solve one contact of hull points, as `contact_solver` does for particles. Returns: 1 if the two are
-    pressed together.
+    """Solve one contact of hull points, as `contact_solver` does for particles.
+
+    Returns: 1 if the point and the triangle are pressed together, else 0.
     """
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]

@@ -1,7 +1,7 @@
 """Narrow phase: find the candidates that are contacts in this substep, with their gaps and normals.
 
-Candidates within range are listed first, `LANES` at a time, and their gaps are computed in SIMD lanes, as in
-`elastic`. Contacts are then selected vertex by vertex.
+First, the candidates within range are listed. Then their gaps are computed, and contacts are selected vertex
+by vertex. Both passes process `LANES` candidates at a time in SIMD lanes, as in `elastic`.
 
 Groups of fields: reads hull, islands; writes soft.
 """
@@ -15,24 +15,25 @@ from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
 OUTSIDE = 1e-4
-"""Smallest barycentric weight for which the nearest point counts as inside the triangle."""
+"""Smallest barycentric coordinate at which the nearest point counts as inside the triangle."""
 
 SAME_NORMAL = 0.7
-"""Cosine between the normals of two contacts of a vertex above which they count as one contact. So a flat
-surface gives one contact for any triangulation, and a corner gives two."""
+"""Cosine of the angle between the normals of two contacts of a vertex, above which the two count as one
+contact. A flat surface therefore gives one contact for any triangulation, and a corner gives two."""
 
 SAME_NORMAL_INSIDE = 0.95
-"""`SAME_NORMAL` for a vertex inside both triangles, which is in a valley or a dent, or touches two bodies.
-Both sides of a valley must support the vertex. In a dent, several contacts would make it oscillate."""
+"""`SAME_NORMAL` for a vertex whose nearest points lie inside both triangles. Such a vertex is in a valley or
+a dent, or touches two bodies. Both sides of a valley must support the vertex. In a dent, several contacts
+would make the vertex oscillate."""
 
 MIN_ADVANTAGE = 0.01
-"""Fraction of the thickness by which a contact at an edge must be nearer to replace another one that carries
-a load."""
+"""Distance, relative to the thickness, by which a contact at an edge must be nearer than a contact with a
+load in order to replace that contact."""
 
 
 @ti.func
 def _list_near_candidates(state: ti.template(), body, impact_speed, h):
-    """List the candidates of a body that can touch within the substep. Returns: their number.
+    """List the candidates of a body that can touch within the substep. Returns: the number of candidates.
 
     Args:
         impact_speed: speed that either body can gain from impacts [m/s].
@@ -60,10 +61,13 @@ def _list_near_candidates(state: ti.template(), body, impact_speed, h):
 
 @ti.func
 def _measure_gap(state: ti.template(), slot):
-    """Compute the position of a vertex relative to a triangle.
+    """Compute the position of a candidate's vertex relative to its triangle.
 
-    Returns: direction from the triangle; distance [m], negative behind the triangle; weights of the nearest
-    point; 1 if contact is possible. A vertex behind an edge belongs to another triangle, or is outside.
+    Returns: contact normal; distance [m], negative behind the triangle; barycentric coordinates of the
+    nearest point; 1 if contact is possible, else 0.
+
+    Contact is not possible for a vertex behind an edge of the triangle. Such a vertex has contact with
+    another triangle, or is outside.
     """
     who = state.soft.slot_vertices[slot]
     x = state.particle_position[who[0]]
@@ -87,9 +91,10 @@ def _measure_gap(state: ti.template(), slot):
 
 @ti.func
 def _contact_range(state: ti.template(), slot, impact_speed, h):
-    """Return the thickness [m] at which a vertex and a triangle touch, and the distance [m] by which they can
-    approach within the substep. If one of their bodies explodes, the distance is -NO_CONTACT, so that they
-    never touch.
+    """Return the distance [m] at which a vertex and a triangle touch, and the distance [m] by which they can
+    approach each other within the substep.
+
+    If one of the two bodies explodes, the second distance is -NO_CONTACT, so that the two never touch.
     """
     who = state.soft.slot_vertices[slot]
     mine, other = state.particle_body[who[0]], state.particle_body[who[1]]
@@ -110,7 +115,7 @@ def _clear_impulses(soft: ti.template(), slot):
 
 @ti.func
 def _merge_contacts(soft: ti.template(), lost, kept):
-    """End contact `lost` and add its impulses to contact `kept`."""
+    """End the contact in slot `lost` and add its impulses to the contact in slot `kept`."""
     soft.slot_gap[lost] = NO_CONTACT
     soft.slot_normal_impulse[kept] = soft.slot_normal_impulse[kept] + soft.slot_normal_impulse[lost]
     soft.slot_friction_impulse[kept] = soft.slot_friction_impulse[kept] + soft.slot_friction_impulse[lost]
@@ -119,17 +124,16 @@ def _merge_contacts(soft: ti.template(), lost, kept):
 
 @ti.func
 def _merge_duplicate_contacts(soft: ti.template(), first, at, lead):
-    """Merge this contact and earlier ones that push the vertex in the same direction into the nearest of
-    them.
+    """Merge a contact with earlier contacts of the same vertex that have about the same normal.
 
-    The nearest contact inherits the impulses of the others, so that a vertex that crosses an edge stays
-    supported. In front of an edge, the distances to both triangles are equal up to rounding. There, the
-    triangle that carries the load keeps its contact. The other triangle would distribute friction to other
-    corners, and the jolt of each change would prevent heaps from coming to rest.
+    The nearest contact remains and receives the impulses of the others, so that a vertex that crosses an edge
+    stays supported. In front of an edge, the distances to both triangles are equal up to rounding. The
+    triangle that carries the load then keeps its contact. The other triangle would distribute friction to
+    other corners, and the jolt of each change would prevent heaps from coming to rest.
 
     Args:
-        first, at: rows in `near_slot` of the vertex's first contact and of this contact.
-        lead: distance by which another contact must be nearer at an edge [m].
+        first, at: rows in `near_slot` of the vertex's first contact and of the contact to merge.
+        lead: distance by which a contact at an edge must be nearer than a contact with a load [m].
     """
     slot = soft.near_slot[at]
     is_inside = int(soft.slot_weights[slot].min() > OUTSIDE)
@@ -152,10 +156,10 @@ def _is_in_front(state: ti.template(), first, at, slot, depth, behind):
     """1 if a vertex `depth` [m] behind a triangle is nearer to the front of another triangle of the same
     body.
 
-    Such a vertex is outside the body. If a part is thinner than the search range, the triangles on its far
-    side are found as well.
+    Such a vertex is outside the body. If a part of the body is thinner than the search range, a vertex in
+    front of the part also finds the triangles on the far side.
     Args:
-        first, at: rows in `near_slot` of the vertex's first contact and of this contact.
+        first, at: rows in `near_slot` of the vertex's first contact and of the contact in `slot`.
         behind: slot of the vertex's current contact from behind, or -1.
     """
     body, is_outside = state.particle_body[state.soft.slot_vertices[slot][1]], 0
@@ -170,19 +174,20 @@ def _is_in_front(state: ti.template(), first, at, slot, depth, behind):
 def _select_contacts(state: ti.template(), body, count, impact_speed, h):
     """Select contacts among the near candidates.
 
-    A vertex has contact with all triangles that it is in front of. Among the triangles that it is behind, it
-    has contact only with the shallowest, and only if it is not nearer to the front of the same body.
+    A vertex in front of triangles has contact with all of them. A vertex behind triangles has contact only
+    with the nearest of them. This contact is ignored if the vertex is nearer to the front of another triangle
+    of the same body.
 
     Args:
         count: number of near candidates.
-        impact_speed, h: as in `_list_near_candidates`.
+        impact_speed, h: see `_list_near_candidates`.
     """
     first_slot = state.touching.body_outer[body][0] * SLOTS
     vertex, first_row, shallowest, behind = -1, first_slot, ti.cast(-1e30, ti.f32), -1
     for block in range((count + LANES - 1) // LANES):
         first = (first_slot + block * LANES) & ROW_BITS
-        normals = ti.Matrix.zero(ti.f32, LANES, 4)  # normals, and distances
-        feet = ti.Matrix.zero(ti.f32, LANES, 4)  # weights of the nearest point, and if contact is possible
+        normals = ti.Matrix.zero(ti.f32, LANES, 4)  # normals and distances
+        feet = ti.Matrix.zero(ti.f32, LANES, 4)  # weights of nearest points, and 1 if contact is possible
         for lane in range(LANES):
             normal, distance, weights, can_touch = _measure_gap(state, state.soft.near_slot[first + lane])
             for i in ti.static(range(3)):
@@ -227,7 +232,7 @@ def _select_contacts(state: ti.template(), body, count, impact_speed, h):
 
 @ti.real_func
 def find_contacts(state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: ti.f32):
-    """List the contacts of a body's vertices. `impact_speed` and `h` are those of `_list_near_candidates`."""
+    """List the contacts of a body's vertices. For `impact_speed` and `h`, see `_list_near_candidates`."""
     first_slot, before = state.touching.body_outer[body][0] * SLOTS, state.soft.contact_count[body]
     near = _list_near_candidates(state, body, impact_speed, h)
     for k in range(first_slot, first_slot + before):
@@ -246,6 +251,6 @@ def find_contacts(state: ti.template(), body: ti.i32, impact_speed: ti.f32, h: t
             state.soft.contact_slot[first_slot + count] = slot
             count += 1
         else:
-            _clear_impulses(state.soft, slot)  # contacts may have been merged into it before
+            _clear_impulses(state.soft, slot)  # an earlier merge can have added impulses
         near_row = row_behind(near_row)
     state.soft.contact_count[body] = count

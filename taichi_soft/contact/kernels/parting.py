@@ -1,9 +1,10 @@
-"""Move apart bodies that were placed inside each other, before they touch.
+"""Move bodies apart that were placed inside each other.
 
-Contact keeps a vertex on its side of a surface, so bodies placed inside each other would stay there. Each
-step therefore first finds the bodies that overlap newly placed ones. Contact ignores overlapping pairs. At
-the end of the step, they are moved apart as rigid bodies, at a limited speed. Velocities change only to stop
-the approach. As soon as the bodies no longer overlap, contact acts on them again.
+Contact keeps a vertex on its side of a surface, so bodies placed inside each other would stay inside. Each
+step therefore begins with a search for bodies that overlap newly placed bodies. Contact ignores these pairs.
+At the end of the step, the two bodies of a pair are moved apart as rigid bodies, at a limited speed. Their
+velocities change only to stop an approach. As soon as the bodies no longer overlap, contact acts on them
+again.
 
 Groups of fields: reads colliders, hull, islands; writes soft.
 """
@@ -22,18 +23,19 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 PARTING_RATE = 2.0
-"""Relative speed with which two bodies are moved apart, over the largest side of the smaller body [1/s]."""
+"""Relative speed at which two bodies are moved apart, divided by the largest side of the smaller body
+[1/s]."""
 
 OUTSET = 0.5
-"""Clearance, in thicknesses, from which contact acts on two bodies again. Contact then has hardly any
+"""Smallest clearance, in thicknesses, at which contact acts on two bodies again. Contact then has hardly any
 penetration to correct."""
 
 INWARD_SHIFT = 0.05
 """Fraction by which the corners of a triangle are moved towards its centre for the overlap test."""
 
 MIN_CENTER_DISTANCE = 1e-3
-"""Distance of two centres, over the largest side, below which the slots of the bodies determine the
-direction."""
+"""Distance of two centres, relative to the smaller body's largest side, below which the direction is computed
+from the slots of the bodies."""
 
 
 @ti.func
@@ -56,10 +58,11 @@ def _mobility(state: ti.template(), body):
 
 @ti.func
 def _side_of_edge(p, q, a, b):
-    """Return the side of an edge from a to b on which the origin of the plane lies: 1 or -1.
+    """Return the side of an edge from `a` to `b` on which the origin of the plane lies: 1 or -1.
 
-    Both triangles of an edge compute the same product with opposite signs, in the order of the numbers `p`
-    and `q` of its particles. So a ray passes through exactly one of the two triangles for any rounding.
+    The product is computed in the order of the particle numbers `p` and `q`, so that both triangles of the
+    edge get the same product with opposite signs. A ray therefore passes through exactly one of the two
+    triangles for any rounding.
     """
     is_turned = p > q
     first, second = ti.select(is_turned, b, a), ti.select(is_turned, a, b)
@@ -95,9 +98,9 @@ def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
 
 @ti.real_func
 def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f32) -> ti.i32:
-    """1 if a point `depth` [m] below the surface of a body (above if negative) is inside another.
+    """1 if a point `depth` [m] below the surface of `body` (above if negative) is inside `other`.
 
-    For sheets and ropes, which have no inside, the particles are tested.
+    If `body` is a sheet or a rope, which has no inside, its outer particles are tested.
     """
     found = 0
     blocks, triangles = state.body_blocks[body], state.touching.body_triangles[body]
@@ -132,7 +135,9 @@ def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f
 
 @ti.func
 def _overlap(state: ti.template(), a, b):
-    """1 if two bodies overlap by more than `INSET`, or are moved apart and not yet clear by `OUTSET`."""
+    """1 if two bodies overlap by more than `INSET`, or if they are being moved apart and are nearer than
+    `OUTSET`.
+    """
     depth = INSET * ti.min(state.body_surface[a].z, state.body_surface[b].z)
     if state.body_overlap[a] == OVERLAPPING or state.body_overlap[b] == OVERLAPPING:
         depth = -OUTSET * 0.5 * (state.body_surface[a].y + state.body_surface[b].y)
@@ -192,9 +197,7 @@ def find_overlaps(state: ti.template(), island: ti.i32):
 
 @ti.func
 def are_parting(state: ti.template(), body, other):
-    """1 if two bodies overlap and contact ignores them. A body with too many partners touches no other
-    body.
-    """
+    """1 if contact ignores two bodies, because they overlap or because one overlaps too many bodies."""
     count = state.soft.partner_count[body]
     found = int(ti.max(count, state.soft.partner_count[other]) > MAX_PARTNERS)
     for k in range(ti.min(count, MAX_PARTNERS)):
@@ -204,7 +207,7 @@ def are_parting(state: ti.template(), body, other):
 
 @ti.func
 def _measure(state: ti.template(), body):
-    """Compute centre, displacement, velocity and largest side of a body."""
+    """Store centre, displacement, velocity, largest side and mobility of a body, and reset its sums."""
     particles, outer = state.body_particles[body], state.body_outer[body]
     x0 = state.particle_position[particles[0]]
     mass = ti.cast(0.0, ti.f32)
@@ -239,9 +242,9 @@ def _point_of_slot(body):
 
 @ti.func
 def _parting_direction(soft: ti.template(), a, b):
-    """Return the direction from the centre of one body to the centre of the other.
+    """Return the direction from the centre of body `b` to the centre of body `a`.
 
-    If the centres coincide, the direction is horizontal and depends on the slots.
+    If the centres coincide, the direction is horizontal and depends on the slots of the bodies.
     """
     away = soft.center[a] - soft.center[b]
     if away.norm() < MIN_CENTER_DISTANCE * ti.min(soft.size[a], soft.size[b]):
@@ -251,15 +254,15 @@ def _parting_direction(soft: ti.template(), a, b):
 
 @ti.func
 def _part_pair(soft: ti.template(), a, b, gravity, dt):
-    """Add the displacements and velocity changes that move a pair apart to those of its bodies. Momentum is
-    conserved.
+    """Compute the displacements and velocity changes that move two bodies apart, and add them to the sums of
+    the bodies. Momentum is conserved.
     """
     n = _parting_direction(soft, a, b)
     mine, total = soft.mobility[a], soft.mobility[a] + soft.mobility[b]
     share = mine / total
     wanted = PARTING_RATE * ti.min(soft.size[a], soft.size[b]) * dt
     missing = ti.max(wanted - (soft.displacement[a] - soft.displacement[b]).dot(n), 0.0)
-    # Move only the upper body against gravity, because the lower one may lie on something.
+    # Move only the upper body against gravity, because the lower body can rest on a surface.
     up = -gravity / ti.max(gravity.norm(), 1e-30)
     rise = missing * n.dot(up)
     upper_share = share
@@ -278,7 +281,7 @@ def _part_pair(soft: ti.template(), a, b, gravity, dt):
 def _shift_beside_colliders(
     state: ti.template(), body: ti.i32, shift: ti.math.vec3, dt: ti.f32
 ) -> ti.math.vec3:
-    """Reduce the displacement of a body [m] so that none of its particles moves deeper into a collider."""
+    """Return the displacement of a body [m], changed so that no particle moves deeper into a collider."""
     s = shift
     for c in range(state.colliders.count[None]):
         mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
@@ -295,7 +298,7 @@ def _shift_beside_colliders(
 
 @ti.func
 def _distance(state: ti.template(), c, x, time):
-    """Return the distance of a point from a collider's skin [m], and the normal in the collider's frame."""
+    """Return the distance of point `x` from a collider's skin [m], and the normal in the collider's frame."""
     distance, normal = signed_distance(
         state.colliders.samples,
         state.colliders.kind[c],

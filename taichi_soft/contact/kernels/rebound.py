@@ -1,9 +1,9 @@
 """Restitution of a whole body: limit the speed at which its centre of mass leaves a collider.
 
 An elastic body stores the energy of an impact and returns it, independently of the contact law for vertices.
-So Newton's law of restitution is applied to the centre of mass: a body that approaches a collider with speed
-v leaves it with speed e v. The excess is removed by the same change of velocity for all particles. The change
-is limited to the velocity that contact has added, because a collider does not pull.
+Newton's law of restitution is therefore applied to the centre of mass: a body that approaches a collider at
+speed v leaves the collider at speed e v. The same change of velocity for all particles removes the excess
+speed. The change is limited to the velocity that contact has added, because a collider does not pull.
 
 Groups of fields: writes colliders.
 """
@@ -14,13 +14,14 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MIN_REBOUND = 0.1
-"""Speed that the centre of mass always keeps [m/s], so that a flattened body rises again."""
+"""Smallest limit for the speed of the centre of mass [m/s]. This speed lets a flattened body rise again."""
 
 
 @ti.func
 def begin_rebounds(state: ti.template(), body):
-    """Reset the rebound speeds of contacts that ended. Call this before the impulses of the last step are
-    cleared.
+    """Reset the rebound speeds of a body's contacts that ended.
+
+    Call this before the impulses of the last step are cleared.
     """
     row = body * state.colliders.capacity.colliders
     while row < (body + 1) * state.colliders.capacity.colliders:
@@ -42,12 +43,12 @@ def restore_rebounds(state: ti.template(), body):
 
 @ti.func
 def add_normal_impulse(colliders: ti.template(), row, normal_impulse, normal, before, surface):
-    """Accumulate the normal impulse of a collider on a particle, for the restitution of the body.
+    """Add the normal impulse of a collider on a particle to the sums that `limit_rebounds` uses.
 
     Args:
         normal_impulse: impulse along the normal [N s].
-        before, surface: velocities of the particle before the impulse, and of the surface, along the normal
-            [m/s].
+        before: velocity of the particle along the normal before the impulse [m/s].
+        surface: velocity of the surface along the normal [m/s].
     """
     colliders.normal_impulse[row] = colliders.normal_impulse[row] + normal_impulse * normal
     rates = ti.Vector([normal_impulse, normal_impulse * surface, normal_impulse * (surface - before)])
@@ -56,7 +57,7 @@ def add_normal_impulse(colliders: ti.template(), row, normal_impulse, normal, be
 
 @ti.func
 def _momentum_along(state: ti.template(), first, end, n):
-    """Return the mass of the free particles [kg], and their momentum along `n` [kg m/s]."""
+    """Return mass [kg] and momentum along `n` [kg m/s] of the particles that are not pinned."""
     masses, momenta = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
     for block in range((end - first + LANES - 1) // LANES):
         row = (first + block * LANES) & ROW_BITS
@@ -70,7 +71,7 @@ def _momentum_along(state: ti.template(), first, end, n):
 
 @ti.func
 def limit_rebounds(state: ti.template(), body, time):
-    """Limit the velocity of the centre of mass to the restitution, after the collisions of a substep.
+    """Limit the speed at which the centre of mass leaves each collider, after the collisions of a substep.
 
     Args:
         time: time since the start of the fixed step [s].
@@ -89,7 +90,7 @@ def limit_rebounds(state: ti.template(), body, time):
             approach = normal_impulse / mass - speed
             leave = state.colliders.rebound[row]
             if leave == 0.0:
-                # The centre of a rotating body can move away although it never approached.
+                # The centre of a rotating body can move away from a collider without an earlier approach.
                 leave = ti.max(MIN_REBOUND, rates.z / rates.x - approach)
             if approach > RESTITUTION_SPEED:
                 leave = ti.max(leave, state.colliders.surface[c].y * approach)

@@ -8,14 +8,14 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def resolved_velocity(v, normal, surface_velocity, friction, restitution):
-    """Return the velocity after contact with a surface of infinite mass [m/s].
+    """Return the velocity of a particle after contact with a surface of infinite mass [m/s].
 
     Args:
         v: velocity before the contact [m/s].
         normal: outward normal of the surface, of unit length.
         surface_velocity: velocity of the surface at the contact [m/s].
-        friction: coefficient, 0 or more. It bounds the change of the tangential velocity, over the change of
-            the normal velocity.
+        friction: Coulomb coefficient, 0 or more: the largest ratio of the changes of the tangential and the
+            normal velocity.
         restitution: 0 to 1, for impacts faster than `RESTITUTION_SPEED`; negative values count as 0.
     """
     relative = v - surface_velocity

@@ -1,8 +1,8 @@
-"""Record the pairs of bodies that touched in a step, with the sum of their impulses, if contacts are
-recorded.
+"""Record the pairs of bodies that touched in a step, and the sum of the impulses of each pair.
 
-Each island has its own part of the table of pairs, so that threads share no rows. Pairs are found by hashing.
-Reading a row clears it, so the table is empty before the next step.
+This happens only while contact events are recorded. Each island has its own part of the table of pairs, so
+that threads share no rows. Pairs are found by hashing. Reading a row clears the row, so that the table is
+empty before the next step.
 
 Groups of fields: reads colliders, hull, islands; writes soft.
 """
@@ -19,8 +19,9 @@ OF_COLLIDER, OF_BODY = 0, 1
 
 @ti.func
 def _find_pair(soft: ti.template(), first, count, a, b):
-    """Return the row of two bodies in the part of the table that starts at `first`, or -1 if the part is
-    full.
+    """Return the row of bodies `a` and `b` among the `count` rows from `first` on, -1 if all rows are in use.
+
+    A new pair gets a free row.
     """
     start = (a * 40503 + b) & 0x7FFFFFFF
     row, tried = -1, 0
@@ -28,7 +29,7 @@ def _find_pair(soft: ti.template(), first, count, a, b):
         here = first + (start + tried) % count
         tried += 1
         pair = soft.pair_bodies[here]
-        if pair.y == 0:  # no pair has body 0 as its second member
+        if pair.y == 0:  # the row is free: body 0 is never second
             soft.pair_bodies[here] = ti.Vector([a, b])
             row = here
         elif pair.x == a and pair.y == b:
@@ -38,7 +39,7 @@ def _find_pair(soft: ti.template(), first, count, a, b):
 
 @ti.func
 def add_touches(state: ti.template(), island):
-    """Add the impulses of a substep between the bodies of an island to the rows of their pairs."""
+    """Add the impulses between the bodies of an island in a substep to the rows of their pairs."""
     first, last = state.islands.first[island], state.islands.first[island + 1]
     for i in range(first, last):
         body = state.islands.body[i]
@@ -89,11 +90,11 @@ def read_touches(
     """Read the status of all bodies, and the pairs that touched in the last step, in a fixed order.
 
     Args:
-        status: statuses from the last call, or zeros, (bodies + 2,). Receives the current statuses, then 1 if
-            the table was too small for all pairs, then the number of rows written.
-        who: receives a body, `OF_COLLIDER` or `OF_BODY`, and the collider or second body of each pair,
+        status: the array from the last call, or zeros, (bodies + 2,). Receives the current status of each
+            body, then 1 if the table was too small for all pairs, then the number of pairs.
+        who: receives for each pair the body, `OF_COLLIDER` or `OF_BODY`, and the collider or second body,
             (rows, 3).
-        impulses: receives the impulse of the first on the second, (rows, 3) [N s].
+        impulses: receives the impulse of the body on the collider or second body, (rows, 3) [N s].
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -7,19 +7,19 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CELL = 1.5
-"""Edge of a grid cell, over the mean edge of the triangles that query the grid. Values from 1 to 2 are
+"""Edge of a grid cell, relative to the mean edge of the triangles that query the grid. Values from 1 to 2 are
 equally fast in a heap."""
 
 
 MAX_QUERY_EDGES = 64.0
 """Largest extent of a triangle's query along an axis, in mean edges. Larger triangles belong to exploding
-bodies, stretched over kilometres, and are skipped. Otherwise the step that freezes the body would take hours.
-"""
+bodies that extend over kilometres, and are skipped. Otherwise, the step that freezes the body would take
+hours."""
 
 
 @ti.func
 def cell_of(x, lowest, cells, cell):
-    """Return the cell that contains a point, or the nearest cell."""
+    """Return the cell that contains the point `x`, or the nearest cell if `x` is outside the grid."""
     return ti.min(ti.max(ti.cast((x - lowest) / cell, ti.i32), 0), cells - 1)
 
 
@@ -36,7 +36,7 @@ def boxes_overlap(lower, upper, other_lower, other_upper):
 
 @ti.func
 def update_boxes(state: ti.template(), body):
-    """Update the boxes around the surface of a body and around each of its triangles."""
+    """Update the boxes around a body and around each of its triangles, and store the current positions."""
     outer = state.touching.body_outer[body]
     lower = state.particle_position[state.touching.outer_particle[outer[0]]]
     upper = lower
@@ -68,7 +68,7 @@ def update_boxes(state: ti.template(), body):
 
 @ti.func
 def _choose_cells(size, count, smallest):
-    """Return the number of cells along each axis of a grid, at most four per point, and their edge [m].
+    """Return the number of cells along each axis of a grid, and their edge [m]; at most four cells per point.
 
     Args:
         size: size of the grid, vec3 [m]. It must not be negative, or the loop would not end.
@@ -91,7 +91,9 @@ def _choose_cells(size, count, smallest):
 def fill_grid(state: ti.template(), table, body, other, margin):
     """Sort the vertices of `body` within `margin` [m] of the box of `other` into a grid.
 
-    Returns: number of these vertices; box around them; number of cells along each axis, and their edge [m].
+    Returns: number of these vertices; lower and upper corner of the box around them [m]; number of cells
+    along each axis; edge of a cell [m].
+    Args: table: first rows of `body` in `cell_first` and in `item`.
     """
     lower, upper = state.body_bounds_lower[other] - margin, state.body_bounds_upper[other] + margin
     lowest, highest = upper, lower
@@ -117,7 +119,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
                 k = state.soft.item[i]
                 x = state.particle_position[state.touching.outer_particle[k]]
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
-                # The first pass counts up. The second pass counts down to the first row.
+                # The first pass counts the vertices of a cell. The second pass counts down to its first row.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
                 if pass_number == 1:

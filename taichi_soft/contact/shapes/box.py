@@ -21,7 +21,7 @@ class BoxShape(Shape):
 
     Args:
         size: lengths of the edges along x, y and z, (3,) [m].
-    Raises: OptionError.
+    Raises: OptionError for a size out of range.
     """
 
     kind = ShapeKind.BOX
@@ -53,6 +53,6 @@ class BoxShape(Shape):
 
     def surface(self) -> Triangles:
         """Return the triangles of the box, two per face."""
-        import trimesh  # imported here, because it takes half a second
+        import trimesh  # imported here, because the import takes half a second
 
         return triangles_of(trimesh.creation.box(np.asarray(self.size)))

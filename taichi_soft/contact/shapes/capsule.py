@@ -15,13 +15,13 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius", "length")
 @dataclass(frozen=True, eq=False)
 class CapsuleShape(Shape):
-    """A capsule: all points within `radius` of a segment of the z axis, centred on the origin.
+    """A capsule centred on the origin: all points within `radius` of a segment of the z axis.
 
     Args:
         radius: radius of the cylinder and the caps [m].
         length: distance between the centres of the caps [m], 0 or more. The capsule is `length + 2 * radius`
             long.
-    Raises: OptionError.
+    Raises: OptionError for a radius or a length out of range.
     """
 
     kind = ShapeKind.CAPSULE
@@ -52,7 +52,7 @@ class CapsuleShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return triangles that approximate the capsule. Their vertices lie on it."""
-        import trimesh  # imported here, because it takes half a second
+        """Return triangles that approximate the capsule. Their vertices lie on the capsule."""
+        import trimesh  # imported here, because the import takes half a second
 
         return triangles_of(trimesh.creation.capsule(self.length, self.radius, count=(32, 32)))

@@ -15,14 +15,15 @@ from taichi_soft.meshing.advice import scene_hint, with_install_hint
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices
 
 FLATTEST = 1e-9
-"""Volume over the cube of the longest side, below which the volume is only rounding."""
+"""Smallest volume of a mesh, relative to the cube of its longest side. A smaller volume can be a rounding
+error."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedMesh:
     """A closed surface of triangles, which separates inside from outside."""
 
-    vertices: FloatArray  # (n, 3) [m], all different
+    vertices: FloatArray  # (n, 3) [m], without duplicates
     triangles: IntArray  # (f, 3), counterclockwise seen from outside
 
     @property
@@ -35,7 +36,8 @@ def closed_mesh(source: Any) -> ClosedMesh:
     """Return the surface of a trimesh.Trimesh or TetMesh, or of a pair (vertices, triangles).
 
     Vertices at the same position are merged. Triangles that become lines are removed.
-    Raises: MeshError for anything else, and if the surface is open, faces inward or encloses no volume.
+    Raises: MeshError if `source` is none of these, or if its surface is open, faces inward or encloses no
+    volume.
     """
     vertices, triangles = _arrays(source)
     points = as_points(vertices)
@@ -65,8 +67,9 @@ def _arrays(source: Any) -> tuple[Any, Any]:
 
 
 def _require_closed(triangles: IntArray, numbers: NDArray[Any]) -> None:
-    """Raise a MeshError unless each edge is used equally often in both directions, so that the surface has no
-    border.
+    """Check that the surface has no border: its triangles use each edge equally often in both directions.
+
+    Raises: MeshError.
     """
     ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     pairs, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)

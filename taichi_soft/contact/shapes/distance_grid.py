@@ -22,17 +22,17 @@ DEFAULT_CELL_COUNT = 64
 """Default number of cells along the longest side of the mesh."""
 
 MAX_NODES = 2_000_000
-"""Largest number of nodes of a grid: 8 MB, and a few seconds to compute."""
+"""Largest number of nodes of a grid. Such a grid takes 8 MB and is computed in a few seconds."""
 
 MAX_LOST = 0.1
-"""Largest fraction of the surface behind which the grid can lack solid. Any grid loses the outer cells of
-sharp edges."""
+"""Largest fraction of the surface that can have no solid behind it on the grid. The limit is not 0, because
+every grid loses the outer cells of sharp edges."""
 
 DEPTHS = (0.5, 1.0)
-"""Depths below the surface, in cells, at which the grid must be solid."""
+"""Depths below the surface, in cells. The grid must be solid at one of these depths at least."""
 
 SHALLOWEST = 0.05
-"""Smallest depth, in cells, at which a sample counts as solid."""
+"""Smallest interpolated depth, in cells, at which a sample counts as solid."""
 
 # Barycentric coordinates of ten points spread evenly over a triangle.
 SHARES: NDArray[np.float64] = (
@@ -44,13 +44,13 @@ SHARES: NDArray[np.float64] = (
 class Grid:
     """A grid with equal spacing along all axes."""
 
-    origin: NDArray[np.float64]  # first node (3,) [m]
-    cell: float  # [m]
+    origin: NDArray[np.float64]  # position of the first node, (3,) [m]
+    cell: float  # distance between neighbouring nodes [m]
     resolution: tuple[int, int, int]  # number of nodes along each axis
 
 
 def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
-    """Return the grid for a mesh, with the default cell if `cell` is None.
+    """Return the grid for a mesh. Neighbouring nodes are `cell` [m] apart; None uses the default.
 
     Raises: OptionError for a bad cell, MeshError for too many nodes.
     """
@@ -71,17 +71,16 @@ def grid_around(mesh: ClosedMesh, cell: Any) -> Grid:
 
 
 def _node_counts(size: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
-    # Rounded, so that rounding errors add no cell to a side of a whole number of cells.
+    # A rounding error must not add a cell to a side that is a whole number of cells long.
     counts: NDArray[np.float64] = np.ceil(np.round(size / cell, 6)) + 1 + 2 * MARGIN
     return counts
 
 
 def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
-    """Compute the signed distance of each node, negative inside, (nx, ny, nz) [m]. Starts Taichi if
-    necessary.
+    """Compute the signed distance of each node from the mesh, negative inside, (nx, ny, nz) [m].
 
-    A node is inside if the surface winds around it once or more.
-    Raises: MeshError for a part that is inside out, or for walls too thin for the grid.
+    A node is inside if the surface winds around it once or more. Taichi is started if necessary.
+    Raises: MeshError if a part of the mesh is inside out, or if walls are too thin for the grid.
     """
     init()
     corners = ((mesh.vertices - grid.origin) / grid.cell)[mesh.triangles]
@@ -109,7 +108,10 @@ def _place(windings: NDArray[np.int32], grid: Grid) -> list[float]:
 
 
 def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float32], grid: Grid) -> None:
-    """Raise a MeshError if the grid lacks solid behind too much of the surface."""
+    """Raise a MeshError if more than the fraction `MAX_LOST` of the surface has no solid behind it.
+
+    Args: corners: corners of the triangles, (f, 3, 3), in cells. distances: distances of the nodes, in cells.
+    """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
     corners, normals, areas = corners[areas > 0], normals[areas > 0], areas[areas > 0]
@@ -130,7 +132,7 @@ def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float
 
 
 def _interpolated(distances: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return trilinear interpolations of `distances` at `places` (n, 3) within the grid, in cells."""
+    """Return the trilinear interpolation of `distances` at `places` (n, 3), (n,). The unit is the cell."""
     base = np.floor(places).astype(np.int64)
     value = np.zeros(len(places))
     for corner in product((0, 1), repeat=3):

@@ -36,7 +36,7 @@ def cache_folder() -> Path:
 
 
 def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
-    """Return a hash of everything that affects the distances."""
+    """Return a hash of the mesh and the spacing, which determine all distances."""
     digest = hashlib.sha256(VERSION)
     for array in (mesh.vertices.astype("<f8"), mesh.triangles.astype("<i4"), np.array([grid.cell], "<f8")):
         digest.update(len(array).to_bytes(8, "little") + array.tobytes())
@@ -56,7 +56,7 @@ def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
 
 
 def write_grid(key: str, distances: NDArray[np.float32]) -> None:
-    """Store distances. If that fails, do nothing: the next start computes them again."""
+    """Store distances on disk. A failure is ignored: the next start computes the distances again."""
     payload = distances.astype("<f4").tobytes()
     path = _path(key)
     with contextlib.suppress(OSError):

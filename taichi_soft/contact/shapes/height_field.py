@@ -1,4 +1,4 @@
-"""The shape of ground that is given by heights on a grid."""
+"""The shape of ground, defined by heights on a grid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import read_only
 
 MAX_NODES = 20_000_000
-"""Largest number of nodes of a grid: 80 MB. A square of 4,097 x 4,097 nodes fits."""
+"""Largest number of nodes of a grid. They take 80 MB. A square of 4,097 x 4,097 nodes is possible."""
 
 
 @serialised("heights", "spacing")
@@ -64,18 +64,18 @@ class HeightFieldShape(Shape):
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Number of nodes along x and y, and 1."""
+        """Number of nodes along x, along y, and 1 for z."""
         nx, ny = np.shape(self.heights)
         return (nx, ny, 1)
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """Heights of the nodes, row by row."""
+        """Heights of the nodes [m], y fastest, float32 (k,)."""
         return np.asarray(self.heights).reshape(-1)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of the bounding box, (2, 3) [m]; infinite downwards."""
+        """Lower and upper corner of the bounding box, (2, 3) [m]. The lower corner is at z = -infinity."""
         half = (np.array(np.shape(self.heights)) - 1) * self.spacing / 2
         top = float(np.max(self.heights))
         corners: NDArray[np.float64] = read_only(np.array([[*-half, -np.inf], [*half, top]]))

@@ -28,10 +28,10 @@ class MeshShape(Shape):
     """The solid inside a closed mesh, stored as its signed distance on a grid.
 
     Distances are accurate to a fraction of a cell, and edges are rounded by the same amount. Parts thinner
-    than two cells can be lost. A mesh that would lose more than a tenth of its surface is refused.
+    than two cells can be lost. A mesh that would lose more than a tenth of its surface raises a MeshError.
     Args:
         mesh: a trimesh.Trimesh, a TetMesh (its surface at rest) or (vertices (n, 3) [m], triangles (m, 3)),
-            counterclockwise seen from outside. Parts can overlap.
+            counterclockwise seen from outside. Parts of the mesh can overlap.
         cell: spacing of the grid [m]. The grid can have up to 2,000,000 nodes. None uses a 64th of the
             longest side.
         cache: True stores the grid on disk for the next start, in $TAICHI_SOFT_CACHE or the user's cache
@@ -90,7 +90,7 @@ class MeshShape(Shape):
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the depth of points below the surface, from the grid, (n,) [m], negative outside.
+        """Return the depth of points below the surface, interpolated on the grid, (n,) [m], negative outside.
 
         Args:
             points: points in the frame of the shape, (n, 3) [m].

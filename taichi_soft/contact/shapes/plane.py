@@ -18,11 +18,11 @@ from taichi_soft.meshing.arrays import read_only
 @serialised("normal")
 @dataclass(frozen=True, eq=False)
 class PlaneShape(Shape):
-    """A plane through the origin, solid below.
+    """The solid half-space below a plane through the origin.
 
     Args:
         normal: direction away from the solid, (3,), of any length.
-    Raises: OptionError for a normal without direction.
+    Raises: OptionError for a normal shorter than 1e-9.
     """
 
     kind = ShapeKind.PLANE
@@ -41,7 +41,7 @@ class PlaneShape(Shape):
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Bounds that are infinite in all directions, (2, 3)."""
+        """Lower and upper corner of the bounds, infinite in all directions, (2, 3) [m]."""
         return about_origin((np.inf, np.inf, np.inf))
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ class PlaneShape(Shape):
         return depths
 
     def surface(self, size: float = 20.0) -> Triangles:
-        """Return a square around the origin.
+        """Return two triangles that form a square in the plane, centred on the origin.
 
         Args:
             size: edge of the square [m]; 20 m by default.

@@ -17,12 +17,12 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int32]]
 """Vertices (n, 3) [m] and triangles (m, 3), counterclockwise seen from outside."""
 
 SHORTEST, LONGEST = 1e-6, 1e6
-"""Range of lengths of a shape that float32 resolves [m]."""
+"""Smallest and largest length of a shape that float32 resolves [m]."""
 
 
 SEAM = 1e-4
-"""Skin on shapes with flat faces and edges [m]. A body on one of two flush shapes is then deeper in the other
-shape than rounding errors, and cannot slip into the joint."""
+"""Skin on shapes with flat faces and edges [m]. The skins of two flush shapes overlap by more than rounding
+errors, so that a body cannot slip into the joint between the shapes."""
 
 
 class Shape(ABC):
@@ -30,7 +30,7 @@ class Shape(ABC):
 
     kind: ClassVar[ShapeKind]
     seam: ClassVar[float] = 0.0
-    """Skin in addition to the thickness of the collider [m]."""
+    """Skin of the shape, which is added to the thickness of the collider [m]."""
 
     @abstractmethod
     def _values(self) -> tuple[float, ...]:
@@ -47,12 +47,12 @@ class Shape(ABC):
 
     @property
     def resolution(self) -> tuple[int, int, int]:
-        """Number of nodes of the grid along each axis; zeros without a grid."""
+        """Number of nodes of the grid along each axis; (0, 0, 0) for a shape without a grid."""
         return (0, 0, 0)
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """Values at the nodes of the grid, last axis fastest, float32 (k,)."""
+        """Values at the nodes of the grid, last axis fastest, float32 (k,); empty without a grid."""
         return _NO_SAMPLES
 
     @property
@@ -64,8 +64,9 @@ class Shape(ABC):
 
     @abstractmethod
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the depth of points below the surface, (n,) [m], negative outside; approximate for some
-        shapes.
+        """Return the depth of points below the surface, (n,) [m], negative outside.
+
+        The depths of height fields and meshes are approximate.
 
         Args:
             points: points in the frame of the shape, (n, 3) [m].
@@ -85,7 +86,7 @@ def as_length(value: Any, name: str, low: float = SHORTEST) -> float:
 
 
 def about_origin(half: Any) -> NDArray[np.float64]:
-    """Return the bounds of a solid that extends by `half` (3,) to both sides of the origin, (2, 3) [m]."""
+    """Return the bounds (2, 3) [m] of a solid that extends by `half` (3,) [m] on both sides of the origin."""
     corner = np.array(half, dtype=np.float64)
     bounds: NDArray[np.float64] = read_only(np.array([-corner, corner]))
     return bounds

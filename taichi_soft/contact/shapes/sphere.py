@@ -46,7 +46,7 @@ class SphereShape(Shape):
         return depths
 
     def surface(self) -> Triangles:
-        """Return 1,280 triangles that approximate the sphere. Their vertices lie on it."""
-        import trimesh  # imported here, because it takes half a second
+        """Return 1,280 triangles that approximate the sphere. Their vertices lie on the sphere."""
+        import trimesh  # imported here, because the import takes half a second
 
         return triangles_of(trimesh.creation.icosphere(subdivisions=3, radius=self.radius))

@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 from taichi_soft.meshing import spatial_order
 
 FAR_AWAY = 1e15
-"""Coordinate [m] of empty leaves, far from everything. Its square fits float32."""
+"""Coordinate of empty leaves, far from all triangles. The square of this number fits into float32."""
 
 
 def triangle_tree(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the triangles (f, 3, 3) in the order of the leaves, and the boxes.
+    """Return the triangles in the order of the leaves, (f, 3, 3), and the boxes of the tree, (2 n, 6).
 
-    Boxes are lower and upper corners, (2 n, 6), with n a power of two. Box 1 is the root, the children of i
-    are 2 i and 2 i + 1, and the leaves n to 2 n - 1 contain one triangle or none.
+    Each box has a lower and an upper corner. n is a power of two. Box 1 is the root, box i has the children
+    2 i and 2 i + 1, and boxes n to 2 n - 1 are leaves, which contain one triangle or none.
     """
     ordered = corners[spatial_order(corners.mean(axis=1))]
     count = 1 << (len(ordered) - 1).bit_length()
     low = np.full((count, 3), FAR_AWAY, dtype=np.float32)
-    high = -low  # lower above upper: an empty box does not enlarge its parent
+    high = -low  # empty boxes have low > high, so that they do not enlarge their parents
     low[: len(ordered)], high[: len(ordered)] = ordered.min(axis=1), ordered.max(axis=1)
     levels = [np.hstack([low, high])]
     while count > 1:

@@ -1,4 +1,4 @@
-"""Find overloaded bodies in every step, by a cheap upper bound on the stress of each tetrahedron."""
+"""Find overloaded bodies after every step, by a cheap upper bound on the stress of each tetrahedron."""
 
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.core.constants import LANES
@@ -9,7 +9,10 @@ from taichi_soft.elements.kernels.stress import stress_of
 
 @ti.func
 def _pull_bound(state: ti.template(), model: ti.template(), block, lane):
-    """Upper bound on the largest principal stress of a tetrahedron [Pa]; exact for uniaxial tension."""
+    """Return an upper bound on the largest principal stress of a tetrahedron [Pa].
+
+    The bound is exact for uniaxial tension.
+    """
     stress = stress_of(state, model, block, lane)
     mean = trace(stress) / 3.0
     d = scaled_plus_identity(stress, 1.0, -mean)
@@ -33,7 +36,12 @@ def find_overloaded(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Write 1 for each body with a tetrahedron whose stress may exceed the body's limit [Pa], else 0."""
+    """Find the bodies in which the stress of a tetrahedron can exceed the body's limit.
+
+    Args:
+        limits: largest stress of each body [Pa], 0 for a body that is not checked.
+        found: receives 1 for an overloaded body, else 0.
+    """
     for body in range(limits.shape[0]):
         result = 0
         if limits[body] > 0.0 and state.body_status[body] == ACTIVE:

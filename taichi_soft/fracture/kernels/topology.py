@@ -1,4 +1,4 @@
-"""Kernels that read and write a body with the state of its motion.
+"""Kernels that read the motion of a body, and write a body with its motion into a slot.
 
 Groups of fields: writes colliders, hull.
 """
@@ -8,8 +8,8 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 26
-"""Columns of `read_motion`: position, velocity, both before the last step, inverse mass, floor contact,
-touch, mass, aim, target, external force, reaction."""
+"""Number of columns of `read_motion`: position, velocity, position and velocity before the last step, inverse
+mass, collider contact, touch, mass, aim, target, external force, reaction."""
 
 
 @ti.func
@@ -19,7 +19,7 @@ def _three(rows: ti.template(), i, first):
 
 @ti.kernel
 def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Read the state of one body's particles into (n, MOTION_WIDTH), in the caller's vertex order."""
+    """Read the state of a body's particles into `out`, (n, MOTION_WIDTH), in the caller's vertex order."""
     ti.loop_config(serialize=True)
     for i in range(out.shape[0]):
         p = state.particle_of_vertex[state.body_particles[body][0] + i]
@@ -62,8 +62,9 @@ def write_body(
     """Write a body into its slot. Indices count from the slot's first rows.
 
     Args:
-        model_of: body whose fields `state.inherited` it takes over: itself, or the body it was cut from.
-        motion: as in `read_motion`, one row for each vertex in the caller's order.
+        model_of: body from which the fields in `state.inherited` are copied: the body itself, or the body
+            from which it was cut.
+        motion: one row for each vertex in the caller's order, see `read_motion`.
         rest: positions of the particles at rest [m], in kernel order.
         particles: particle of each vertex.
         tet_vertices, tet_edges: vertices and edges of the tetrahedra, in blocks.
@@ -135,7 +136,10 @@ def write_touching(
     carriers: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Write the contact hull of a body, if the world has hulls: see `contact.hull_fields.touching_rows`."""
+    """Write the contact surface of a body in a world with hulls.
+
+    The arguments after `body` are the results of `contact.hull_fields.touching_rows`.
+    """
     ti.loop_config(serialize=True)
     for _ in range(1):
         p0 = state.body_particles[body][0]
@@ -156,7 +160,7 @@ def write_touching(
 
 @ti.kernel
 def write_kind(state: ti.template(), body: ti.i32, row: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write friction, thickness [m] and `SoftBodyAsset.kind_row` of a body."""
+    """Write the row of a body: friction, thickness [m] and the numbers of `SoftBodyAsset.kind_row`."""
     state.body_edge[body] = row[2]
     state.body_stride[body] = row[3]
     state.body_sound_speed[body] = row[4]

@@ -17,7 +17,7 @@ def _put(rows: ti.template(), i, column, vector):
 
 @ti.func
 def _center(rows: ti.template(), x):
-    """Centre of mass of the positions in columns x [m]."""
+    """Return the centre of mass [m] of the positions in the three columns from `x` on."""
     mass, moment = ti.cast(0.0, ti.f64), ti.Vector.zero(ti.f64, 3)
     for i in range(rows.shape[0]):
         mass += rows[i, MASS]
@@ -27,7 +27,10 @@ def _center(rows: ti.template(), x):
 
 @ti.func
 def _momenta(rows: ti.template(), x, v, center):
-    """Momentum [kg m/s] and angular momentum about a point [kg m^2/s]."""
+    """Return momentum [kg m/s] and angular momentum about `center` [kg m^2/s].
+
+    Args: x, v: first columns of the positions and of the velocities.
+    """
     momentum, angular_momentum = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
     for i in range(rows.shape[0]):
         part = rows[i, MASS] * row_at(rows, i, v)
@@ -38,11 +41,11 @@ def _momenta(rows: ti.template(), x, v, center):
 
 @ti.func
 def _rigid(rows: ti.template(), x, momentum, angular_momentum):
-    """Rigid motion that has a momentum and an angular momentum about the centre of mass.
+    """Return the rigid motion that has this momentum, and this angular momentum about the centre of mass.
 
-    Given a force and a torque instead, the returned rates are accelerations.
+    If the arguments are a force and a torque instead, the results are accelerations instead of velocities.
 
-    Returns: centre of mass [m], its velocity [m/s], and the angular velocity [rad/s].
+    Returns: centre of mass [m]; velocity of the centre [m/s]; angular velocity [rad/s].
     """
     center = _center(rows, x)
     mass, inertia = ti.cast(0.0, ti.f64), ti.Matrix.zero(ti.f64, 3, 3)
@@ -88,10 +91,11 @@ def _pin(
     weights: ti.template(),
     nearest: ti.template(),
 ):
-    """Pin vertices, with the state of the nearest pinned vertices of the old level.
+    """Pin vertices of the new level, with the state of the nearest pinned vertices of the old level.
 
-    The pinned vertices follow the rigid motion that fits the old pinned vertices best, plus the deviation of
-    the nearest old vertex from it. Their arrangement therefore does not drift over repeated changes of level.
+    The position of a pinned vertex follows from the rigid motion that fits the old pinned vertices best. The
+    deviation of the nearest old vertex from this motion is added. The arrangement of the pinned vertices
+    therefore does not drift over repeated changes of level.
     """
     for x in ti.static((POSITION, EARLIER_POSITION)):
         rotation, translation = fitting_motion(rest_before, before, x, weights)
@@ -115,7 +119,10 @@ def _pin(
 
 @ti.func
 def _map_pushes(before: ti.template(), after: ti.template()):
-    """Distribute the total external force and its torque as a rigid acceleration of all particles."""
+    """Distribute the total external force and torque over the particles of the new level.
+
+    The resulting forces accelerate the new particles as a rigid body.
+    """
     center = _center(before, POSITION)
     force, torque = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
     for i in range(before.shape[0]):
@@ -147,9 +154,9 @@ def map_motion(
         sources, begins, shares: see `Passage.rows`.
         masses: masses of the new level's vertices, (m,) [kg].
         rest_before, rest_after: positions at rest, (n, 3) and (m, 3) [m].
-        weights: weights of the old level's pinned vertices, whose sum is 1; 0 for other vertices, (n,).
-        nearest: pinned vertex of the old level for each vertex that will be pinned; -1 for others, (m,).
-        after: the kernel writes the rows here; the columns of touches and reactions become 0.
+        weights: weights of the old level's pinned vertices, with sum 1; 0 for other vertices, (n,).
+        nearest: nearest pinned vertex of the old level for each vertex that will be pinned, else -1, (m,).
+        after: receives the rows. The columns of touches and reactions become 0.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
