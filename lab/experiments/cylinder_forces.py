@@ -20,10 +20,10 @@ from lab.experiments.experiment import (
 from lab.experiments.judgement import judged
 from taichi_soft import Material, TetMesh, cylinder, internal_forces
 
-YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # those of the thesis [Pa, m]
-POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions others
+YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # values of the thesis [Pa, m]
+POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions other values
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
-COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about as many as in the thesis, and 2592
+COARSE, FINE = (4, 2), (6, 4)  # rings and layers; 576 tetrahedra, about as in the thesis, and 2592
 EXACT = 0.01
 """Largest relative error of a slope that counts as exact."""
 CLOSE = 0.15
@@ -37,8 +37,9 @@ STRAIGHT = 0.05
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: both directions for each nu, another E, sliding ends, an uneven mesh, and a finer
-    mesh.
+    """List the points: tension and shear for each nu, a larger E, sliding ends, and an uneven mesh.
+
+    A full report adds a finer mesh.
     """
     is_full = effort is Effort.FULL
     count = 20 if is_full else 5
@@ -53,7 +54,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the forces on the top up to a strain of 0.5, or as far as an equilibrium is found."""
+    """Measure the forces on the top up to a strain of 0.5, or up to the last strain with an equilibrium."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     if point["shaken"]:
         mesh = _shaken(mesh)
@@ -239,7 +240,7 @@ def conclude(results: Results) -> Section:
 
 
 def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
-    """Return the largest shear force over the tensile force at the same strain."""
+    """Return the largest ratio of shear force to tensile force, over the points with this "shaken"."""
     return max(
         float((np.hypot(n["shear"], n["aside"]) / np.abs(n["tension"])).max())
         for point, n in rows
@@ -248,7 +249,7 @@ def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
 
 
 def _ratio(numbers: Numbers, way: str, modulus: float) -> list[float]:
-    """Return the force over modulus, area and strain, for each strain."""
+    """Return the force over the product of modulus, area and strain, for each strain."""
     forces, strain = np.array(numbers[way]), np.array(numbers["strain"])
     return list((forces / (modulus * numbers["area"] * strain)).tolist())
 

@@ -1,7 +1,8 @@
 """A standing wave with both Euler methods (thesis figure 3.2): the first mode of a row of springs.
 
-The row discretises the wave equation. Its modes and the change of amplitude per step are known exactly:
-explicit Euler multiplies the amplitude by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides by it.
+The row discretises the wave equation. Its modes and the change of amplitude per step are known exactly.
+Explicit Euler multiplies the amplitude by abs(1 + i h w) = sqrt(1 + h^2 w^2). Implicit Euler divides the
+amplitude by this factor.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from taichi_soft.world.bare import bare_world
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
-"""Number of particles between the fixed ends. With more, explicit Euler first amplifies round-off in higher
-modes."""
+"""Number of particles between the fixed ends. With more particles, explicit Euler would amplify round-off in
+higher modes before it visibly amplifies the first mode."""
 
 PERIODS = 2
 AMPLITUDE = 0.05
@@ -50,9 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the displacement of the mode and its amplitude after each step of 1 s, over the initial
-    amplitude.
-    """
+    """Measure displacement and amplitude of the mode after each step of 1 s, over the initial amplitude."""
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2
