@@ -17,7 +17,7 @@ def ring(count: int, radius: float, phase: float = 0.0) -> np.ndarray:
 
 
 def flat_triangles(points: np.ndarray, least_area: float = 1e-6) -> np.ndarray:
-    """Return the Delaunay triangles (t, 3) of points (n, 2), without flat ones along straight borders.
+    """Return the Delaunay triangles of points (n, 2), except flat triangles along straight borders, (t, 3).
 
     Args:
         least_area: smallest value of twice the area of a triangle.

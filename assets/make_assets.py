@@ -22,7 +22,8 @@ FOLDER = Path(__file__).parent
 def sphere() -> TetMesh:
     """Make the ball of section 6.6: 381 particles and 4 m^3, fine at the surface and coarse inside."""
     total, inner, depth, seed = 381, 17, 0.5, 2
-    # Weight of heights against angles in the unit ball [degrees/m]: as good a time step as 15 degrees allow.
+    # Weight of heights relative to angles [degrees/m]. With this weight, the time step in the unit ball is as
+    # long as with angles of 15 degrees.
     angle_per_height = 200.0
     outer = spread_on_sphere(total - inner - 1, seed)
     shell = depth * spread_on_sphere(inner, seed + 1)

@@ -86,7 +86,7 @@ def ellipsoid(p: Floats, middle: tuple[float, ...], axes: tuple[float, ...]) -> 
 
 
 def cone(p: Floats, a: Floats, b: Floats, start: float, end: float) -> Floats:
-    """Return the approximate distance from a round rod from a to b with end radii `start` and `end`."""
+    """Return the approximate distance from a round rod from `a` to `b` with end radii `start` and `end`."""
     along = np.clip((p - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
     return np.linalg.norm(p - a - along[..., None] * (b - a), axis=-1) - (start + (end - start) * along)
 
@@ -144,7 +144,8 @@ def gradient(p: Floats) -> Floats:
 def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
     """Return the vertices (n, 3), the triangles (m, 3) and the vertex normals (n, 3) of the elephant.
 
-    Marching cubes find the surface. It is simplified, smoothed, and projected back onto the solid.
+    Marching cubes make a mesh of the surface, which is simplified, smoothed, and projected back onto the
+    solid.
     """
     axes = [np.arange(lo, hi, GRID) for lo, hi in zip(LOW, HIGH, strict=True)]
     values = solid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
@@ -240,7 +241,10 @@ def paint(p: Floats) -> Floats:
 
 
 def on_trunk(p: Floats) -> tuple[Floats, Floats]:
-    """Return the position of points along the trunk's centre line and their distance from the trunk, (n,)."""
+    """Locate points (n, 3) relative to the trunk.
+
+    Returns: position along its centre line, and distance from its surface, (n,) each.
+    """
     starts, ways = TRUNK[:-1], np.diff(TRUNK, axis=0)
     shares = np.clip(((p[:, None] - starts) * ways).sum(axis=2) / (ways**2).sum(axis=1), 0.0, 1.0)
     far = np.linalg.norm(p[:, None] - starts - shares[..., None] * ways, axis=2)
@@ -298,7 +302,7 @@ def main() -> None:
     atlas.generate(charts, pack)
     source, corners, uv = atlas[0]
     uv = np.asarray(uv, dtype=np.float64)
-    uv[:, 1] = 1.0 - uv[:, 1]  # in trimesh, they start at the lower left
+    uv[:, 1] = 1.0 - uv[:, 1]  # the texture coordinates of trimesh start at the lower left
     corners = np.asarray(corners, dtype=np.int64)
     picture = texture(points[source], corners, uv)
     material = trimesh.visual.material.PBRMaterial(

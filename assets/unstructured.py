@@ -1,4 +1,4 @@
-"""Tetrahedra from scattered points: Delaunay's rule, and moves of points that improve the worst angles."""
+"""Connect scattered points to tetrahedra by Delaunay's rule, and move points to improve the worst angles."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def spread_on_sphere(count: int, seed: int, steps: int = 300) -> np.ndarray:
 
 
 def triangulate(cloud: Cloud, sliver: float = HULL_SLIVER) -> np.ndarray:
-    """Return Delaunay tetrahedra of positive volume, without flat ones on the surface, (m, 4)."""
+    """Return Delaunay tetrahedra of positive volume, without flat tetrahedra on the surface, (m, 4)."""
     points = cloud.points
     tets = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[tets[:, i]] - points[tets[:, 0]] for i in (1, 2, 3))

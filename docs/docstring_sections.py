@@ -93,7 +93,7 @@ class DocstringSections(griffe.Extension):
                 parameter.default = value_of(parameter.default, func.module.path) or parameter.default
 
     def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
-        """List the fields of a dataclass if its docstring does not. Hide constructors that only worlds call."""
+        """List a dataclass's fields if its docstring omits them. Hide constructors that only worlds call."""
         doc, init = cls.docstring, cls.members.get("__init__")
         if init is not None and init.docstring is not None and init.docstring.value.startswith("Use `"):
             del cls.members["__init__"]

@@ -32,7 +32,7 @@ FADE = 10
 
 SEEN, CHANGED, LOOK = 24, 0.004, 1.0
 """A frame still shows motion if more than the fraction `CHANGED` of its pixels differ from the last frame by
-more than `SEEN` levels. A film ends `LOOK` after the last such frame [s]."""
+more than `SEEN` levels. A film ends `LOOK` [s] after the last such frame."""
 
 CODEC = (
     *("-c:v", "libvpx-vp9", "-crf", "34", "-b:v", "0"),

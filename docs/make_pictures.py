@@ -51,7 +51,7 @@ STILL_SIZE, QUALITY = (480, 270), 82
 
 
 def still(name: str, moment: float | None, size: tuple[int, int] = (520, 292)) -> np.ndarray:
-    """Draw a demo at a moment [s], by default at `STILL`. Returns: uint8 (height, width, 3)."""
+    """Draw a demo at a moment [s]; None chooses `STILL`. Returns: uint8 (height, width, 3)."""
     stage = load_demo(name).stage()
     return still_of(stage, STILL * stage.seconds if moment is None else moment, size)
 

@@ -65,7 +65,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(text: str, page: Any, **_: Any) -> str:
-    """Point links between files of the repository to their pages, and fill the page of the report."""
+    """Redirect links between files of the repository to their pages, and fill in the page of the report."""
     name = page.file.src_uri
     if name == "report/index.md":
         return text.replace("<!-- head -->", _head()).replace("<!-- verdicts -->", _verdicts())
@@ -86,7 +86,7 @@ def _head() -> str:
 
 
 def _verdicts() -> str:
-    """Return a Markdown table of all claims with their verdicts, in chapters."""
+    """Return all claims with their verdicts in Markdown, one table for each chapter."""
     lines, chapter = [], ""
     with (REPORT / "verdicts.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
@@ -104,7 +104,7 @@ def _verdicts() -> str:
 def _report() -> str:
     """Return `report.md` as an HTML page in the style of the pages from `python -m lab report`."""
     text = (REPORT / "report.md").read_text(encoding="utf-8")
-    text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # nested lists need four columns
+    text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # nested lists need four spaces
     body = markdown.markdown(text, extensions=["tables", "sane_lists"])
     style = (ROOT / "lab/report/templates/report.css").read_text(encoding="utf-8")
     return PAGE.format(style=style, body=body)

@@ -46,7 +46,7 @@ class Scene:
     The docstring of the function that makes the scene contains the title and the text.
     """
 
-    world: World  # built world with `record=STEPS`
+    world: World  # a built world, created with `record=STEPS`
     camera: Camera
     controls: list[dict[str, Any]]
     colors: list[Any]  # colour of each slot, sRGB from 0 to 1
@@ -179,7 +179,7 @@ def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
 def elephant() -> Scene:
     """Drop an elephant.
 
-    Drop elephants onto the steps. There is room for four; a fifth replaces the first.
+    Drop elephants onto the steps. The scene holds four elephants; a fifth replaces the first.
     """
     world = World(friction=0.8, record=STEPS)
     depth, rise, width = 0.6, 0.24, 2.4
