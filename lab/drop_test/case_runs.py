@@ -28,7 +28,7 @@ kernels."""
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
 """A body is at rest if its root mean square speed over vertices stays below a limit for `CALM_TIME` [s]. The
 limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED` [m/s].
-`LEAST_CALM_SPEED` is half of Box2D's sleeping threshold. It is needed because a small ball in a corner keeps
+`LEAST_CALM_SPEED` is half of Box2D's sleeping threshold. Small balls need it, because in a corner they keep
 rocking from facet to facet at a few mm/s."""
 
 PATIENCE = 150.0

@@ -32,7 +32,7 @@ LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
 """Laws that a quick report omits, because each takes seconds to compile."""
 
 LEAST_SPREAD = 1e-3
-"""Spread up to which a mesh is no evidence about a law, because it hides the law's anisotropy."""
+"""A mesh with a smaller spread is no evidence about a law, because it hides the law's anisotropy."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:
@@ -78,7 +78,7 @@ def in_plane(count: int) -> NDArray[np.float64]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the stiffness over lambda + 2 mu in many directions.
+    """Measure the stiffness in many directions, divided by lambda + 2 mu.
 
     The directions are those of a hemisphere ("around") and of the x-z plane ("plane").
     """

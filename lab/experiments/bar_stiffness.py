@@ -17,7 +17,7 @@ LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
-    """Measure the stiffness of a bar over its theoretical stiffness.
+    """Measure the ratio of a bar's stiffness to its theoretical stiffness.
 
     Args:
         point: has the keys "law" (a law, `LINEAR` or `QUADRATIC`), "strain" and "cells" (number across the

@@ -60,7 +60,7 @@ TEXT = (
 def points(effort: Effort) -> list[Point]:
     """List the points: every law and finite elements on a coarse mesh.
 
-    Two finer meshes have one law and linear elements.
+    On two finer meshes, there are only one law and linear elements.
     """
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)
@@ -71,12 +71,12 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the stiffness over theory for each load."""
+    """Measure the ratio of stiffness to theory for each load."""
     return stiffness_over_theory(point, LENGTH, LOADS)
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether tension and shear are exact, and whether extrapolated torsion and bending are."""
+    """Judge tension and shear against theory, and torsion and bending after an extrapolation."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     coarse = rows[0][0]["cells"]
     of_laws = [row for row in rows if row[0]["law"] not in (LINEAR, QUADRATIC)]

@@ -33,12 +33,12 @@ FITTED: LawName = "best_fitting_plane"
 SPLIT: LawName = "split_ring_plane"
 LAWS: tuple[LawName, ...] = (CMPM, FITTED, SPLIT)
 AS_STABLE = 0.9
-"""A law counts as equally stable if its largest step is at least this fraction of that of the best fitting
-plane."""
+"""A law counts as equally stable if its largest step is at least this fraction of the best fitting
+plane's."""
 MESHES = ("another uneven block", "uneven block", "ball")
 STEP, SUBSTEPS = 1e-4, 200
-"""Length [s] and number of the substeps of a timed call. They are so short that a body at rest stays at
-rest."""
+"""Length [s] and number of the substeps of a timed call. The substeps are so short that a body at rest stays
+at rest."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -50,8 +50,8 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the time of a substep and the small vibrations under each law.
 
-    Returns: "seconds", median time of a substep [s]; "ratio", median of this time over CMPM's time in
-        alternating calls; "step", largest stable step [s]; "growth_rate", growth of undamped vibrations
+    Returns: "seconds", median time of a substep [s]; "ratio", median ratio of this time to CMPM's in
+        alternating calls; "step", largest stable step [s]; "growth_rate", growth rate of undamped vibrations
         [1/s]; "tets", number of tetrahedra.
     """
     mesh = mesh_of(point["mesh"], point["size"])

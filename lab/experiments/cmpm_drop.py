@@ -19,7 +19,7 @@ RADIUS, HEIGHT = 1.0, 1.5
 
 FRAME, FRAMES = 0.06, 12
 TOUCHES = 0.25
-"""Time until which the sphere is in the air [s]. It needs 0.32 s to fall 0.5 m."""
+"""Time until which the sphere is in the air [s]. The fall of 0.5 m takes 0.32 s."""
 
 OFF, SHRUNK = 0.05, 0.9
 """Limits for a valid fall: largest deviation from the reference in the air [m], and smallest volume over the

@@ -23,17 +23,18 @@ from taichi_soft import Material, TetMesh, cylinder, internal_forces
 YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # values of the thesis [Pa, m]
 POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions other values
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
-COARSE, FINE = (4, 2), (6, 4)  # rings and layers; 576 tetrahedra, about as in the thesis, and 2592
+COARSE, FINE = (4, 2), (6, 4)  # rings, layers: 576 tetrahedra (about as many as in the thesis) and 2592
 EXACT = 0.01
 """Largest relative error of a slope that counts as exact."""
 CLOSE = 0.15
 """Largest relative error of a slope that counts as close."""
 NO_SHEAR = 0.01
-"""Largest shear force over tensile force that counts as zero."""
+"""Largest ratio of shear force to tensile force that counts as no shear force."""
 SHAKEN = 0.2
 """Largest random displacement of a vertex along an axis [mean edge length]."""
 STRAIGHT = 0.05
-"""Largest relative change of force over strain along a curve that counts as straight."""
+"""A curve counts as straight if the ratio of force to strain, relative to theory, changes by less than
+this."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -240,7 +241,7 @@ def conclude(results: Results) -> Section:
 
 
 def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
-    """Return the largest ratio of shear force to tensile force, over the points with this "shaken"."""
+    """Return the largest ratio of shear force to tensile force, on meshes that are shaken or not."""
     return max(
         float((np.hypot(n["shear"], n["aside"]) / np.abs(n["tension"])).max())
         for point, n in rows
@@ -249,7 +250,7 @@ def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
 
 
 def _ratio(numbers: Numbers, way: str, modulus: float) -> list[float]:
-    """Return the force over the product of modulus, area and strain, for each strain."""
+    """Return the force divided by modulus, area and strain, for each strain."""
     forces, strain = np.array(numbers[way]), np.array(numbers["strain"])
     return list((forces / (modulus * numbers["area"] * strain)).tolist())
 

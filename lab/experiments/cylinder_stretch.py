@@ -42,7 +42,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume and the width at mid-height for each stretch, over their values at rest.
+    """Measure the volume and the width at mid-height for each stretch, relative to their values at rest.
 
     The last shape is stored, too.
     """

@@ -27,7 +27,7 @@ from taichi_soft import Material, TetMesh, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.world.bare import bare_world
 
-YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # SPIN [rad/s] stretches the body too little to see
+YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # SPIN [rad/s] is too slow to stretch the body visibly
 DT, SUBSTEPS = 1 / 60, 12
 MODELS = ("edge", "tet_mean")
 KEPT, RATE_ERROR = 1e-3, 0.05
@@ -53,7 +53,10 @@ def body_mesh(name: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the angular momentum over time, over its initial value, and compute the expected rate [1/s]."""
+    """Measure the angular momentum over time, relative to its initial value.
+
+    The result also has the "expected" decay rate [1/s].
+    """
     mesh = body_mesh(point["mesh"])
     world = bare_world(gravity=(0, 0, 0), retries=0)
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)

@@ -45,8 +45,9 @@ def strains(vector: Floats, normal: Floats) -> tuple[float, float]:
     """Return the tensile and the shear strain (eq. 4.3) of an edge.
 
     Args:
-        vector: the deformed edge, (3,). At rest, it is the unit vector along the direction of tension.
-        normal: direction of tension, a unit vector.
+        vector: the deformed edge, (3,). At rest, the edge has length 1 and lies along the direction of
+            tension.
+        normal: direction of tension in the deformed body, a unit vector.
     """
     stretch = float(normal @ vector)
     return stretch - 1, float(np.linalg.norm(vector - stretch * normal))

@@ -61,8 +61,8 @@ class Plates:
 
         Args:
             direction: displacement of the top per unit of `shares` [height of the body].
-            shares: increasing positive displacements of the top over the height. Their steps must be small
-                enough to follow the branch of equilibria that starts at rest.
+            shares: increasing positive displacements of the top [height of the body]. Their spacing must be
+                small enough to follow the branch of equilibria that starts at rest.
         Returns: positions (n, 3) [m] for each share, up to the first share without an equilibrium.
         """
         z = self.mesh.vertices[:, 2:]

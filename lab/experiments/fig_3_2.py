@@ -51,7 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure displacement and amplitude of the mode after each step of 1 s, over the initial amplitude."""
+    """Measure the displacement and the amplitude of the mode after each step, relative to the start."""
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2
@@ -84,7 +84,7 @@ def measure(point: Point) -> Numbers:
 
 
 def per_step(integrator: IntegratorName, angle: float) -> float:
-    """Return the exact factor on the amplitude per step; `angle` is h w."""
+    """Return the exact factor by which a step multiplies the amplitude; `angle` is h w."""
     growth = float(np.hypot(1.0, angle))
     return {"explicit_euler": growth, "implicit_euler": 1 / growth}.get(integrator, 1.0)
 

@@ -59,7 +59,7 @@ MUCH = 2.0
 """Ratio of shear strain to tensile strain above which shear counts as much larger."""
 
 SMALL = 0.5
-"""Tensile strain over the stretch below which tension counts as small."""
+"""Ratio of tensile strain to stretch below which tension counts as small."""
 
 
 def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:

@@ -47,10 +47,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure percentiles of the angles between edges and normals, and between two normals [degrees].
+    """Measure percentiles of two angles [degrees]: of edges to normals, and of fitted to cheap normals.
 
-    Edges with two particles around them are omitted. The angles between fitted and cheap normals also omit
-    edges with three particles, because both normals of such an edge are equal.
+    Edges with two particles around them are omitted. The second angle also omits edges with three particles,
+    because the fitted and the cheap normal of such an edge are equal.
     """
     mesh = mesh_of(point["mesh"], point["size"])
     edge, _ = EdgeRings.of(mesh).neighbours

@@ -37,9 +37,9 @@ SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
 MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
 """Limits of the verdict. The sphere is dented if more than `MANY` of its tetrahedra are inverted at the end,
-more than `STAYS` of those inverted at half-time stay inverted, and more than `PLACED` of the inverted ones
-are in the most compressed quarter (by chance it would be 0.25). It failed if its extent exceeds `APART` times
-the extent at rest."""
+more than `STAYS` of those inverted at half-time stay inverted, and more than `PLACED` of the inverted
+tetrahedra are in the most compressed quarter (0.25 by chance). The sphere failed if its extent exceeds
+`APART` times the extent at rest."""
 
 
 def points(effort: Effort) -> list[Point]:

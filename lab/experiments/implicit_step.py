@@ -96,7 +96,7 @@ def _rate_finding(
 ) -> Finding:
     """Judge whether the gain in rate is within the tolerance of the thesis's range.
 
-    If the bounce is lost, the gain agrees only in part.
+    If the bounce is lost, the verdict is "agrees in part" at best.
     """
     gain = sum(rates["explicit"]) / sum(rates["implicit"])
     low, high = THESIS_RATES[0] / RATE_TOLERANCE, THESIS_RATES[1] * RATE_TOLERANCE

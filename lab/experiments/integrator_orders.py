@@ -32,7 +32,7 @@ START = 0.02
 """Initial displacement [m]; errors are divided by it."""
 
 STEPS = (32, 64, 128, 256)
-"""Numbers of steps per period. With more, rounding of float32 dominates."""
+"""Numbers of steps per period. With more steps, rounding of float32 dominates."""
 
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
 """h w and number of periods of the long run."""
@@ -43,7 +43,7 @@ leapfrog's."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each integrator over one period with four steps, and over ten periods with one."""
+    """List the points: each integrator over one period (four step lengths) and over ten periods (one)."""
     del effort  # the full run is short enough for a quick report
     return [{"integrator": name, "run": run} for name in ORDERS for run in ("period", "long")]
 

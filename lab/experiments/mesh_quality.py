@@ -115,7 +115,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the largest stable step against the smallest angle and against Poisson's ratio."""
+    """Judge how the largest stable step depends on the smallest angle and on Poisson's ratio."""
     ratios = sorted(point["poisson"] for point, _ in results.where())
     by_ratio = {nu: results.one(poisson=nu) for nu in ratios}
     names = [(kind, share) for kind, share, _ in cubes()]

@@ -1,7 +1,7 @@
 """Particles of 1 kg, each on a spring to a pinned particle: u'' = -k u - b u'.
 
-They serve to test the integrators of a world on the test equations of chapter 3. All particles move along
-their springs, which are linear in this direction.
+With these particles, the integrators of a world solve the test equations of chapter 3. All particles move
+along their springs, which are linear in this direction.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume of a cube, deformed by plates at its ends, over its rest volume."""
+    """Measure the volume of a cube that plates at its ends deform, relative to its rest volume."""
     mesh = cube(3, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, 0.3, DENSITY, shear_modulus=point["modulus"] * YOUNG, damping_ratio=0.0)

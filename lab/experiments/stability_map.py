@@ -1,8 +1,8 @@
 """The dropped sphere for many Young's moduli and Poisson's ratios (thesis section 6.6).
 
 Spheres of all moduli with one Poisson's ratio fall side by side in one world, without contact. The linear
-limit is the modulus whose largest stable step is the thesis's step. It shows how much of the upper edge is
-due to the mesh.
+limit is the modulus whose largest stable step is the thesis's step. This limit shows how much of the upper
+edge is due to the mesh.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ SLOW = 0.5
 again."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
-"""Largest first displacement over the size of the body. A body that moves farther is not constrained."""
+"""A body is not constrained if its first displacement exceeds this multiple of its size."""
 
 
 class NoEquilibriumError(TaichiSoftError):
@@ -159,7 +159,7 @@ def factorised(matrix: Any) -> Any:
 
 
 def _dependence(mesh: TetMesh, material: Material, law: LawName) -> Any:
-    """Return a sparse, symmetric (n, n) matrix: non-zero if the force on one vertex depends on the other."""
+    """Return a sparse, symmetric (n, n) matrix: non-zero for vertices whose forces depend on each other."""
     from scipy.sparse import coo_matrix
 
     chosen = LAWS[law]

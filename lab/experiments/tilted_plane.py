@@ -52,10 +52,10 @@ def mesh_of(ring: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the rotation of the plane about the axis of the shear ("tilt") and across it ("aside") [rad].
+    """Measure the rotation of the plane for each of `ANGLES` [rad].
 
-    In a shear along the edge, lines across the edge rotate by the shear angle, and the edge keeps its
-    direction.
+    Returns: "tilt", rotation about the axis of the shear; "aside", rotation across this axis. In a shear
+        along the edge, lines across the edge rotate by the shear angle, and the edge keeps its direction.
     """
     mesh = mesh_of(point["ring"])
     found = []

@@ -52,7 +52,7 @@ def measure(point: Point) -> Numbers:
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     mass = np.repeat(mesh.vertex_volumes * DENSITY, 3)[plates.free][:, None]
-    springs, volume = (_gradient(plates, nu) for nu in (0.0, 0.3))  # linear in nu at rest
+    springs, volume = (_gradient(plates, nu) for nu in (0.0, 0.3))  # at rest, gradients are linear in nu
     braking = -point["damping"] * _edge_matrix(mesh)[np.ix_(plates.free, plates.free)]
     zero, one = np.zeros_like(springs), np.eye(len(springs))
     growth, step = [], []

@@ -45,7 +45,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume, and the forces on the top, while it moves sideways by up to the cube's height."""
+    """Measure the volume and the forces on the top, which moves sideways by up to the cube's height."""
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)

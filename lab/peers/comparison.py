@@ -34,7 +34,7 @@ class Entry:
 
     @property
     def cost(self) -> float:
-        """Median time to simulate 1/60 s [s]."""
+        """Median computing time for 1/60 s of simulation [s]."""
         return float(np.median(self.trajectory.frame_times))
 
     @property

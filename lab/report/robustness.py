@@ -24,11 +24,11 @@ from taichi_soft.core.types import ArchName
 from taichi_soft.meshing.delaunay import scipy_spatial
 
 TIME_LIMIT = 600.0
-"""Time limit of a cell [s]. A cell that exceeds it has no result and is retried."""
+"""Time limit of a cell [s]. A cell that exceeds the limit has no result and is retried."""
 
 SOFT_MACH, SOFT_SAG = 0.5, 0.1
-"""A printed line mentions the Mach number of the impact and the sag above these values. A body that hits the
-floor at its speed of sound is crushed."""
+"""A printed line mentions the Mach number of the impact and the sag if they exceed these values. A body that
+hits the floor at its speed of sound is crushed."""
 
 COLUMNS = (
     Verdict.OK,

@@ -23,7 +23,7 @@ END_LIMIT = 10.0
 
 
 class Worker:
-    """A process that computes one point at a time. If the process is lost, the next point starts another one.
+    """A process that computes one point at a time. If it is lost, the next point starts another process.
 
     `concurrent.futures` is not sufficient: before Python 3.14 it cannot end a process that hangs, it does not
     report how a process ended, and its workers remain if the parent process is killed.

@@ -59,7 +59,7 @@ def delaunay_body(points: Floats) -> TetMesh:
 
 
 def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
-    """Mesh random points in a ball. Their smallest distance is `spacing` times the diameter of the ball."""
+    """Mesh random points in a ball. Points are at least `spacing` times the ball's diameter apart."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(-0.5, 0.5, (8 * count, 3))
     points = points[np.linalg.norm(points, axis=1) < 0.5][:count]
@@ -102,7 +102,7 @@ def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh
 
 
 def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
-    """Mesh a cube whose edges are `ratio` times longer in one corner than in the opposite corner."""
+    """Mesh a cube. Edges of tetrahedra are `ratio` times longer in one corner than in the opposite corner."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(40 * count, 3)) ** (1 + np.log10(ratio))
     away = np.linalg.norm(points, axis=1) / 3**0.5
@@ -329,4 +329,4 @@ FOREIGN_MESHES: dict[str, Maker] = {
     },
 }
 """Functions that make the 49 meshes, by name. The smallest dihedral angles of the meshes are 0.02 to 20
-degrees. `python -m lab drop-test --sweep` lists them."""
+degrees. `python -m lab drop-test --sweep` lists these angles."""

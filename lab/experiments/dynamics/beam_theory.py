@@ -61,7 +61,7 @@ def timoshenko_frequency(beam: Beam, *, is_held: bool) -> float:
     weights = weights * beam.length / 2
     values = legendre.legvander(at, DEGREE)
     slopes = np.stack([legendre.legval(at, legendre.legder(row)) for row in np.eye(DEGREE + 1)], axis=1)
-    if is_held:  # the factor, the distance from the clamp, makes the deflection zero there
+    if is_held:  # multiply by the distance from the clamp, so that the deflection there is zero
         slopes = slopes * (at + 1)[:, None] + values
         values = values * (at + 1)[:, None]
     slopes = slopes * 2 / beam.length

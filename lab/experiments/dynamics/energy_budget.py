@@ -33,10 +33,10 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 DAMPING = 150.0  # [N s/m]
 WITH_ENERGY = ("st_venant_kirchhoff", "neo_hookean")
 GRAVITY = 9.81
-PART = 0.5  # substep over the stable one; the energy error of leapfrog grows with its square
+PART = 0.5  # [stable substep]; leapfrog's energy error grows with the square of the substep
 FRAMES = 120
 UNDAMPED, DAMPED = 1e-3, 1e-3
-"""Largest error of the budget over the work of gravity, without and with damping."""
+"""Largest error of the budget, as a fraction of the work of gravity, without and with damping."""
 
 
 def points(effort: Effort) -> list[Point]:

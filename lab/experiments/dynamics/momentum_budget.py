@@ -63,7 +63,7 @@ def measure(point: Point) -> Numbers:
     changes = np.zeros((FRAMES + 1, 2))
     turning = np.ones(FRAMES + 1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # the result -1 reports it
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the result -1 reports a frozen body
         for frame in range(1, FRAMES + 1):
             world.step(dt, substeps)
             if body.is_frozen:

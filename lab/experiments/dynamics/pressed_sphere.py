@@ -30,7 +30,7 @@ def hertz_force(depth: float) -> float:
 def graded_sphere(resolution: int, grading: float) -> TetMesh:
     """Make a ball with smaller tetrahedra near its lowest point.
 
-    A Moebius map of the ball onto itself moves the vertices down. It preserves spheres and angles.
+    A Moebius map of the ball onto itself moves the vertices down. The map preserves spheres and angles.
     """
     ball = sphere(1.0, resolution)
     x, a = ball.vertices, np.array([0.0, 0.0, -grading])

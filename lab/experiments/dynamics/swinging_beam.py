@@ -63,7 +63,7 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     substeps = world.stable_substeps(dt)
     mode = body.masses * shape[:, 2] / (body.masses @ shape[:, 2] ** 2)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # the frequency 0 reports it
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the frequency 0 reports a frozen body
         while len(crossings) < 5 and len(deflections) < 8 * FRAMES and not body.is_frozen:
             world.step(dt, substeps)
             before, now = deflections[-1], float(mode @ (body.positions()[:, 2] - mesh.vertices[:, 2]))

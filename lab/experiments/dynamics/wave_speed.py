@@ -102,7 +102,7 @@ def measure(point: Point) -> Numbers:
 def _peak(places: Floats, profile: Floats) -> float:
     """Return the position of a bell's maximum [m].
 
-    It is that of a parabola, fitted to the values above 0.7 of the largest value.
+    The function fits a parabola to the values above 0.7 of the largest value.
     """
     top = int(profile.argmax())
     low, high = top, top
