@@ -47,7 +47,7 @@ def cylinder_long() -> TetMesh:
 
 
 def cylinder_flat() -> TetMesh:
-    """Make the cylinder of figure 6.4: 0.5 m high, 2 m in diameter. Its flat ends are pulled and sheared."""
+    """Make the cylinder of figure 6.4, whose flat ends are moved apart or sideways: 0.5 m high, 2 m wide."""
     points, triangles = disc([(6, 0.27, 0.0), (12, 0.53, 0.0), (17, 0.78, 0.0), (18, 1.0, 0.0)])
     return extrude(points, triangles, layers=2, height=0.5)
 

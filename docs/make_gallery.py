@@ -1,8 +1,8 @@
 """Make the films of all demos for the gallery of the documentation.
 
-`python docs/make_gallery.py` makes all films, which takes minutes. With names of demos, it makes only their
-films. It skips a demo that needs a missing package, and prints its name. `make_pictures.py` makes the stills,
-`make_worlds.py` the playable worlds.
+`python docs/make_gallery.py` makes all films, which takes minutes. With names of demos, the script makes only
+the films of these demos. A demo that needs a missing package is skipped, with a message. `make_pictures.py`
+makes the stills, `make_worlds.py` the playable worlds.
 """
 
 import argparse
@@ -47,7 +47,7 @@ Progress = Callable[[int, int], None]
 
 
 def write_film(stage: Stage, name: str, on_frame: Progress, size: tuple[int, int] = SIZE) -> None:
-    """Write the film of a demo. Its end fades into its beginning, so that it can loop."""
+    """Write the film of a demo. The end of the film fades into its beginning, so that the film can loop."""
     with tempfile.TemporaryDirectory() as scratch:
         film(stage, Path(scratch) / "f.png", fps=FPS, size=size, on_frame=on_frame)
         pictures = [cv2.imread(str(file)) for file in sorted(Path(scratch).iterdir())]
