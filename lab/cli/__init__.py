@@ -13,7 +13,7 @@ def main(*arguments: str) -> None:
 
     For an error of this package, print one line and exit with code 1. For invalid options, exit with code 2.
     Args:
-        arguments: command-line arguments; by default those of the process.
+        arguments: command-line arguments; by default the arguments of the process.
     """
     try:
         require_extra("cli", "the command line needs")

@@ -1,6 +1,6 @@
 """Signed distances from solids: functions that map points (n, 3) in the solid's axes to distances (n,) [m].
 
-These formulas check the kernels and therefore share no code with them. They compute in float64.
+These functions check the kernels and therefore share no code with the kernels. All distances are float64.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def half_space(normal: Floats, offset: float = 0.0) -> Distance:
     """Return the distance function of a half space.
 
     Args:
-        normal: unit normal of the bounding plane, (3,). It points out of the half space.
+        normal: unit normal of the bounding plane, pointing out of the half space, (3,).
         offset: distance of the plane from the origin along the normal [m].
     """
     return lambda x: np.asarray(x @ normal - offset)

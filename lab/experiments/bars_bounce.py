@@ -37,7 +37,7 @@ UPRIGHT = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]
 """Rotation that turns the diagonal of the three bars upright."""
 SEEN, BENT, VIBRATES = 0.05, 3.0, 0.01
 """A deflection is visible above `SEEN` times the free length of a bar. Bars bend if the deflection exceeds
-`BENT` times the change of length. They vibrate if the vibration energy in flight exceeds `VIBRATES` times the
+`BENT` times the change of length. Bars vibrate if the vibration energy in flight exceeds `VIBRATES` times the
 energy of the impact."""
 
 

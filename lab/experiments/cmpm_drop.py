@@ -11,8 +11,8 @@ from taichi_soft.core.types import IntegratorName, LawName
 from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""Material so stiff that leapfrog needs steps of about 1e-4 s. It is damped, because undamped CMPM gains
-energy at any step length."""
+"""Material so stiff that leapfrog needs steps of about 1e-4 s. The material is damped, because undamped CMPM
+gains energy at any step length."""
 
 RADIUS, HEIGHT = 1.0, 1.5
 """Radius of the sphere, and initial height of its centre [m]."""

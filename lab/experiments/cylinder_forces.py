@@ -241,7 +241,7 @@ def conclude(results: Results) -> Section:
 
 
 def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
-    """Return the largest ratio of shear force to tensile force, on meshes that are shaken or not."""
+    """Return the largest ratio of shear force to tensile force. `is_shaken` selects the meshes."""
     return max(
         float((np.hypot(n["shear"], n["aside"]) / np.abs(n["tension"])).max())
         for point, n in rows

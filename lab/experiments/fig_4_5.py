@@ -1,6 +1,6 @@
 """An element that is stretched along many axes (thesis figure 4.5).
 
-It is a tetrahedron, whereas the thesis has a triangle.
+The element is a tetrahedron, whereas the thesis has a triangle.
 """
 
 from __future__ import annotations

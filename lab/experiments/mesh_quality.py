@@ -1,7 +1,7 @@
 """Small dihedral angles and a high Poisson's ratio reduce stability (thesis section 6.6).
 
-A cube is degraded by flattening one inner tetrahedron or one layer of cells. Its largest stable step is
-estimated at rest, and measured by running it with increasing steps.
+A cube is degraded by flattening one inner tetrahedron or one layer of cells. The largest stable step of the
+cube is estimated at rest, and measured by running the cube with increasing steps.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ def measure(point: Point) -> Numbers:
     """Measure the largest errors of the forces over random strains of each size.
 
     Returns: "surface", largest difference from the forces of Hooke's stress on the surface at rest; "inside",
-        largest force on an inner vertex, which should be zero. Both are divided by the largest force of
-        Hooke's stress.
+        largest force on an inner vertex, which should be zero. Both numbers are divided by the largest force
+        of Hooke's stress.
     """
     mesh, rng = cube(3, point["seed"]), np.random.default_rng(point["seed"])
     material = Material(YOUNG, POISSON, 1000.0, damping_ratio=0.0)

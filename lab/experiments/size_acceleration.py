@@ -31,7 +31,7 @@ THESIS_RATIO = 8.0
 TOLERANCE = 0.1
 """Largest relative deviation from `THESIS_RATIO` that counts as agreement."""
 STEP = 1e-6
-"""Length of the step over which an acceleration is measured [s]. It is so short that the body hardly
+"""Length of the step over which an acceleration is measured [s]. The step is so short that the body hardly
 moves."""
 
 

@@ -44,8 +44,7 @@ ROUNDING = 1.5
 """Largest factor between an edge and the thesis's edge. The thesis prints one digit: 1e6 can stand for
 1.5e6."""
 EQUAL = 1.1
-"""Largest factor between edges that count as equal. It is smaller than the factor between neighbouring
-moduli."""
+"""Largest factor between edges that count as equal. The factor between neighbouring moduli is larger."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
@@ -210,8 +209,9 @@ def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
 def _window_verdict(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> Verdict:
     """Return the verdict on the range of whole spheres.
 
-    It is "differs" if an edge is wrong, or if a sphere between the thesis's edges collapses or explodes.
-    Otherwise it is "agrees in part" if a sphere between the edges is dented, and "agrees" if none is.
+    The verdict is "differs" if an edge is wrong, or if a sphere between the thesis's edges collapses or
+    explodes. Otherwise the verdict is "agrees in part" if a sphere between the edges is dented, and "agrees"
+    if no sphere is.
     """
     if not (all(_edges_agree(numbers, nu, collapsed)) and _is_calm(numbers, nu, collapsed)):
         return Verdict.DIFFERS

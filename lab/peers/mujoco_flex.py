@@ -88,8 +88,8 @@ def _advance(model: Any, data: Any, steps: int) -> None:
 def _positions(model: Any, data: Any) -> NDArray[np.float64]:
     """Recompute and return the positions of the vertices, (n, 3) [m]; NaN after an instability.
 
-    MuJoCo stores the positions before the step. It resets the simulation if it detects an instability. A
-    reset counts as an explosion.
+    The positions that MuJoCo stores are those before the step. After an instability, MuJoCo resets the
+    simulation, which counts as an explosion.
     """
     import mujoco
 

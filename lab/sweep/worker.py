@@ -101,7 +101,7 @@ class Worker:
         return f"exit code {code}" if code is None or code >= 0 else f"killed by {signal.Signals(-code).name}"
 
     def _start(self) -> None:
-        """Start a process that ignores Ctrl-C. It ends when the pipe is closed."""
+        """Start a process that ignores Ctrl-C. The process ends when the pipe is closed."""
         self._is_starting = True
         self._pipe, theirs = CONTEXT.Pipe()
         self._process = CONTEXT.Process(target=_serve, args=(theirs, self._arch), daemon=True)

@@ -65,7 +65,7 @@ WRECKED_SEEDS = range(3)
 def law_variants() -> list[tuple[str | None, str | None]]:
     """Return pairs of law and flips. The first pair, (None, None), stands for the defaults.
 
-    The others are all pairs of a law on tetrahedra and a treatment of flips that this law supports.
+    The other pairs combine each law on tetrahedra with each treatment of flips that the law supports.
     """
     laws = [law for law in LAWS.values() if isinstance(law, StressLaw | EnergyLaw)]
     return [(None, None), *((law.name, flips.value) for law in laws for flips in law.flips)]
@@ -88,7 +88,8 @@ def choose_cells(
         flips: treatment of inverted tetrahedra; None for all treatments that each law supports.
         damping: a name in `DAMPINGS`. None chooses "default" for the default law, and all dampings for the
             other laws.
-        count: size of a random sample of each group; None for all cells. Larger samples contain smaller ones.
+        count: size of a random sample of each group; None for all cells. A larger sample contains all smaller
+            samples.
         wrecks: number of random deformed bodies to add if `groups` is None or contains "wrecked".
     Raises: OptionError for unknown names.
     """
@@ -125,7 +126,10 @@ def _require_known(option: str, name: str, known: Any) -> None:
 
 
 def _sample(total: int, count: int) -> list[int]:
-    """Choose `count` of `total` indices at random, with a fixed seed. Larger samples contain smaller ones."""
+    """Choose `count` of `total` indices at random, with a fixed seed.
+
+    A larger sample contains all smaller samples.
+    """
     return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 

@@ -110,8 +110,8 @@ def _energy_density(law: LawName, F: Floats) -> Floats:
 def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float:
     """Return the power lost in the dampers of all edges [W].
 
-    It is the sum of b (n . dv)^2, with the damping b, the unit vector n along an edge, and the velocity
-    difference dv of its ends.
+    The power is the sum of b (n . dv)^2, with the damping b, the unit vector n along an edge, and the
+    velocity difference dv of its ends.
     """
     p, q = mesh.edges.T
     along = x[q] - x[p]

@@ -40,7 +40,7 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Return the indices of the fixed vertices: those more than half a radius above the centre."""
+    """Return the indices of the fixed vertices, which lie more than half a radius above the centre."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
