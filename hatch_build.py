@@ -1,4 +1,4 @@
-"""While a wheel is built: three.js comes in. Without a network `taichi-soft live` fetches it later."""
+"""Build hook that adds three.js to a wheel. Without a network, `taichi-soft live` fetches three.js later."""
 
 import runpy
 from pathlib import Path
@@ -7,10 +7,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class FetchThreeJs(BuildHookInterface):
-    """See `taichi_soft/live/three_js.py`."""
+    """Hatchling's hook that fetches three.js, see `taichi_soft/live/three_js.py`."""
 
     def initialize(self, version, build_data):
-        """Before files are collected."""
+        """Fetch three.js before hatchling collects the files. Without a network, display a warning."""
         try:
             runpy.run_path(str(Path(self.root) / "taichi_soft" / "live" / "three_js.py"))["fetch_three_js"]()
         except OSError as error:

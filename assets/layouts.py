@@ -1,4 +1,4 @@
-"""Point layouts and connections made for one body each: a long rod, a disc, a plate with a hole."""
+"""Vertices and elements of three bodies: a long rod, a disc, and a plate with a hole."""
 
 from __future__ import annotations
 
@@ -7,20 +7,31 @@ from scipy.spatial import Delaunay
 
 
 def ring(count: int, radius: float, phase: float = 0.0) -> np.ndarray:
-    """(count, 2) points on a circle; `phase` turns them, in steps of their spacing."""
+    """Return `count` evenly spaced points on a circle, (count, 2).
+
+    Args:
+        phase: rotation of the points about the centre [spacing of the points].
+    """
     angle = (np.arange(count) + phase) * (2 * np.pi / count)
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def flat_triangles(points: np.ndarray, least_area: float = 1e-6) -> np.ndarray:
-    """Delaunay triangles (t, 3) of points (n, 2), without those of no area along straight borders."""
+    """Return the Delaunay triangles of points (n, 2), except flat triangles along straight borders, (t, 3).
+
+    Args:
+        least_area: smallest value of twice the area of a triangle.
+    """
     triangles = Delaunay(points).simplices.astype(np.int64)
     a, b = (points[triangles[:, i]] - points[triangles[:, 0]] for i in (1, 2))
     return triangles[np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > least_area]
 
 
 def disc(rings: list[tuple[int, float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """A disc as its centre and rings of (count, radius, phase), and the triangles between them."""
+    """Make a disc from its centre and rings of (count, radius, phase).
+
+    Returns: points (n, 2), and the triangles between them (t, 3).
+    """
     points = np.concatenate([np.zeros((1, 2)), *(ring(*each) for each in rings)])
     return points, flat_triangles(points)
 
@@ -33,17 +44,17 @@ def rod(
     cap: list[tuple[int, float, float]],
     axis: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A long cylinder with points on its surface and a few on its axis; axis along z.
+    """Make a cylinder along z with points on its surface and a few points on its axis.
 
-    Every triangle of the surface is joined to one axis point, and every edge between triangles of different
-    axis points to the piece of axis between those. So no tetrahedron lies flat in the surface, which is
-    where a Delaunay triangulation of the same points has its slivers.
+    Each surface triangle forms a tetrahedron with one axis point. Each edge between triangles of different
+    axis points forms tetrahedra with the segments of the axis between these points. So no tetrahedron lies
+    flat in the surface, where a Delaunay triangulation of the same points would have slivers.
 
     Args:
-        around: points on each of the staggered rings of the wall.
-        bands: for each axis point, how many layers of the wall belong to it.
+        around: number of points on each ring of the wall. Neighbouring rings are staggered.
+        bands: number of layers of the wall that belong to each axis point.
         cap: rings (count, radius, phase) of points inside each of the two flat ends.
-        axis: the axis points lie evenly between z = -axis and z = axis.
+        axis: the axis points are evenly spaced from z = -axis to z = axis.
     Returns: points (n, 3) and tetrahedra (m, 4) of either orientation.
     """
     levels = np.linspace(-height / 2, height / 2, sum(bands) + 1)
@@ -85,7 +96,14 @@ def rod(
 def plate_with_hole(
     length: float, width: float, hole: float, spacing: float, smoothing: int = 60
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A rectangle about the origin with a round hole of radius `hole` in the middle, in even triangles."""
+    """Make a rectangle about the origin with a round hole in its centre, with triangles of similar size.
+
+    Args:
+        hole: radius of the hole.
+        spacing: distance between neighbouring points.
+        smoothing: number of rounds in which each inner point moves to the mean of its neighbours.
+    Returns: points (n, 2) and triangles (t, 3).
+    """
 
     def side(count: int) -> np.ndarray:
         return np.linspace(-0.5, 0.5, count + 1)[:-1]

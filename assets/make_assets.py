@@ -1,6 +1,7 @@
-"""Make the mesh files in this folder. The same command makes the same files: every random choice is seeded.
+"""Make the mesh files in this folder. All random choices are seeded, so the files are reproducible.
 
-Needs `pip install "taichi-soft[voronoi]"`. Prints a row of the table in README.md for each file.
+The script needs `pip install "taichi-soft[voronoi]"`. For each file, it prints a row of the table in
+README.md.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ FOLDER = Path(__file__).parent
 
 
 def sphere() -> TetMesh:
-    """The ball of section 6.6: 381 particles, 4 m^3; fine at the surface, coarse inside."""
+    """Make the ball of section 6.6: 381 particles and 4 m^3, fine at the surface and coarse inside."""
     total, inner, depth, seed = 381, 17, 0.5, 2
-    # 200 degrees per metre of the unit ball: as good a time step as 15 degrees allows.
+    # Weight of heights relative to angles [degrees/m]. With this weight, the time step in the unit ball is as
+    # long as with angles of 15 degrees.
     angle_per_height = 200.0
     outer = spread_on_sphere(total - inner - 1, seed)
     shell = depth * spread_on_sphere(inner, seed + 1)
@@ -38,32 +40,32 @@ def sphere() -> TetMesh:
 
 
 def cylinder_long() -> TetMesh:
-    """The cylinder that is stretched in section 6.6: 4 m long, 1.5 m across."""
+    """Make the cylinder that is stretched in section 6.6: 4 m long, 1.5 m in diameter."""
     cap = [(8, 0.45, 0.1), (2, 0.15, 0.0)]
     points, tets = rod(4.0, 0.75, around=13, bands=[3, 2, 2, 2, 2, 3], cap=cap, axis=1.5)
     return TetMesh(points, tets, fix_orientation=True)
 
 
 def cylinder_flat() -> TetMesh:
-    """The cylinder of figure 6.4, pulled and sheared by its flat ends: 0.5 m high, 2 m across."""
+    """Make the cylinder of figure 6.4, whose flat ends are moved apart or sideways: 0.5 m high, 2 m wide."""
     points, triangles = disc([(6, 0.27, 0.0), (12, 0.53, 0.0), (17, 0.78, 0.0), (18, 1.0, 0.0)])
     return extrude(points, triangles, layers=2, height=0.5)
 
 
 def cube() -> TetMesh:
-    """The cube of figures 5.1 and 5.2: edge 1 m."""
+    """Make the cube of figures 5.1 and 5.2, with edges of 1 m."""
     return box((1.0, 1.0, 1.0), (4, 4, 4))
 
 
 def bars() -> TetMesh:
-    """Three bars that cross in the middle, each 13 times as long as thick, to see them bend."""
+    """Make three bars that cross in the middle, each 13 times as long as thick, so that they bend visibly."""
     mask = np.zeros((26, 26, 26), dtype=bool)
     mask[:, 12:14, 12:14] = mask[12:14, :, 12:14] = mask[12:14, 12:14, :] = True
     return voxels(mask, 0.1)
 
 
 def beam_with_hole() -> TetMesh:
-    """A beam along x with a round hole through it along z: the larger body, for timing."""
+    """Make a beam along x with a round hole along z. This larger body is for timing."""
     points, triangles = plate_with_hole(3.0, 1.0, 0.25, spacing=0.117)
     return extrude(points, triangles, layers=5, height=0.6)
 
@@ -74,7 +76,7 @@ BODIES: dict[str, Callable[[], TetMesh]] = {
 
 
 def table_row(name: str, mesh: TetMesh) -> str:
-    """The measures of one mesh, as a row of the table in README.md."""
+    """Format the properties of a mesh as a row of the table in README.md."""
     size = " x ".join(f"{edge:.3g}" for edge in mesh.bounds[1] - mesh.bounds[0])
     quality = mesh.quality
     return (

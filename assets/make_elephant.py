@@ -10,14 +10,14 @@
 #     "xatlas==0.0.11",
 # ]
 # ///
-"""Make `elephant.glb`: a toy elephant that sits, 0.5 m high, with a painted texture.
+"""Make `elephant.glb`: a sitting toy elephant, 0.5 m high, with a painted texture.
 
-`uv run assets/make_elephant.py`, or with the packages above installed, `python assets/make_elephant.py`.
-The same packages make the same file. All lengths below are in heights of the toy, about; z is up and it looks
-along -y. The file has y up, as glTF wants it.
+Run `uv run assets/make_elephant.py`, or install the packages above and run `python assets/make_elephant.py`.
+The same packages make the same file. In this script, the unit of length is about the height of the toy, z
+points up, and the elephant looks along -y. In the file, y points up, as glTF requires.
 
-Its shape is where a function of space is zero: round parts, blended. Its colours are a function of space as
-well, looked up at every pixel of the texture.
+The shape is the zero level of a function of space that blends round parts. The colours are also a function of
+space, which is evaluated at each pixel of the texture.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ Floats = NDArray[np.float64]
 
 FILE = Path(__file__).parent / "elephant.glb"
 HEIGHT = 0.5  # [m]
-TRIANGLES, ROUNDS = 14000, 12  # how many, and rounds of making them rounder
-GRID = 0.011  # edge of a cell in which the surface is looked for
-PIXELS, MARGIN, QUALITY = 1024, 6, 90  # of the texture: edge, paint beyond each chart, JPEG quality
-LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # what is searched
+TRIANGLES, ROUNDS = 14000, 12  # number of triangles, rounds of smoothing
+GRID = 0.011  # edge of a cell of marching cubes
+PIXELS, MARGIN, QUALITY = 1024, 6, 90  # texture: edge and margin around charts [pixels], JPEG quality
+LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # corners of the sampled box
 
 EYES = np.array([[-0.105, -0.262, 0.765], [0.105, -0.262, 0.765]])
 EYE = 0.036  # radius
-EAR, EAR_SIZE = np.array([0.40, 0.02, 0.735]), np.array([0.235, 0.0, 0.265])  # middle, half axes
-EAR_TURN, EAR_TILT = 0.45, 0.22  # forward about z, outward about y [rad]
-EAR_THICKNESS = 0.052  # half of it
+EAR, EAR_SIZE = np.array([0.40, 0.02, 0.735]), np.array([0.235, 0.0, 0.265])  # centre, half axes
+EAR_TURN, EAR_TILT = 0.45, 0.22  # rotations: forward about z, outward about y [rad]
+EAR_THICKNESS = 0.052  # half thickness
 TRUNK = np.array(
     [
         [0, -0.20, 0.70],
@@ -69,26 +69,33 @@ SPOT = (0.54, 0.66, 0.80)
 
 
 def blend(a: Floats, b: Floats, width: float) -> Floats:
-    """Union of two solids, rounded over `width` where they meet."""
+    """Return the distance to the union of two solids, rounded over `width` at their junction.
+
+    Args:
+        a, b: distances to the solids, negative inside.
+    """
     h = np.clip(0.5 + 0.5 * (b - a) / width, 0.0, 1.0)
     return b + (a - b) * h - width * h * (1.0 - h)
 
 
 def ellipsoid(p: Floats, middle: tuple[float, ...], axes: tuple[float, ...]) -> Floats:
-    """Distance to it, nearly."""
+    """Return the approximate distance of points (..., 3) from an ellipsoid, (...); negative inside."""
     q = (p - np.array(middle)) / np.array(axes)
     far, slope = np.linalg.norm(q, axis=-1), np.linalg.norm(q / np.array(axes), axis=-1)
     return far * (far - 1.0) / np.maximum(slope, 1e-9)
 
 
 def cone(p: Floats, a: Floats, b: Floats, start: float, end: float) -> Floats:
-    """Distance to a round rod from a to b, of radii `start` and `end`, nearly."""
+    """Return the approximate distance from a round rod from `a` to `b` with end radii `start` and `end`."""
     along = np.clip((p - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
     return np.linalg.norm(p - a - along[..., None] * (b - a), axis=-1) - (start + (end - start) * along)
 
 
 def ear_axes(p: Floats) -> Floats:
-    """Places in the axes of the right ear: across, out of its front, up. Both ears are one, mirrored."""
+    """Return points in the axes of the right ear: across, towards its front, and up, (..., 3).
+
+    Points to the left are mirrored, because the left ear mirrors the right one.
+    """
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1) - EAR
     c, s = np.cos(EAR_TURN), np.sin(EAR_TURN)
     across, front, up = c * q[..., 0] - s * q[..., 1], -s * q[..., 0] - c * q[..., 1], q[..., 2]
@@ -97,17 +104,17 @@ def ear_axes(p: Floats) -> Floats:
 
 
 def ear(p: Floats) -> Floats:
-    """Distance to both: a hollow disc, thick at its rim."""
+    """Return the distance of points from both ears: dished discs with round rims."""
     x, y, z = np.moveaxis(ear_axes(p), -1, 0)
     a, b = EAR_SIZE[0] - EAR_THICKNESS, EAR_SIZE[2] - EAR_THICKNESS
     far = np.sqrt((x / a) ** 2 + (z / b) ** 2)
     flat = np.maximum((far - 1.0) * min(a, b), 0.0)
-    hollow = y - 0.09 * (far**2 - 0.6)  # the rim comes forward
+    hollow = y - 0.09 * (far**2 - 0.6)  # the rim is in front of the centre
     return np.sqrt(flat**2 + hollow**2) - EAR_THICKNESS
 
 
 def solid(p: Floats) -> Floats:
-    """Below zero within the elephant, (...,) for places (..., 3)."""
+    """Return the approximate distance of points (..., 3) from the elephant, (...); negative inside."""
     mirrored = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
     body = ellipsoid(p, (0, 0.02, 0.29), (0.275, 0.245, 0.30))
     body = blend(body, ellipsoid(p, (0, -0.07, 0.25), (0.235, 0.22, 0.22)), 0.10)
@@ -129,13 +136,17 @@ def solid(p: Floats) -> Floats:
 
 
 def gradient(p: Floats) -> Floats:
-    """Of `solid`, by central differences, (n, 3)."""
+    """Return the gradient of `solid` at points (n, 3) by central differences, (n, 3)."""
     step = 1e-4 * np.eye(3)
     return np.stack([(solid(p + each) - solid(p - each)) / 2e-4 for each in step], axis=-1)
 
 
 def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Vertices, triangles and normals: marching cubes, coarser where it is flat, put back on the solid."""
+    """Return the vertices (n, 3), the triangles (m, 3) and the vertex normals (n, 3) of the elephant.
+
+    Marching cubes make a mesh of the surface, which is simplified, smoothed, and projected back onto the
+    solid.
+    """
     axes = [np.arange(lo, hi, GRID) for lo, hi in zip(LOW, HIGH, strict=True)]
     values = solid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     points, triangles, _, _ = marching_cubes(values, 0.0, spacing=(GRID,) * 3, gradient_direction="descent")
@@ -145,7 +156,7 @@ def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
     points = on_solid(points.astype(np.float64))
     edges = trimesh.Trimesh(points, triangles, process=False).edges_unique
     ends, others = np.concatenate([edges, edges[:, ::-1]]).T
-    for _ in range(ROUNDS):  # towards the middle of their neighbours, which makes triangles rounder
+    for _ in range(ROUNDS):  # move vertices towards the mean of their neighbours, for regular triangles
         counts = np.bincount(ends, minlength=len(points))[:, None]
         middle = np.stack([np.bincount(ends, points[others, k], len(points)) for k in range(3)], axis=1)
         points = on_solid(points + 0.4 * (middle / counts - points))
@@ -154,7 +165,7 @@ def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
 
 
 def on_solid(points: Floats) -> Floats:
-    """Points near the surface, put on it: Newton's method along the gradient."""
+    """Project points near the surface onto it, by Newton's method along the gradient."""
     for _ in range(3):
         slope = gradient(points)
         points = points - slope * (solid(points) / np.maximum((slope**2).sum(axis=1), 1e-9))[:, None]
@@ -162,18 +173,25 @@ def on_solid(points: Floats) -> Floats:
 
 
 def soft(distance: Floats, width: float = 0.012) -> Floats:
-    """1 below zero, 0 above, smooth between."""
+    """Return 1 for negative and 0 for positive distances, with a smooth transition over `width`."""
     t = np.clip(0.5 - distance / width, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def over(colors: Floats, paint: tuple[float, ...], share: Floats) -> None:
-    """Lay paint over colours (n, 3)."""
+    """Blend a paint over colours (n, 3), in place.
+
+    Args:
+        share: opacity of the paint, (n,).
+    """
     colors += share[:, None] * (np.array(paint) - colors)
 
 
 def spots(p: Floats) -> Floats:
-    """How far places are from the rims of round spots of several sizes, spread over its back and sides."""
+    """Return the distance of points from the rims of round spots, (n,); negative inside a spot.
+
+    The spots have several sizes and are spread over the elephant's back and sides.
+    """
     rng = np.random.default_rng(5)
     places = rng.uniform([-0.3, -0.1, 0.05], [0.3, 0.35, 1.0], (400, 3))
     kept: list[tuple[Floats, float]] = []
@@ -185,7 +203,7 @@ def spots(p: Floats) -> Floats:
 
 
 def paint(p: Floats) -> Floats:
-    """sRGB from 0 to 1 at places on the surface, (n, 3)."""
+    """Return the colours of points on the surface, sRGB from 0 to 1, (n, 3)."""
     colors = np.tile(np.array(BODY), (len(p), 1))
     mirrored = np.stack([np.abs(p[:, 0]), p[:, 1], p[:, 2]], axis=1)
     over(colors, SPOT, 0.8 * soft(spots(p)) * soft(-p[:, 1] - 0.03, 0.05) * soft(mirrored[:, 0] - 0.27))
@@ -216,14 +234,17 @@ def paint(p: Floats) -> Floats:
     over(colors, TUFT, 0.9 * soft(brow))
     out = np.array([0.25, -0.93, 0.26])
     over(colors, BLACK, soft(np.linalg.norm(mirrored - EYES[1], axis=1) - 1.28 * EYE, 0.008))
-    for eye in EYES:  # light from the same side in both
+    for eye in EYES:  # the light comes from the same side in both eyes
         glint = eye + 1.05 * EYE * out / np.linalg.norm(out) + np.array([-0.014, 0.0, 0.012])
         over(colors, WHITE, soft(np.linalg.norm(p - glint, axis=1) - 0.013, 0.006))
     return np.asarray(colors * weave(p)[:, None])
 
 
 def on_trunk(p: Floats) -> tuple[Floats, Floats]:
-    """How far along the trunk's middle places are, and how far outside of the trunk, each (n,)."""
+    """Locate points (n, 3) relative to the trunk.
+
+    Returns: position along its centre line, and distance from its surface, (n,) each.
+    """
     starts, ways = TRUNK[:-1], np.diff(TRUNK, axis=0)
     shares = np.clip(((p[:, None] - starts) * ways).sum(axis=2) / (ways**2).sum(axis=1), 0.0, 1.0)
     far = np.linalg.norm(p[:, None] - starts - shares[..., None] * ways, axis=2)
@@ -236,13 +257,13 @@ def on_trunk(p: Floats) -> tuple[Floats, Floats]:
 
 
 def weave(p: Floats) -> Floats:
-    """The pattern of its cloth: threads that cross, a few per cent lighter and darker."""
+    """Return the brightness of the cloth at points (n, 3), (n,). Crossing threads vary by a few per cent."""
     x, y, z = (2 * np.pi / 0.020 * p).T
     return 1.0 + 0.022 * (np.sin(x + z) + np.sin(y - z) + np.sin(x - y))
 
 
 def texture(points: Floats, triangles: NDArray[np.int64], uv: Floats) -> Image.Image:
-    """The painted picture: every pixel of a chart has the colour of its place on the surface."""
+    """Paint the texture. Each pixel of a chart gets the colour of its point on the surface."""
     places = np.zeros((PIXELS, PIXELS, 3))
     is_painted = np.zeros((PIXELS, PIXELS), dtype=bool)
     corners = np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)[triangles] * PIXELS - 0.5
@@ -271,7 +292,7 @@ def texture(points: Floats, triangles: NDArray[np.int64], uv: Floats) -> Image.I
 
 
 def main() -> None:
-    """Write the file."""
+    """Write `elephant.glb` and print its properties."""
     points, triangles, normals = surface()
     atlas = xatlas.Atlas()
     atlas.add_mesh(points.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32))
@@ -281,7 +302,7 @@ def main() -> None:
     atlas.generate(charts, pack)
     source, corners, uv = atlas[0]
     uv = np.asarray(uv, dtype=np.float64)
-    uv[:, 1] = 1.0 - uv[:, 1]  # trimesh's begin at the lower left
+    uv[:, 1] = 1.0 - uv[:, 1]  # the texture coordinates of trimesh start at the lower left
     corners = np.asarray(corners, dtype=np.int64)
     picture = texture(points[source], corners, uv)
     material = trimesh.visual.material.PBRMaterial(

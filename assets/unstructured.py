@@ -1,4 +1,4 @@
-"""Tetrahedra from scattered points: Delaunay, then moving points until the worst angles are good."""
+"""Connect scattered points to tetrahedra by Delaunay's rule, and move points to improve the worst angles."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from taichi_soft.meshing.quality import measure_quality
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.topology import LOCAL_FACES, surface_of
 
-# Tetrahedra of the Delaunay triangulation with a smaller angle than this [degrees] lie flat on the surface,
-# between points that share a plane or nearly so; without them the surface is as good.
+# Delaunay tetrahedra of surface points with a smaller dihedral angle [degrees] lie flat on the surface. They
+# can be removed without harm to the surface.
 HULL_SLIVER = 4.0
 
 
 @dataclass
 class Cloud:
-    """Points and what holds each of them.
+    """Points and their constraints. A constraint is NaN for a free point.
 
     Attributes:
-        points: (n, 3).
-        sphere: (n,) distance from the origin that a point keeps, nan if free.
-        radius: (n,) distance from the z axis that it keeps, nan if free.
-        height: (n,) z that it keeps, nan if free.
+        points: positions, (n, 3).
+        sphere: prescribed distance of each point from the origin, (n,).
+        radius: prescribed distance of each point from the z axis, (n,).
+        height: prescribed z of each point, (n,).
     """
 
     points: np.ndarray
@@ -34,11 +34,11 @@ class Cloud:
     height: np.ndarray
 
     def is_held(self) -> np.ndarray:
-        """(n,) which points have to stay on the surface."""
+        """Return True for each point that must stay on the surface, (n,)."""
         return ~(np.isnan(self.sphere) & np.isnan(self.radius) & np.isnan(self.height))
 
     def held(self, index: int, point: np.ndarray) -> np.ndarray:
-        """`point` put back to where point `index` may be."""
+        """Return `point`, (3,), moved so that it satisfies the constraints of the point with this index."""
         point = point.copy()
         if self.sphere[index] == self.sphere[index]:
             point *= self.sphere[index] / np.linalg.norm(point)
@@ -50,7 +50,7 @@ class Cloud:
 
 
 def spread_on_sphere(count: int, seed: int, steps: int = 300) -> np.ndarray:
-    """`count` points on the unit sphere that have pushed each other apart (Thomson's problem)."""
+    """Spread points on the unit sphere by mutual repulsion (Thomson's problem). Returns: (count, 3)."""
     index = np.arange(count) + 0.5
     latitude, longitude = np.arccos(1 - 2 * index / count), np.pi * (1 + np.sqrt(5)) * index
     points = np.column_stack(
@@ -72,7 +72,7 @@ def spread_on_sphere(count: int, seed: int, steps: int = 300) -> np.ndarray:
 
 
 def triangulate(cloud: Cloud, sliver: float = HULL_SLIVER) -> np.ndarray:
-    """Delaunay tetrahedra of positive volume, without flat ones that lie on the surface."""
+    """Return Delaunay tetrahedra of positive volume, without flat tetrahedra on the surface, (m, 4)."""
     points = cloud.points
     tets = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[tets[:, i]] - points[tets[:, 0]] for i in (1, 2, 3))
@@ -92,9 +92,11 @@ def triangulate(cloud: Cloud, sliver: float = HULL_SLIVER) -> np.ndarray:
 
 
 def worth(points: np.ndarray, tets: np.ndarray, angle_per_height: float) -> np.ndarray:
-    """(m,) score of each tetrahedron: its smallest dihedral angle or its smallest height, whichever is worse.
+    """Return the score of each tetrahedron, (m,).
 
-    The height, which limits the time step, counts `angle_per_height` degrees per metre.
+    The score is the smallest dihedral angle [degrees], or the weighted smallest height if this is less. The
+    height limits the time step. Its weight is `angle_per_height` degrees per metre. Inverted tetrahedra have
+    the score -1.
     """
     corners = points[tets]
     faces = corners[:, LOCAL_FACES]
@@ -108,7 +110,10 @@ def worth(points: np.ndarray, tets: np.ndarray, angle_per_height: float) -> np.n
 
 
 def polish(cloud: Cloud, tets: np.ndarray, seed: int, trials: int, angle_per_height: float) -> None:
-    """Move points of the worst tetrahedra at random, keeping each move that raises the worst score there."""
+    """Move points of the worst tetrahedra at random.
+
+    A move is kept if it raises the worst score of the tetrahedra around the point.
+    """
     random = np.random.default_rng(seed)
     around = [np.flatnonzero((tets == vertex).any(axis=1)) for vertex in range(len(cloud.points))]
     score = worth(cloud.points, tets, angle_per_height)

@@ -1,8 +1,8 @@
-"""Docstrings of this code base as mkdocstrings understands them: a Griffe extension.
+"""Griffe extension that prepares the docstrings of this code base for mkdocstrings.
 
-Ours write `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each, and code
-under `Example:`. A comment beside a field of a dataclass describes it. Signatures print the values of
-constants. A class that only a world makes has no signature.
+Our docstrings have `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each,
+and code under `Example:`. Comments after the fields of a dataclass describe the fields. Signatures show the
+values of constants. Classes that only a world can create have no signature.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 import griffe
 
-import taichi_soft  # noqa: F401 - the modules that hold the values of constants
+import taichi_soft  # noqa: F401 - loads the modules that define constants
 
 LIST = re.compile(r"^(Args|Attributes):$")
 EXAMPLE = "Example:"
@@ -25,9 +25,9 @@ COMMENT = re.compile(r"\s#\s(?!noqa|type:)(.*)$")
 
 
 def sectioned(text: str) -> str:
-    """The docstring with its sections set apart."""
+    """Return a docstring with an empty line before each section, and its sections as Markdown."""
     lines: list[str] = []
-    section = ""  # that the present line belongs to
+    section = ""  # section of the current line
     for line in text.splitlines():
         if line == EXAMPLE:
             section = EXAMPLE
@@ -53,7 +53,7 @@ def sectioned(text: str) -> str:
 
 
 def value_of(default: griffe.Expr, module: str) -> str | None:
-    """A default as the value that its names stand for; None where it reads best as it is."""
+    """Return the value of a default that contains names, as text; None if the source text is clearer."""
     names = [part.name for part in default.iterate(flat=True) if isinstance(part, griffe.ExprName)]
     if not names or module not in sys.modules:
         return None
@@ -67,7 +67,7 @@ def value_of(default: griffe.Expr, module: str) -> str | None:
 
 
 def described_fields(cls: griffe.Class) -> list[str]:
-    """What a dataclass says of its fields in comments beside them; where it says nothing, their types."""
+    """Return a line for each field of a dataclass: the comment after the field, or else its type."""
     lines = []
     for name, member in cls.members.items():
         if not (member.is_attribute and "instance-attribute" in member.labels and member.annotation):
@@ -79,21 +79,21 @@ def described_fields(cls: griffe.Class) -> list[str]:
 
 
 class DocstringSections(griffe.Extension):
-    """Griffe calls it for every object that it has read."""
+    """Extension whose methods Griffe calls for every object that it has read."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Set the sections of its docstring apart."""
+        """Separate the sections of the object's docstring."""
         if obj.docstring is not None:
             obj.docstring.value = sectioned(obj.docstring.value)
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
-        """Print the values of constants."""
+        """Replace constants in the defaults of parameters by their values."""
         for parameter in func.parameters:
             if isinstance(parameter.default, griffe.Expr):
                 parameter.default = value_of(parameter.default, func.module.path) or parameter.default
 
     def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
-        """List the fields of a dataclass whose docstring does not; hide how a world makes its handles."""
+        """List a dataclass's fields if its docstring omits them. Hide constructors that only worlds call."""
         doc, init = cls.docstring, cls.members.get("__init__")
         if init is not None and init.docstring is not None and init.docstring.value.startswith("Use `"):
             del cls.members["__init__"]

@@ -1,10 +1,10 @@
-"""The gallery of the documentation site: an entry for every demo, and a page with its script.
+"""MkDocs hooks for the gallery: an entry for every demo and every playable scene, and a page for each script.
 
-An entry is made of the docstring of the demo: its first paragraph says what is seen, its second one what to
-notice. Above the demos are scenes to play, with the docstrings of `play/scenes.py`. Stills come from
-`docs/pictures`, which is in the repository; films and worlds from `docs/gallery`, where `make_gallery.py` and
-`make_worlds.py` put them. Without them an entry shows its still, and the page says how to make them. MkDocs
-calls these functions by their names (mkdocs.yml, `hooks`).
+The first paragraph of a demo's docstring says what is seen, the second what to notice. The docstrings in
+`play/scenes.py` describe the scenes, which are above the demos. Stills come from `docs/pictures`, which is in
+the repository. Films and worlds come from `docs/gallery`, where `make_gallery.py` and `make_worlds.py` write
+them. If they are missing, an entry shows its still, and the page says how to make them. MkDocs calls these
+functions by their names (mkdocs.yml, `hooks`).
 """
 
 from __future__ import annotations
@@ -86,15 +86,15 @@ search:
 
 @dataclass(frozen=True)
 class Played:
-    """Text of the gallery about a scene to play."""
+    """Text of the gallery about a playable scene."""
 
     name: str
     title: str
-    what: str  # to do
+    what: str  # what a visitor can do
 
 
 def scenes() -> list[Played]:
-    """All scenes to play: the public functions of their script."""
+    """Return all playable scenes, from the public functions of `play/scenes.py`."""
     script = ast.parse((ROOT / "docs" / "play" / "scenes.py").read_text(encoding="utf-8"))
     found = []
     for each in script.body:
@@ -106,16 +106,16 @@ def scenes() -> list[Played]:
 
 @dataclass(frozen=True)
 class Demo:
-    """What the page says of a demo."""
+    """Script of a demo, and text of the gallery about it."""
 
     name: str
     script: str
-    what: str  # is seen
+    what: str  # what is seen
     notice: str
 
     @classmethod
     def of(cls, file: Path) -> Demo:
-        """The demo that a file sets. Raises: ValueError where its docstring has no second paragraph."""
+        """Read a demo from its file. Raises: ValueError if its docstring has no second paragraph."""
         script = file.read_text(encoding="utf-8")
         what, _, notice = (ast.get_docstring(ast.parse(script)) or "").partition("\n\n")
         if not notice:
@@ -124,14 +124,14 @@ class Demo:
 
 
 def demos() -> list[Demo]:
-    """All demos that set a stage."""
+    """Return all demos that define a function `stage`."""
     files = sorted((ROOT / "demos").glob("[a-z]*.py"))
     return [Demo.of(file) for file in files if "\ndef stage(" in file.read_text(encoding="utf-8")]
 
 
 def on_files(files: Any, config: Any) -> Any:
     """Add a page for the script of each demo."""
-    from mkdocs.structure.files import File  # here: what else is in this file works without MkDocs
+    from mkdocs.structure.files import File  # local: the rest of this file works without MkDocs
 
     for demo in demos():
         text = SCRIPT.format(name=demo.name, what=demo.what, script=demo.script.strip())
@@ -140,14 +140,14 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(text: str, page: Any, **_: Any) -> str:
-    """Fill the gallery."""
+    """Insert the entries into the page of the gallery."""
     if page.file.src_uri != "gallery.md":
         return text
     return text.replace("<!-- play -->", played()).replace("<!-- demos -->", entries())
 
 
 def played() -> str:
-    """An entry for each scene to play, which leads to its page where that was made."""
+    """Return the entries of all playable scenes. An entry links to its scene if the scene has been made."""
     found, missing = [], False
     for scene in scenes():
         named = {"name": scene.name, "title": escape(scene.title, quote=True)}
@@ -162,7 +162,7 @@ def played() -> str:
 
 
 def entries() -> str:
-    """One for each demo, and what holds them."""
+    """Return the entries of all demos, and the grid that contains them."""
     shown = [_entry(demo) for demo in demos()]
     filmed = sum("<video" in each for each in shown)
     head = [PAUSE] if filmed else []
@@ -173,7 +173,7 @@ def entries() -> str:
 
 
 def _entry(demo: Demo) -> str:
-    """Return what the page shows of a demo: its film, or else its still."""
+    """Return the entry of a demo, with its film, or with its still if there is no film."""
     named = {"name": demo.name, "alt": escape(demo.what, quote=True)}
     film = STILL.format(**named)
     if (FOLDER / f"{demo.name}.webm").is_file():

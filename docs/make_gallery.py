@@ -1,7 +1,8 @@
 """Make the films of all demos for the gallery of the documentation.
 
-`python docs/make_gallery.py` makes all, in some minutes; with names of demos, those. A demo that needs a
-missing package is skipped by name. `make_pictures.py` makes the stills, `make_worlds.py` what is played.
+`python docs/make_gallery.py` makes all films, which takes minutes. With names of demos, the script makes only
+the films of these demos. A demo that needs a missing package is skipped, with a message. `make_pictures.py`
+makes the stills, `make_worlds.py` the playable worlds.
 """
 
 import argparse
@@ -27,26 +28,26 @@ FOLDER = Path(__file__).parent / "gallery"
 SIZE, FPS = (480, 270), 25
 
 FADE = 10
-"""Pictures in which the last one becomes the first again."""
+"""Number of frames in which the last frame fades into the first."""
 
 SEEN, CHANGED, LOOK = 24, 0.004, 1.0
-"""A picture of which more than this share differs by more levels than that from the last one shows something
-that moves. A film ends so long after the last of these [s]."""
+"""A frame still shows motion if more than the fraction `CHANGED` of its pixels differ from the last frame by
+more than `SEEN` levels. A film ends `LOOK` [s] after the last such frame."""
 
 CODEC = (
     *("-c:v", "libvpx-vp9", "-crf", "34", "-b:v", "0"),
     *("-deadline", "good", "-cpu-used", "2", "-row-mt", "1"),
 )
-"""Small files, for which encoding may take its time."""
+"""Options for small files. Encoding can be slow."""
 
 MOST = 6e6
-"""Largest size of all films together [bytes]: a page is read on the way, too."""
+"""Largest size of all films together [bytes], small enough for readers with a mobile connection."""
 
 Progress = Callable[[int, int], None]
 
 
 def write_film(stage: Stage, name: str, on_frame: Progress, size: tuple[int, int] = SIZE) -> None:
-    """Write the film of a demo, which leads back into its beginning."""
+    """Write the film of a demo. The end of the film fades into its beginning, so that the film can loop."""
     with tempfile.TemporaryDirectory() as scratch:
         film(stage, Path(scratch) / "f.png", fps=FPS, size=size, on_frame=on_frame)
         pictures = [cv2.imread(str(file)) for file in sorted(Path(scratch).iterdir())]
@@ -61,19 +62,19 @@ def write_film(stage: Stage, name: str, on_frame: Progress, size: tuple[int, int
 
 
 def _end_of(pictures: list[NDArray[np.uint8]]) -> int:
-    """How many of them there is something to see in."""
+    """Return the number of frames to show, up to `LOOK` after the last motion."""
     shares = [(cv2.absdiff(each, pictures[-1]).max(axis=2) > SEEN).mean() for each in pictures]
     moving = np.flatnonzero(np.array(shares) > CHANGED)
     return min(len(pictures), int(moving.max(initial=0)) + 1 + round(LOOK * FPS))
 
 
 def _mixed(one: NDArray[np.uint8], other: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:
-    """Some of the other picture over the one."""
+    """Blend two images. `share` is the weight of `other`, from 0 to 1."""
     return np.asarray(cv2.addWeighted(one, 1.0 - share, other, share, 0.0), dtype=np.uint8)
 
 
 def main() -> None:
-    """Make what belongs to the demos that are named."""
+    """Make the films of the demos that are named, or of all demos."""
     options = argparse.ArgumentParser(description="Film the demos for the gallery of the documentation.")
     options.add_argument("names", nargs="*", metavar="NAME", help="a demo; all of them by default")
     options.add_argument("--seconds", type=float, help="shows at most this much of each demo")

@@ -1,7 +1,7 @@
 """Make the pictures of the README and the pages, and the stills of the gallery.
 
-`python docs/make_pictures.py` makes all, in some minutes; with names of demos, or of scenes to play such as
-`play/jelly`, only their stills.
+`python docs/make_pictures.py` makes all pictures, which takes minutes. With names of demos or of playable
+scenes, such as `play/jelly`, it makes only their stills.
 """
 
 import subprocess
@@ -24,10 +24,10 @@ from taichi_soft.render.props import Prop
 
 FOLDER = Path(__file__).parent / "pictures"
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
-"""That show what each demo is about [s]."""
+"""Moments of the demos in the picture `demos.png` [s]. Each moment shows what its demo is about."""
 
 STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
-"""Moments of demos that their stills in the gallery show [s]."""
+"""Moments of demos for their stills in the gallery [s]."""
 
 PLAYED = {
     "jelly": 0.3,
@@ -38,41 +38,41 @@ PLAYED = {
     "stiffness": 0.75,
     "hand": 0.2,
 }
-"""Moments of the scenes to play [s]."""
+"""Moments of the playable scenes for their stills [s]."""
 
 STILL = 0.3
-"""Moment of all others [share of the film's length]."""
+"""Moment of all other demos for their stills, as a fraction of the demo's length."""
 
 STRIP = (4, 6, 8, 14)
-"""Numbers of the frames that the page on films shows, at 20 per second."""
+"""Numbers of the frames that the page on films shows. The film has 20 FPS."""
 
 STILL_SIZE, QUALITY = (480, 270), 82
-"""Width and height [pixels] of the gallery's stills, and quality of their JPEG: about 20 kB each."""
+"""Width and height of the gallery's stills [pixels], and JPEG quality. A still has about 20 kB."""
 
 
 def still(name: str, moment: float | None, size: tuple[int, int] = (520, 292)) -> np.ndarray:
-    """Picture of a demo at a moment, uint8 (height, width, 3)."""
+    """Draw a demo at a moment [s]; None chooses `STILL`. Returns: uint8 (height, width, 3)."""
     stage = load_demo(name).stage()
     return still_of(stage, STILL * stage.seconds if moment is None else moment, size)
 
 
 def still_of(stage: Stage, moment: float, size: tuple[int, int]) -> np.ndarray:
-    """Picture of a stage at a moment, uint8 (height, width, 3)."""
-    film(stage, None, seconds=moment)  # draws nothing
+    """Draw a stage at a moment [s]. Returns: uint8 (height, width, 3)."""
+    film(stage, None, seconds=moment)  # simulates without drawing
     with tempfile.TemporaryDirectory() as folder:
         film(stage, Path(folder) / "f.png", fps=50, seconds=0.02, size=size)
         return cv2.imread(f"{folder}/f_0000.png")
 
 
 def write_still(name: str) -> None:
-    """Write the still of a demo in the gallery."""
+    """Write the still of a demo for the gallery."""
     file = FOLDER / "demos" / f"{name}.jpg"
     file.parent.mkdir(exist_ok=True)
     cv2.imwrite(str(file), still(name, STILLS.get(name), STILL_SIZE), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
 
 
 def write_played_still(name: str) -> None:
-    """Write the still of a scene to play."""
+    """Write the still of a playable scene for the gallery."""
     made = vars(scenes)[name]()
     actors = [Actor(body, made.colors[body.index]) for body in made.world.bodies]
     props = [Prop(surface, frame) for frame, surface in made.props.items()]
@@ -84,7 +84,7 @@ def write_played_still(name: str) -> None:
 
 
 def write_strip() -> None:
-    """Write some pictures of the film that `taichi-soft film` makes of an artist's mesh."""
+    """Write a strip of frames from the film that `taichi-soft film` makes of the elephant."""
     with tempfile.TemporaryDirectory() as folder:
         options = ["--out", f"{folder}/f.png", "--seconds", "1", "--fps", "20", "--size", "480x270"]
         command = [sys.executable, "-m", "taichi_soft", "film", str(ASSETS / "elephant.glb"), *options]
@@ -94,7 +94,7 @@ def write_strip() -> None:
 
 
 def main(names: list[str]) -> None:
-    """Write the stills of these demos, or all pictures."""
+    """Write the stills with these names, or all pictures if there are no names."""
     for name in names or [*demo_names(), *(f"play/{each}" for each in PLAYED)]:
         scene = name.removeprefix("play/")
         write_still(name) if scene == name else write_played_still(scene)

@@ -1,7 +1,7 @@
-"""Make what the playable gallery needs: the player, and each scene's world and recording.
+"""Make the playable gallery: the player, and the world and the recording of each scene.
 
-`python docs/make_worlds.py` makes all scenes, in some minutes; with names, those. An export ends what a
-process can do with Taichi, so that each scene is made by one of its own.
+`python docs/make_worlds.py` makes all scenes, which takes minutes. With names, it makes only these scenes.
+After an export, a process cannot use Taichi any more, so each scene is made in a separate process.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CREASE = 40.0
 
 
 def write_player(folder: Path) -> None:
-    """Write the page and the list of its scenes. Raises: OSError if three.js cannot be fetched."""
+    """Write the player's page and the list of its scenes. Raises: OSError if three.js cannot be fetched."""
     fetch_three_js()
     folder.mkdir(parents=True, exist_ok=True)
     own = [HERE / "play" / name for name in PAGE]
@@ -52,7 +52,10 @@ def write_player(folder: Path) -> None:
 
 
 def write_scene(name: str, folder: Path) -> None:
-    """Write a scene: world, recording, and what the page has to know. It ends this process's Taichi."""
+    """Write a scene: its world, its recording, and the data for the page.
+
+    After the export, this process cannot use Taichi any more.
+    """
     from play import scenes as made
 
     from taichi_soft.export import export_world
@@ -94,7 +97,11 @@ def write_scene(name: str, folder: Path) -> None:
 
 
 def _handles(world: Any) -> dict[str, Any]:
-    """The numbers by which a recording names bodies (by slot), colliders and frames, and the next one."""
+    """Return the serial numbers by which a recording names objects.
+
+    Returns: numbers of bodies (by slot), colliders and frames, with 0 for an empty slot; and the next free
+        number.
+    """
     from taichi_soft.control.frames import Frames
 
     context = context_of_world(world)
@@ -125,7 +132,7 @@ def _picture(folder: Path, picture: Any) -> str:
 
 
 def main() -> None:
-    """Make the scenes that are named, and the page for all that are there."""
+    """Make the scenes that are named, or all scenes, and the page for all scenes that exist."""
     options = argparse.ArgumentParser(description="Make the worlds of the playable gallery.")
     options.add_argument("names", nargs="*", metavar="NAME", help="a scene; all of them by default")
     options.add_argument("--out", type=Path, default=WORLDS, help="folder of the page")
@@ -140,7 +147,7 @@ def main() -> None:
             command = [sys.executable, __file__, name, "--alone", "--out", str(given.out)]
             subprocess.run(command, check=True)
         write_player(given.out)
-    except (MissingExtraError, OSError) as error:  # three.js has to be fetched once
+    except (MissingExtraError, OSError) as error:  # OSError: three.js could not be fetched
         say(f"playable worlds: skipped. {error}")
 
 

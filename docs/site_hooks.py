@@ -1,4 +1,4 @@
-"""Give the documentation site its address, its version, files above this folder and the report.
+"""MkDocs hooks: set the address and version of the site; add the report, and files from above this folder.
 
 MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
 """
@@ -48,7 +48,7 @@ main img {{ max-width: 100%; height: auto; background: #fff; }}
 
 
 def on_config(config: Any) -> Any:
-    """Show the repository of pyproject.toml, and the version of the library."""
+    """Set the address of the repository, from pyproject.toml, and the version of the library."""
     address = re.search(r'^Homepage = "(.*)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.M)
     assert address is not None
     config.repo_url, config.repo_name = address[1], config.site_name
@@ -57,7 +57,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages from above, and the report as one page that stands by itself."""
+    """Add the pages for files in `ABOVE`, and the report as a self-contained page."""
     for name, page in ABOVE.items():
         files.append(File.generated(config, page, abs_src_path=str(ROOT / name)))
     files.append(File.generated(config, "report/full.html", content=_report()))
@@ -65,7 +65,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(text: str, page: Any, **_: Any) -> str:
-    """Let links between files of the repository lead to their pages."""
+    """Redirect links between files of the repository to their pages, and fill in the page of the report."""
     name = page.file.src_uri
     if name == "report/index.md":
         return text.replace("<!-- head -->", _head()).replace("<!-- verdicts -->", _verdicts())
@@ -75,7 +75,7 @@ def on_page_markdown(text: str, page: Any, **_: Any) -> str:
 
 
 def _head() -> str:
-    """When and how the report was made, and how many claims hold."""
+    """Return sentences on when and how the report was made, and on how many claims hold."""
     text = (REPORT / "report.md").read_text(encoding="utf-8")
     facts = dict(re.findall(r"^- (\w+): (.*)$", text, re.MULTILINE))
     counts = re.findall(r"^Of \d+ (?:claims of the thesis|statements of theory): .*$", text, re.MULTILINE)
@@ -86,7 +86,7 @@ def _head() -> str:
 
 
 def _verdicts() -> str:
-    """The table of all claims with their verdicts."""
+    """Return all claims with their verdicts in Markdown, one table for each chapter."""
     lines, chapter = [], ""
     with (REPORT / "verdicts.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
@@ -102,9 +102,9 @@ def _verdicts() -> str:
 
 
 def _report() -> str:
-    """`report.md` as a page with the style of those that `python -m lab report` writes."""
+    """Return `report.md` as an HTML page in the style of the pages from `python -m lab report`."""
     text = (REPORT / "report.md").read_text(encoding="utf-8")
-    text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # a list in a list, four columns in
+    text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # nested lists need four spaces
     body = markdown.markdown(text, extensions=["tables", "sane_lists"])
     style = (ROOT / "lab/report/templates/report.css").read_text(encoding="utf-8")
     return PAGE.format(style=style, body=body)

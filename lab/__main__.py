@@ -1,7 +1,7 @@
 """Run the command line `python -m lab`.
 
-The imports take one or two seconds. During them, too, Ctrl-C ends the process with one line and exit code
-130.
+Ctrl-C ends the process with one line and exit code 130, even during the imports, which take one or two
+seconds.
 """
 
 import os

@@ -20,7 +20,7 @@ EXTRAS = {
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """List the packages of an extra, or of these modules of it, that are not installed."""
+    """List the packages of an extra that are not installed. `modules` restricts the list to these modules."""
     return missing_among(EXTRAS[extra], *modules)
 
 

@@ -1,4 +1,4 @@
-"""Playable scenes of the documentation. Each public function makes one.
+"""Playable scenes of the documentation. Each public function makes one scene.
 
 `controls` are plain data for `game.js`: sliders that set gravity, damping or wind, or move an object `along`
 or `about` a direction, and buttons that spawn or push bodies.
@@ -36,24 +36,27 @@ from taichi_soft.render import PALETTE, Camera
 
 CORAL, TEAL, HONEY, PERIWINKLE, LEAF, ROSE, SKY, CLAY = PALETTE
 STEPS = 300
-"""Length of the recording with which a browser compares its results."""
+"""Number of steps in the recording with which a browser compares its results."""
 
 
 @dataclass
 class Scene:
-    """A world and the data that a page needs to show it. Its function's docstring is the title and text."""
+    """A world and the data that a page needs to show it.
 
-    world: World  # built, made with `record=STEPS`
+    The docstring of the function that makes the scene contains the title and the text.
+    """
+
+    world: World  # a built world, created with `record=STEPS`
     camera: Camera
     controls: list[dict[str, Any]]
-    colors: list[Any]  # of the slots, sRGB from 0 to 1
-    names: dict[Any, str] = field(default_factory=dict)  # of assets, bodies, colliders and frames
-    textures: Mapping[SoftBodyAsset, Any] = field(default_factory=dict)  # pictures of PIL
+    colors: list[Any]  # colour of each slot, sRGB from 0 to 1
+    names: dict[Any, str] = field(default_factory=dict)  # names of assets, bodies, colliders, frames
+    textures: Mapping[SoftBodyAsset, Any] = field(default_factory=dict)  # PIL images
     props: Mapping[Frame, Any] = field(default_factory=dict)  # (vertices, triangles) drawn with a frame
 
 
 def _gravity(most: float = 2.0) -> dict[str, Any]:
-    """A slider for gravity, in multiples of the Earth's."""
+    """Return a slider for gravity, in multiples of the Earth's gravity."""
     return {
         "kind": "gravity",
         "label": "Gravity",
@@ -66,7 +69,7 @@ def _gravity(most: float = 2.0) -> dict[str, Any]:
 
 
 def _damping(value: float = 0.0) -> dict[str, Any]:
-    """A slider for the drag on all bodies."""
+    """Return a slider for the linear damping of all bodies [1/s]."""
     return {
         "kind": "damping",
         "label": "Damping",
@@ -106,14 +109,14 @@ def jelly() -> Scene:
 
 
 def _assets(world: World) -> list[SoftBodyAsset]:
-    """The asset of each slot."""
+    """Return the asset of each slot."""
     from taichi_soft.world.world import context_of_world
 
     return list(context_of_world(world).slots.assets)
 
 
 def _pudding() -> TetMesh:
-    """A fluted cylinder that narrows towards its top."""
+    """Make a fluted cylinder that narrows towards its top."""
     height, flutes = 0.7, 8
     mesh = cylinder(0.55, height, rings=4, layers=6)
     x, y, z = mesh.vertices.T
@@ -164,7 +167,7 @@ def bowl() -> Scene:
 
 
 def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
-    """Half a hollow ball with a round rim, open at the top; the origin is the centre of the opening."""
+    """Make half a hollow ball with a round rim, open at the top. The origin is the centre of the opening."""
     angles = np.linspace(0, np.pi / 2, 17)
     outer = (radius + wall) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = radius * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
@@ -176,7 +179,7 @@ def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
 def elephant() -> Scene:
     """Drop an elephant.
 
-    Drop elephants onto the steps. There is room for four; a fifth replaces the first.
+    Drop elephants onto the steps. The scene holds four elephants; a fifth replaces the first.
     """
     world = World(friction=0.8, record=STEPS)
     depth, rise, width = 0.6, 0.24, 2.4

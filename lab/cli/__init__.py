@@ -11,9 +11,9 @@ from taichi_soft.core.extras import require_extra
 def main(*arguments: str) -> None:
     """Run the command line.
 
-    An error of this package prints one line and exits with code 1; invalid options exit with code 2.
+    For an error of this package, print one line and exit with code 1. For invalid options, exit with code 2.
     Args:
-        arguments: arguments of the command; by default those of the process.
+        arguments: command-line arguments; by default the arguments of the process.
     """
     try:
         require_extra("cli", "the command line needs")

@@ -1,4 +1,4 @@
-"""Command `python -m lab drop-test`: random drops, and a sweep."""
+"""Command `python -m lab drop-test`: run random drops, or a sweep over meshes, materials and laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command `python -m lab peers`: one drop in taichi-soft, in other engines and in a fine reference."""
+"""Command `python -m lab peers`: simulate one drop in taichi-soft, in other engines and in a reference."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def peers(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Drop one body in taichi-soft, in a fine reference, and in each installed engine.
+    """Drop one body in taichi-soft, in a reference with fine steps, and in each installed engine.
 
-    Print the cost and the error of each, and film them side by side in slow motion.
+    Print the cost and the error of each simulation, and film all of them side by side in slow motion.
     """
     from lab.peers import Drop, compare, missing_peers
     from lab.peers.wall import captions, film_wall

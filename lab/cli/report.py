@@ -33,8 +33,8 @@ def report(
 ) -> None:
     """Run the thesis's experiments and judge its claims; exit code 1 if a point could not be computed.
 
-    Each result is stored immediately in the folder data next to the page. An interrupted report resumes from
-    there and retries failed points.
+    Each result is stored immediately, in the folder "data" next to the page. An interrupted report resumes
+    from the stored results and retries failed points.
     """
     from lab.experiments import Effort
     from lab.report.machine import machine_facts

@@ -56,7 +56,7 @@ class Case:
 
     @property
     def unit_time(self) -> float:
-        """Time unit of the case: sqrt(size / g) [s], in which the body falls half its size."""
+        """Unit of the case's time limits: sqrt(size / g) [s], in which the body falls half its size."""
         return math.sqrt(self.size / GRAVITY_EARTH)
 
     @property
@@ -86,7 +86,7 @@ def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName 
 
     The damping is `edge_damping` with a ratio between 0.1 and 0.5, uniformly distributed.
     Args:
-        seed, number: determine the case.
+        seed, number: seed and case number. Together they determine the case.
         law: force law of the body.
         flips: treatment of inverted tetrahedra; by default "recover" if the law supports it.
     """
@@ -136,7 +136,8 @@ def edge_damping(mesh: TetMesh, young: float, density: float, share: float) -> f
 def shape_mesh(shape: str, size: float, parts: Floats) -> TetMesh:
     """Make the mesh of a shape.
 
-    All meshes of one shape have equal numbers of vertices and tetrahedra, so that worlds reuse their kernels.
+    All meshes of one shape have equal numbers of vertices and tetrahedra, so that worlds share compiled
+    kernels.
     Args:
         shape: one of `SHAPES`.
         size: longest edge of the mesh's bounding box [m].
@@ -163,6 +164,9 @@ def _direction(rng: np.random.Generator) -> Floats:
 
 
 def _rounded(substeps: float) -> int:
-    """Round up to 1, 2, 3, 4, 6, 8, 12, 16, ..., because cases with equal numbers can run in one world."""
+    """Round a number of substeps up to 1, 2, 3, 4, 6, 8, 12, 16, ...
+
+    Only cases with equal numbers of substeps can run in one world.
+    """
     whole = 1 << max(0, math.ceil(math.log2(max(substeps, 1.0))))
     return whole * 3 // 4 if whole >= 4 and whole * 3 / 4 >= substeps else whole

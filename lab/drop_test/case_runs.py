@@ -22,13 +22,14 @@ PER_SHAPE = 6
 """Largest number of cases of each shape in one world. Each case occupies one collision group."""
 
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
-"""Capacity for colliders and height samples, equal in all worlds, so that they share kernels."""
+"""Capacities for colliders and height samples. All worlds have these capacities, so that they share
+kernels."""
 
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
-"""A body is at rest if its speed stays below a limit for `CALM_TIME` [s]. The speed is the root mean square
-over vertices. The limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED`
-[m/s], which is half of Box2D's sleeping threshold: a small ball in a corner keeps rocking from facet to facet
-at a few mm/s."""
+"""A body is at rest if its root mean square speed over vertices stays below a limit for `CALM_TIME` [s]. The
+limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED` [m/s].
+`LEAST_CALM_SPEED` is half of Box2D's sleeping threshold. Small balls need it, because in a corner they keep
+rocking from facet to facet at a few mm/s."""
 
 PATIENCE = 150.0
 """Time within which a body must come to rest [`Case.unit_time`]."""
@@ -156,7 +157,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
                 group=contact.group,
                 mask=contact.mask,
             )
-    # A collider that touches nothing uses up the remaining samples.
+    # A collider that touches nothing fills the capacity for samples, which must be equal in all worlds.
     world.add_collider(HeightFieldShape(np.zeros((2, (MOST_SAMPLES - samples) // 2)), 1.0), group=0, mask=0)
     for shape in SHAPES:
         missing = PER_SHAPE - sum(case.shape == shape for case in batch)
@@ -168,7 +169,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
 
 @cache
 def _filler(shape: str, law: LawName, flips: FlipsName | None) -> SoftBodyAsset:
-    """Make the asset of empty slots. It is soft and pinned, so that it causes no warnings."""
+    """Make the asset for slots that no case uses. It is soft and pinned, so that it causes no warnings."""
     mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
     pinned = range(len(mesh.vertices))
     return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips, pinned=pinned)

@@ -24,10 +24,11 @@ from taichi_soft.core.math.rotations import matrix_of
 Floats = NDArray[np.float64]
 
 HALF, HEIGHT, BELOW = 3.0, 8.0, 3.0
-"""Dimensions of the room [sizes of the body]: half its width, height of the lid, depth of the walls."""
+"""Dimensions of the room [sizes of the body]: half its width, height of its lid, depth of its walls below the
+floor."""
 
 THINNEST = 0.02
-"""Thickness of walls, lids and floors [m]."""
+"""Smallest thickness of walls, lids and floors [m]."""
 
 STEEPEST = 0.35
 """Largest angle of a tilted floor [rad]."""
@@ -38,11 +39,11 @@ CELLS = 24
 
 @dataclass(frozen=True)
 class Solid:
-    """A collider, and a separate formula for the signed distance from it."""
+    """A collider, and an independent formula for the signed distance from its surface."""
 
     name: str
     shape: Shape
-    distance: Distance  # in the solid's axes; points beyond floor, walls or lid are inside
+    distance: Distance  # maps points in the solid's axes; negative inside, and beyond floor, walls or lid
     tolerance: float  # largest depth of a point that counts as lying on the surface [m]
     is_room: bool  # True for floor, walls and lid, which bodies must not pass
     position: Floats
@@ -51,7 +52,7 @@ class Solid:
     restitution: float | None
 
     def depth(self, points: Floats) -> float:
-        """Return the penetration depth of the deepest of the points (n, 3) [m]; it is negative outside."""
+        """Return the largest depth of points (n, 3) in the solid [m]; negative if all points are outside."""
         return -float(self.distance((points - self.position) @ self.rotation).min())
 
 

@@ -1,6 +1,6 @@
-"""Functions for the signed distances of points (n, 3) from solids, in the solids' axes [m], float64.
+"""Signed distances from solids: functions that map points (n, 3) in the solid's axes to distances (n,) [m].
 
-These formulas check the kernels and therefore share no code with them.
+These functions check the kernels and therefore share no code with the kernels. All distances are float64.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def half_space(normal: Floats, offset: float = 0.0) -> Distance:
     """Return the distance function of a half space.
 
     Args:
-        normal: unit normal of its plane, out of the half space, (3,).
+        normal: unit normal of the bounding plane, pointing out of the half space, (3,).
         offset: distance of the plane from the origin along the normal [m].
     """
     return lambda x: np.asarray(x @ normal - offset)
@@ -61,10 +61,10 @@ def ring(major: float, minor: float) -> Distance:
 
 
 def ground(heights: Floats, spacing: float) -> Distance:
-    """Return a function for a lower bound of the distance from a height field.
+    """Return a function that computes a lower bound of the distance from a height field.
 
-    The bound is the height above the field times the cosine of its steepest slope. Each cell consists of two
-    triangles that meet on the diagonal from (i, j) to (i + 1, j + 1).
+    The bound is the height above the field times the cosine of the field's steepest slope. Each cell consists
+    of two triangles that meet on the diagonal from (i, j) to (i + 1, j + 1).
     """
     nx, ny = heights.shape
     along, across = (np.abs(np.diff(heights, axis=axis)).max() / spacing for axis in (0, 1))

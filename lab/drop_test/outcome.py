@@ -12,13 +12,13 @@ class Outcome:
     """Measurements of one case."""
 
     case: Case
-    frozen_at: float | None  # time of the first non-finite value [s]
+    frozen_at: float | None  # time of the first non-finite value [s]; None if there was none
     out: float  # largest distance of a surface vertex beyond floor, walls or lid over the run [m]
-    out_through: str | None  # name of that solid; None if the distance is within its tolerance
+    out_through: str | None  # name of the floor, wall or lid; None if `out` is within the tolerance
     inside: float  # largest depth of a surface vertex in an obstacle at the end [m]
-    inside_of: str | None  # name of that obstacle; None if the depth is within its tolerance
-    rest_at: float | None  # time at which the body came to rest [s]; None if it did not
-    speed: float  # root mean square over vertices at the end [sizes of the body per second]
+    inside_of: str | None  # name of the obstacle; None if `inside` is within the tolerance
+    rest_at: float | None  # time at which the body came to rest [s]; None if it kept moving
+    speed: float  # root mean square speed of the vertices at the end [sizes of the body per second]
     flipped: int  # number of inverted tetrahedra at the end
 
     @property

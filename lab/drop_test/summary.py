@@ -42,9 +42,7 @@ class Summary:
         return {name: sum(name in each.faults for each in self.outcomes) for name in FAULTS}
 
     def lines(self, worst: int) -> Iterator[str]:
-        """Yield lines to print: totals, and the `worst` cases of each failure with the commands that repeat
-        them.
-        """
+        """Yield the lines to print: totals, the `worst` cases of each failure, a command to repeat a case."""
         total = len(self.outcomes)
         yield f"{total} cases, {total - len(self.failed)} of them sound"
         yield CRITERION

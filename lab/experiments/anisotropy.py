@@ -25,14 +25,14 @@ from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
-"""Stiffness that an isotropic material has in every direction [Pa]."""
+"""Stiffness of an isotropic material in every direction [Pa]."""
 
 COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
 """Laws that a quick report omits, because each takes seconds to compile."""
 
 LEAST_SPREAD = 1e-3
-"""Largest spread that says nothing about a law, because the mesh hides its anisotropy."""
+"""A mesh with a smaller spread is no evidence about a law, because it hides the law's anisotropy."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:
@@ -78,7 +78,10 @@ def in_plane(count: int) -> NDArray[np.float64]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the stiffness over lambda + 2 mu in directions over a hemisphere and in the x-z plane."""
+    """Measure the stiffness in many directions, divided by lambda + 2 mu.
+
+    The directions are those of a hemisphere ("around") and of the x-z plane ("plane").
+    """
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
 
     def stiffness(rows: NDArray[np.float64]) -> list[float]:

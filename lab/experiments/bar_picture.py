@@ -16,13 +16,14 @@ SIZE = (960, 540)
 def bar_picture(
     length: float, cells: int, displacements: dict[str, ArrayLike], factor: float
 ) -> NDArray[np.uint8]:
-    """Draw bars one above the other, coloured by the displacement of each vertex over the largest
-    displacement.
+    """Draw bars in two columns.
 
+    Colours show the displacement of each vertex over the bar's largest displacement.
     Args:
         length, cells: as in `irregular_block`.
         displacements: displacements of the vertices, (n, 3) [m], by name of the bar.
-        factor: exaggeration of the displacements.
+        factor: factor by which the displacements are exaggerated.
+    Returns: RGB (sRGB), uint8 (height, width, 3).
     """
     mesh = irregular_block(length, WIDTH, cells)
     apart = 2.2 * WIDTH

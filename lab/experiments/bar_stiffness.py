@@ -17,15 +17,15 @@ LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
-    """Measure the stiffness of a bar over its theoretical stiffness.
+    """Measure the ratio of a bar's stiffness to its theoretical stiffness.
 
     Args:
-        point: "law" (a law, `LINEAR` or `QUADRATIC`), "strain", "cells" across the bar, and "drawn", which is
-            true to return displacements too.
+        point: has the keys "law" (a law, `LINEAR` or `QUADRATIC`), "strain" and "cells" (number across the
+            bar). If "drawn" is true, displacements are returned too.
         length: length of the bar [m].
         loads: names of loads of `free_ends`.
-    Returns: the ratio for each load, the numbers of "vertices" and "tets", and "displacements", (n, 3) [m]
-        by load.
+    Returns: the ratio for each load, by name; the numbers of "vertices" and "tets"; and "displacements" of
+        the vertices for each load, (n, 3) [m].
     """
     mesh = irregular_block(length, WIDTH, point["cells"])
     material = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)

@@ -31,13 +31,14 @@ from taichi_soft.world.bare import bare_world
 Floats = NDArray[np.float64]
 
 MATERIAL = Material(young=1e7, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
-HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # half a bar's length, its thickness, initial height [m]
+HALF, THICKNESS, DROP = 1.3, 0.2, 1.5  # half length and thickness of a bar, height of the drop [m]
 DT, SUBSTEPS, SECONDS = 0.01, 24, 1.7
 UPRIGHT = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
 """Rotation that turns the diagonal of the three bars upright."""
 SEEN, BENT, VIBRATES = 0.05, 3.0, 0.01
-"""Limits: deflection over a bar's free length above which it is visible; deflection over change of length
-above which the bars bend; vibration energy in flight over the impact's energy above which they vibrate."""
+"""A deflection is visible above `SEEN` times the free length of a bar. Bars bend if the deflection exceeds
+`BENT` times the change of length. Bars vibrate if the vibration energy in flight exceeds `VIBRATES` times the
+energy of the impact."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -84,8 +85,8 @@ def measure(point: Point) -> Numbers:
 def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
     """Return the largest deflection of an end across its bar [m], and the largest relative change of length.
 
-    Both are relative to the crossing and its rotation. Lengths are those of half bars, along the centres of
-    their sections.
+    Deflections are measured in axes that move and rotate with the crossing. Lengths are those of half bars,
+    along the centres of their cross-sections.
     """
     rest = mesh.vertices
     hub = (np.abs(rest) < 0.6 * THICKNESS).all(axis=1)
@@ -107,7 +108,10 @@ def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
 
 
 def energies(body: Body) -> tuple[float, float]:
-    """Return the kinetic energy, and its excess over that of a rigid body with the same momenta [J]."""
+    """Return the kinetic energy, and its part beyond the motion of a rigid body [J].
+
+    The rigid body has the same linear and angular momentum.
+    """
     masses, x, v = body.masses[:, None], body.positions().astype(np.float64), body.velocities().astype(float)
     total = masses.sum()
     x, mean = x - (masses * x).sum(axis=0) / total, (masses * v).sum(axis=0) / total
@@ -119,8 +123,9 @@ def energies(body: Body) -> tuple[float, float]:
 
 
 def flight_of(series: Numbers) -> tuple[int, int, int]:
-    """Find the first step on the floor, and the first step and the end (exclusive) of the longest flight
-    after it.
+    """Return three indices of steps: the first contact, and the start and end of the longest later flight.
+
+    The end is exclusive.
     """
     low = np.array(series["lowest"]) < 1e-3
     touched = int(np.argmax(low))

@@ -34,8 +34,8 @@ EXAGGERATION = 250.0
 """Factor on the displacements in the image."""
 LOADS = ("tension", "shear", "torsion", "bending", "cantilever")
 EXACT = 1e-3
-"""Tolerance for tension and shear: linear tetrahedra represent a uniform stress exactly, so only the error of
-the small strain remains."""
+"""Tolerance for tension and shear. Linear tetrahedra represent a uniform stress exactly, so the only error is
+of the size of the strain."""
 SAME = 0.01
 """Tolerance between laws on tetrahedra and linear finite elements on the same mesh."""
 LIMIT = 0.03
@@ -58,8 +58,9 @@ TEXT = (
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: every law and finite elements on one mesh, one law and linear elements on two finer
-    meshes.
+    """List the points: every law and finite elements on a coarse mesh.
+
+    On two finer meshes, there are only one law and linear elements.
     """
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)
@@ -70,12 +71,12 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the stiffness over theory for each load."""
+    """Measure the ratio of stiffness to theory for each load."""
     return stiffness_over_theory(point, LENGTH, LOADS)
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether tension is exact, and whether torsion and bending converge to theory from above."""
+    """Judge tension and shear against theory, and torsion and bending after an extrapolation."""
     rows = [(row.point, results.one(**row.point)) for row in results.rows]
     coarse = rows[0][0]["cells"]
     of_laws = [row for row in rows if row[0]["law"] not in (LINEAR, QUADRATIC)]
@@ -178,7 +179,7 @@ def conclude(results: Results) -> Section:
 
 
 def _extrapolated(coarse: float, fine: float, cells: tuple[int, int]) -> float:
-    """Extrapolate a value to cells of zero size, with an error of second order (Richardson)."""
+    """Extrapolate a value to cells of zero size by Richardson's method, for an error of second order."""
     ratio = (cells[1] / cells[0]) ** 2
     return (ratio * fine - coarse) / (ratio - 1)
 

@@ -33,24 +33,26 @@ FITTED: LawName = "best_fitting_plane"
 SPLIT: LawName = "split_ring_plane"
 LAWS: tuple[LawName, ...] = (CMPM, FITTED, SPLIT)
 AS_STABLE = 0.9
-"""Ratio of a law's largest step to that of the best fitting plane above which both are equally stable."""
+"""A law counts as equally stable if its largest step is at least this fraction of the best fitting
+plane's."""
 MESHES = ("another uneven block", "uneven block", "ball")
 STEP, SUBSTEPS = 1e-4, 200
-"""Length [s] and number of the substeps of a timed call. They are so short that a body at rest stays at
-rest."""
+"""Length [s] and number of the substeps of a timed call. The substeps are so short that a body at rest stays
+at rest."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: one per mesh. Each compares all three laws."""
+    """List the points: one per mesh. Each point compares all three laws."""
     size, repeats = (3, 5) if effort is Effort.QUICK else (6, 15)
     return [{"mesh": mesh, "size": size, "repeats": repeats} for mesh in MESHES]
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the median time of a substep of each law [s], its ratio to CMPM's time, and the small
-    vibrations.
+    """Measure the time of a substep and the small vibrations under each law.
 
-    Calls of each law alternate with calls of CMPM.
+    Returns: "seconds", median time of a substep [s]; "ratio", median ratio of this time to CMPM's in
+        alternating calls; "step", largest stable step [s]; "growth_rate", growth rate of undamped vibrations
+        [1/s]; "tets", number of tetrahedra.
     """
     mesh = mesh_of(point["mesh"], point["size"])
     step = {law: partial(_world(mesh, law).step, SUBSTEPS * STEP, SUBSTEPS) for law in LAWS}

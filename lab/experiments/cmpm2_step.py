@@ -37,10 +37,11 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the largest stable step and the growth rate of undamped vibrations at rest [1/s].
+    """Measure the largest stable steps [s] and the growth rate of vibrations at rest [1/s].
 
-    The step is 2 over the highest angular frequency without damping ("undamped"), and the result of running a
-    damped body ("run") [s].
+    Returns: "undamped", 2 over the highest angular frequency without damping; "growth_rate", growth rate
+        without damping; "run", largest step with which a damped body stays near its rest shape in a
+        simulation.
     """
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]
     small = vibration(mesh, UNDAMPED, law)

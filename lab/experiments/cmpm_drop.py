@@ -1,4 +1,4 @@
-"""Drop a sphere onto the floor with leapfrog or implicit Euler; by default a stiff sphere of CMPM."""
+"""Drop a sphere onto the floor with leapfrog or implicit Euler. The default is a stiff sphere under CMPM."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from taichi_soft.core.types import IntegratorName, LawName
 from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""Stiff material: leapfrog needs steps of about 1e-4 s. Without damping, CMPM gains energy at any step
-length."""
+"""Material so stiff that leapfrog needs steps of about 1e-4 s. The material is damped, because undamped CMPM
+gains energy at any step length."""
 
 RADIUS, HEIGHT = 1.0, 1.5
 """Radius of the sphere, and initial height of its centre [m]."""
 
 FRAME, FRAMES = 0.06, 12
 TOUCHES = 0.25
-"""Time at which the sphere is still in the air [s]; it falls 0.5 m in 0.32 s."""
+"""Time until which the sphere is in the air [s]. The fall of 0.5 m takes 0.32 s."""
 
 OFF, SHRUNK = 0.05, 0.9
 """Limits for a valid fall: largest deviation from the reference in the air [m], and smallest volume over the
 rest volume."""
 
 BOUNCE = 0.5
-"""Smallest bounce that counts as kept, over the bounce with short steps."""
+"""A bounce counts as preserved if its height is at least this fraction of the height with short steps."""
 
 
 @cache
 def _mesh(resolution: int) -> TetMesh:
     """Make the mesh of the sphere.
 
-    It is cached, because its Voronoi graph takes as long to compute as a fall.
+    The mesh is cached, because its Voronoi graph takes as long to compute as a fall.
     """
     return sphere(RADIUS, resolution)
 
@@ -95,7 +95,7 @@ def fall(drop: Drop) -> Numbers:
 
 
 def rebound(height: list[float]) -> float:
-    """Return the height of the bounce above rest on the floor [m].
+    """Return the largest height of the centre after the impact, above its height at rest on the floor [m].
 
     Args:
         height: height of the centre in each frame [m].
@@ -104,14 +104,12 @@ def rebound(height: list[float]) -> float:
 
 
 def bounces(numbers: Numbers, reference: list[float]) -> bool:
-    """True if the bounce is at least `BOUNCE` of the bounce of the reference."""
+    """True if the height of the bounce is at least `BOUNCE` times that of the reference."""
     return rebound(numbers["height"]) >= BOUNCE * rebound(reference)
 
 
 def is_whole(numbers: Numbers, reference: list[float]) -> bool:
-    """True if the sphere falls like the reference, stays valid, and lies or bounces on the floor at
-    the end.
-    """
+    """True if the sphere falls like the reference, stays valid, and is on or above the floor at the end."""
     air = [i for i in range(FRAMES) if (i + 1) * FRAME < TOUCHES]
     off = max(abs(numbers["height"][i] - reference[i]) for i in air)
     whole = not numbers["frozen"] and numbers["flipped"] == 0 and numbers["least_volume"] > SHRUNK

@@ -20,25 +20,27 @@ from lab.experiments.experiment import (
 from lab.experiments.judgement import judged
 from taichi_soft import Material, TetMesh, cylinder, internal_forces
 
-YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # those of the thesis [Pa, m]
-POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions others
+YOUNG, RADIUS, HEIGHT = 1e6, 1.0, 0.5  # values of the thesis [Pa, m]
+POISSON = (0.0, 0.2, 0.4)  # the thesis plots 0.2 and mentions other values
 WAYS = {"tension": (0.0, 0.0, 1.0), "shear": (1.0, 0.0, 0.0)}
-COARSE, FINE = (4, 2), (6, 4)  # rings and layers: 576 tetrahedra, about as many as in the thesis, and 2592
+COARSE, FINE = (4, 2), (6, 4)  # rings, layers: 576 tetrahedra (about as many as in the thesis) and 2592
 EXACT = 0.01
 """Largest relative error of a slope that counts as exact."""
 CLOSE = 0.15
 """Largest relative error of a slope that counts as close."""
 NO_SHEAR = 0.01
-"""Largest shear force over tensile force that counts as zero."""
+"""Largest ratio of shear force to tensile force that counts as no shear force."""
 SHAKEN = 0.2
 """Largest random displacement of a vertex along an axis [mean edge length]."""
 STRAIGHT = 0.05
-"""Largest relative change of force over strain along a curve that counts as straight."""
+"""A curve counts as straight if the ratio of force to strain, relative to theory, changes by less than
+this."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: both directions for each nu, another E, sliding ends, an uneven mesh, and a finer
-    mesh.
+    """List the points: tension and shear for each nu, a larger E, sliding ends, and an uneven mesh.
+
+    A full report adds a finer mesh.
     """
     is_full = effort is Effort.FULL
     count = 20 if is_full else 5
@@ -53,7 +55,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the forces on the top up to a strain of 0.5, or as far as an equilibrium is found."""
+    """Measure the forces on the top up to a strain of 0.5, or up to the last strain with an equilibrium."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     if point["shaken"]:
         mesh = _shaken(mesh)
@@ -239,7 +241,7 @@ def conclude(results: Results) -> Section:
 
 
 def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
-    """Return the largest shear force over the tensile force at the same strain."""
+    """Return the largest ratio of shear force to tensile force. `is_shaken` selects the meshes."""
     return max(
         float((np.hypot(n["shear"], n["aside"]) / np.abs(n["tension"])).max())
         for point, n in rows
@@ -248,7 +250,7 @@ def _sideways(rows: list[tuple[Point, Numbers]], is_shaken: bool) -> float:
 
 
 def _ratio(numbers: Numbers, way: str, modulus: float) -> list[float]:
-    """Return the force over modulus, area and strain, for each strain."""
+    """Return the force divided by modulus, area and strain, for each strain."""
     forces, strain = np.array(numbers[way]), np.array(numbers["strain"])
     return list((forces / (modulus * numbers["area"] * strain)).tolist())
 

@@ -21,7 +21,7 @@ from lab.experiments.experiment import (
 from lab.experiments.judgement import judged, judged_but_for
 from taichi_soft import Material, cylinder, internal_forces
 
-RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # those of the thesis [m, Pa]
+RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6  # values of the thesis [m, Pa]
 POISSON = (0.4, 0.0, -0.4)  # for the negative value, the thesis gives only the sign
 COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra (492 in the thesis), and 2592
 FURTHEST, MODERATE = 0.5, 0.25
@@ -30,8 +30,9 @@ KEPT = 0.05
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each nu with the linearised strain, 0.4 with the exact strain, and each nu on a finer
-    mesh.
+    """List the points: each nu with the linearised strain, and nu = 0.4 with the exact strain.
+
+    A full report adds each nu on a finer mesh.
     """
     is_full = effort is Effort.FULL
     usual = {"strain": "linear", "mesh": list(COARSE), "steps": 20 if is_full else 4}
@@ -41,8 +42,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure volume and width at mid-height over their rest values for each stretch, and store the last
-    shape.
+    """Measure the volume and the width at mid-height for each stretch, relative to their values at rest.
+
+    The last shape is stored, too.
     """
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)

@@ -1,9 +1,8 @@
-"""Damping relative to the mean velocity of a tetrahedron brakes rotation; edge damping does not (section
-6.4).
+"""Damping relative to a tetrahedron's mean velocity brakes rotation; edge damping does not (section 6.4).
 
-A stiff body rotates freely. The first kind of damping removes angular momentum at the rate b S / I. I is the
-moment of inertia about the axis. S sums the squared distances of each tetrahedron's corners from the
-tetrahedron's centre, measured perpendicular to the axis.
+A stiff body rotates freely. Damping relative to the mean velocity removes angular momentum at the rate b S /
+I. I is the moment of inertia about the axis. S is the sum of the squared distances of each tetrahedron's
+corners from its centre, measured perpendicular to the axis.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ from taichi_soft import Material, TetMesh, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.world.bare import bare_world
 
-YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # spin [rad/s] without visible stretch
+YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # SPIN [rad/s] is too slow to stretch the body visibly
 DT, SUBSTEPS = 1 / 60, 12
 MODELS = ("edge", "tet_mean")
 KEPT, RATE_ERROR = 1e-3, 0.05
-"""Largest relative loss of angular momentum with edge damping, and largest relative error of the other
-model's rate."""
+"""Largest relative loss of angular momentum with edge damping, and largest relative error of the decay rate
+with the other damping model."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -49,13 +48,14 @@ def points(effort: Effort) -> list[Point]:
 
 
 def body_mesh(name: str) -> TetMesh:
-    """Return the mesh of a cube of 1 m, or that of the thesis's sphere."""
+    """Return the mesh of a cube of 1 m, or of the thesis's sphere."""
     return box((1.0, 1.0, 1.0), (3, 3, 3)) if name == "cube" else load_mesh(ASSETS / "sphere.npz")
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the angular momentum over time, relative to its initial value, and compute the expected decay
-    rate.
+    """Measure the angular momentum over time, relative to its initial value.
+
+    The result also has the "expected" decay rate [1/s].
     """
     mesh = body_mesh(point["mesh"])
     world = bare_world(gravity=(0, 0, 0), retries=0)
@@ -78,7 +78,7 @@ def measure(point: Point) -> Numbers:
 
 
 def rate(numbers: Numbers) -> float:
-    """Return the decay rate, fitted while more than a tenth of the angular momentum is left [1/s]."""
+    """Return the decay rate of the angular momentum [1/s], fitted while more than a tenth of it is left."""
     time, left = np.array([0.0, *numbers["time"]]), np.array([1.0, *numbers["left"]])
     seen = left > 0.1
     return 0.0 if seen.sum() < 2 else -float(np.polyfit(time[seen], np.log(left[seen]), 1)[0])

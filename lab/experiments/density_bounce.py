@@ -1,7 +1,7 @@
 """A body whose density increases to the right is dropped (thesis figure 6.3).
 
-The claim: its heavy side is compressed most, and bounces last and least. For comparison, a body with the same
-mean density everywhere is dropped; its sides must not differ.
+The thesis claims that the heavy side is compressed most, leaves the floor last and rises least. For
+comparison, a body of uniform density with the same mean is dropped; its sides must not differ.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TOUCH = 1e-3  # height below which a vertex counts as lying on the floor [m]
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: increasing and uniform density, for a full report on a finer mesh too."""
+    """List the points: increasing and uniform density; for a full report, both also on a finer mesh."""
     cells = (4,) if effort is Effort.QUICK else (4, 6)
     return [{"density": kind, "cells": count} for count in cells for kind in ("grows", "mean")]
 
@@ -88,10 +88,10 @@ def measure(point: Point) -> Numbers:
 
 
 def side(numbers: Numbers, end: str) -> dict[str, float]:
-    """Measure one end: "left" or "right".
+    """Measure the "left" or the "right" end.
 
-    Returns: "pressed", relative compression in the first contact; "leaves", time at which it leaves the floor
-        [s]; and "rises", height of its lower edge until the body touches down again [m].
+    Returns: "pressed", relative compression in the first contact; "leaves", time at which the end leaves the
+        floor [s]; "rises", largest height of the end's lower edge before the body touches down again [m].
     """
     height, thickness = np.array(numbers[f"{end}_height"]), np.array(numbers[f"{end}_thickness"])
     other = np.array(numbers["left_height" if end == "right" else "right_height"])
@@ -109,7 +109,7 @@ def side(numbers: Numbers, end: str) -> dict[str, float]:
 
 
 def conclude(results: Results) -> Section:
-    """Judge which side is compressed more, leaves the floor later, and rises less."""
+    """Judge whether the heavy side is compressed more, leaves the floor later, and rises less."""
     grows, even = (results.one(density=kind, cells=4) for kind in ("grows", "mean"))
     light, heavy = side(grows, "left"), side(grows, "right")
     most = heavy["pressed"] > light["pressed"]

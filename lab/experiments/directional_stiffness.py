@@ -1,6 +1,4 @@
-"""Stiffness of a body against a uniform stretch along any direction, computed from the work of the
-stretch.
-"""
+"""Stiffness of a body in any direction, computed from the work of a uniform stretch along that direction."""
 
 from __future__ import annotations
 
@@ -27,8 +25,8 @@ def directions(count: int) -> Floats:
 def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: Floats) -> float:
     """Return the stiffness against a stretch without lateral contraction [Pa].
 
-    It is twice the work per volume and squared strain. For an isotropic material it equals lambda + 2 mu. The
-    work is computed from the forces at half the stretch.
+    The stiffness is twice the work per volume and squared strain. For an isotropic material it equals lambda
+    + 2 mu. The work is computed from the forces at half the stretch.
     """
     move = STRETCH * np.outer(mesh.vertices @ direction, direction)
     forces = internal_forces(mesh, material, mesh.vertices + move / 2, law=law)
@@ -36,5 +34,5 @@ def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: 
 
 
 def spread(values: Floats | list[float]) -> float:
-    """Return the largest value minus the smallest, over the mean."""
+    """Return the difference of the largest and the smallest value, divided by the mean."""
     return float(np.ptp(values) / np.mean(values))

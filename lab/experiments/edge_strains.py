@@ -1,7 +1,8 @@
 """Find the strain that a law of chapter 4 computes for an edge, from the stiffness of the edge.
 
-Moving one end of an edge changes the force at the other end: by a E / l per metre along the law's direction
-of tension, and by a G / l across it. The eigenvectors of this stiffness matrix give the direction.
+If one end of an edge moves, the force at the other end changes: by a E / l per metre along the law's
+direction of tension, and by a G / l per metre across it (face area a, length l). The eigenvectors of this
+stiffness matrix give the direction.
 """
 
 from __future__ import annotations
@@ -27,7 +28,11 @@ class EdgeReading:
 
 
 def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName) -> EdgeReading:
-    """Read the edge between vertices 0 and 1 of a body at `positions`."""
+    """Return the direction of tension and the stiffness of the edge between vertices 0 and 1.
+
+    Args:
+        positions: positions of all vertices, (n, 3) [m].
+    """
     block = force_gradient(mesh, material, positions, law=law)[0, :, 1, :]
     values, vectors = np.linalg.eigh((block + block.T) / 2)
     normal = vectors[:, 2]  # the largest eigenvalue, because E > G
@@ -40,8 +45,9 @@ def strains(vector: Floats, normal: Floats) -> tuple[float, float]:
     """Return the tensile and the shear strain (eq. 4.3) of an edge.
 
     Args:
-        vector: the edge, which has length 1 and the direction of the normal at rest.
-        normal: direction of tension, a unit vector.
+        vector: the deformed edge, (3,). At rest, the edge has length 1 and lies along the direction of
+            tension.
+        normal: direction of tension in the deformed body, a unit vector.
     """
     stretch = float(normal @ vector)
     return stretch - 1, float(np.linalg.norm(vector - stretch * normal))
@@ -57,9 +63,7 @@ def ringed_edge(count: int, radius: float = 1.0) -> TetMesh:
 
 
 def edge_in_ring(ring: Floats) -> TetMesh:
-    """Make a mesh of an edge of length 1 along z and a ring of vertices (n, 3) around it,
-    counterclockwise.
-    """
+    """Make a mesh of an edge of length 1 along z and a counterclockwise ring of vertices (n, 3) around it."""
     count = len(ring)
     ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
     tets = [[0, 1, 2 + i, 2 + (i + 1) % count] for i in range(count)]

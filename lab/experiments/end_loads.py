@@ -1,7 +1,7 @@
 """Loads on the ends of a bar along x: prescribed displacements or forces, and their work.
 
-Strains in a uniform bar are at most `STRAIN`. Stiffness is defined by work. For a displacement q, it is the
-work of the reactions over q^2; for a force F, it is F^2 over the work of F.
+Strains in a uniform bar are at most `STRAIN`. Stiffness is defined by work. For a displacement q, the
+stiffness is the work of the reactions over q^2. For a force F, the stiffness is F^2 over the work of F.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def ends(mesh: TetMesh) -> tuple[Mask, Mask]:
 
 
 def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Return loads by name for ends that are glued to rigid plates. The right plate or both move."""
+    """Return loads by name for ends that are glued to rigid plates. One plate or both plates move."""
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
@@ -64,11 +64,11 @@ def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Return loads with a known solution, by name: on ends that can contract or warp, and a cantilever.
+    """Return loads with a known solution, by name: on ends that can contract or warp, and on a cantilever.
 
-    Tension and bending displace the ends along x only, torsion across x only. With the stresses of a uniform
-    bar and those of Saint-Venant, these are exact solutions of linear elasticity up to the ends. In shear,
-    the whole surface moves uniformly along z, because free sides would bulge.
+    Tension and bending prescribe displacements of the ends along x only, torsion across x only. The stresses
+    of a uniform bar and of Saint-Venant's theory are then exact solutions of linear elasticity up to the
+    ends. In shear, displacements along z are prescribed on the whole surface, because free sides would bulge.
     """
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]

@@ -1,8 +1,8 @@
 """Kinetic energy without damping over time (thesis section 6.4): it accumulates, and little damping stops it.
 
 The thesis's stress is not the derivative of an energy, except for the virial law at nu = 1/4, with W = 1/2
-lambda (J (tr b - 5) + 2) and b = F F^T. There, and under a law with an energy, kinetic energy must not
-accumulate.
+lambda (J (tr b - 5) + 2) and b = F F^T. In this case, and under any law with an energy, kinetic energy must
+not accumulate.
 """
 
 from __future__ import annotations
@@ -34,15 +34,17 @@ DT = 1 / 60
 READ_EVERY = 3  # steps between two measurements
 CONSERVATIVE = 0.25  # Poisson's ratio at which the linear virial stress has an energy
 LITTLE = 0.05
-"""Largest fraction of critical damping of a cube's longest vibration that counts as very little."""
+"""Largest damping that counts as very little, as a fraction of the critical damping of the cube's longest
+vibration."""
 GROWS, STAYS = 1.15, 1.05
-"""Mean kinetic energy of the last quarter over that of the first: growing above the first value, constant
-below the second."""
+"""Limits for the mean kinetic energy of the last quarter of a run over that of the first quarter. The energy
+grows if the ratio exceeds `GROWS`, and is constant if it is below `STAYS`."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: Poisson's ratios of the thesis and 1/4, with little or no damping; a law with an
-    energy.
+    """List the points: the virial law with little or no damping, and a law with an energy, undamped.
+
+    The Poisson's ratios are those of the thesis, and 1/4.
     """
     seconds = 20.0 if effort is Effort.QUICK else 60.0
     cases = [("virial", nu, b, 6) for nu in (0.1, 0.25, 0.4) for b in (0.0, 10.0)]
@@ -94,8 +96,9 @@ def _elastic_energy(body: Body, point: Point) -> float:
 
 
 def growth(numbers: Numbers) -> float:
-    """Return the mean kinetic energy of the last quarter over that of the first; infinite if the body
-    failed.
+    """Return the mean kinetic energy of the last quarter of the run over that of the first quarter.
+
+    The result is infinite if the body failed.
     """
     kinetic = numbers["kinetic"]
     quarter = max(1, len(kinetic) // 4)
@@ -103,9 +106,10 @@ def growth(numbers: Numbers) -> float:
 
 
 def damping_ratio(numbers: Numbers) -> float:
-    """Return the fraction of critical damping.
+    """Return the measured damping as a fraction zeta of the critical damping.
 
-    Kinetic energy decays at the rate 2 zeta omega. omega is the frequency of waves twice as long as the edge.
+    Kinetic energy decays at the rate 2 zeta omega. omega is the angular frequency of waves twice as long as
+    the cube's edge.
     """
     time, kinetic = np.array(numbers["time"]), np.array(numbers["kinetic"])
     early = time < 5.0
@@ -114,7 +118,7 @@ def damping_ratio(numbers: Numbers) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether energy accumulates exactly if the stress has no energy."""
+    """Judge whether energy accumulates if and only if the stress has no energy."""
     undamped = {
         nu: results.one(law="virial", poisson=nu, damping=0.0, substeps=6) for nu in (0.1, CONSERVATIVE, 0.4)
     }
@@ -180,8 +184,9 @@ def conclude(results: Results) -> Section:
 
 
 def _least_damping(results: Results) -> float:
-    """Return the smallest damping that stops the growth for every Poisson's ratio, or the largest tried [N
-    s/m].
+    """Return the smallest damping that stops the growth for every Poisson's ratio [N s/m].
+
+    If no damping does, return the largest that was tried.
     """
     damped = {p["damping"] for p, _ in results.where(law="virial") if p["damping"] > 0.0}
     stops = [b for b in damped if max(growth(n) for _, n in results.where(law="virial", damping=b)) < 1.0]

@@ -1,4 +1,4 @@
-"""Equilibrium of a body between plates: vertices on the plates are prescribed, the others move freely.
+"""Equilibrium of a body between plates: vertices on the plates are prescribed, other vertices move freely.
 
 Newton's method on forces in float64 finds the state in which a damped body would come to rest.
 """
@@ -24,7 +24,7 @@ DIFFERENCE = 1e-6
 
 
 class Plates:
-    """A body about the origin whose lowest and highest vertices are on plates across z.
+    """A body about the origin whose lowest and highest vertices are on plates perpendicular to z.
 
     Args:
         mesh: the body at rest, with the same cross-section at all heights.
@@ -60,9 +60,9 @@ class Plates:
         """Find the equilibria while the top moves in `direction` and the bottom is fixed.
 
         Args:
-            direction: displacement of the top per share [height of the body].
-            shares: displacements of the top over the height, ascending from above 0, in steps small enough to
-                follow the branch that begins at rest.
+            direction: displacement of the top per unit of `shares` [height of the body].
+            shares: increasing positive displacements of the top [height of the body]. Their spacing must be
+                small enough to follow the branch of equilibria that starts at rest.
         Returns: positions (n, 3) [m] for each share, up to the first share without an equilibrium.
         """
         z = self.mesh.vertices[:, 2:]
@@ -78,8 +78,10 @@ class Plates:
         return states
 
     def rest(self, forces: Forces, start: Floats) -> Floats | None:
-        """Return the equilibrium positions (n, 3) [m], found from the positions `start`; None if Newton's
-        method fails.
+        """Return the equilibrium positions (n, 3) [m]; None if Newton's method fails.
+
+        Args:
+            start: positions from which Newton's method starts, (n, 3) [m].
         """
         from scipy.sparse.linalg import splu
 
@@ -113,7 +115,7 @@ class Plates:
 
 
 def _neighbours(mesh: TetMesh) -> Any:
-    """Return a sparse, symmetric (n, n) matrix that is true for vertices that are equal or share an edge."""
+    """Return a sparse, symmetric (n, n) matrix: 1 for equal vertices and for vertices that share an edge."""
     from scipy.sparse import csr_matrix
 
     every = np.arange(len(mesh.vertices))

@@ -1,4 +1,4 @@
-"""Experiments: points that are measured one by one, and a conclusion from all of them.
+"""Experiments: points that are measured one by one, and a conclusion from all points.
 
 A point and its measured numbers are plain data, so points can be measured in other processes and stored in a
 file. Pages, plots and tables are made from these numbers afterwards.
@@ -28,7 +28,7 @@ class MissingPointError(TaichiSoftError):
 
 
 class Effort(Choice):
-    """Extent of a report: a coarse answer to every claim within minutes, or everything."""
+    """Extent of a report: a coarse answer to every claim within minutes (`QUICK`), or all points (`FULL`)."""
 
     QUICK = "quick"
     FULL = "full"
@@ -51,7 +51,7 @@ class Finding:
         claim: key of the claim in `CLAIMS`.
         measured: a sentence with the figures, their units, and the tolerance of the verdict.
         verdict: agreement of the figures with the claim.
-        why: reason if they do not fully agree (model, mesh or reading of the text), with evidence.
+        why: reason if the figures do not fully agree (model, mesh or reading of the text), with evidence.
     """
 
     claim: str
@@ -133,7 +133,7 @@ class Results:
     rows: tuple[Result, ...] = field(default=())
 
     def where(self, **values: Any) -> list[tuple[Point, Numbers]]:
-        """Return the measured points with these values and their numbers, in order."""
+        """Return the measured points that have these values, each with its numbers, in order."""
         return [
             (row.point, row.numbers)
             for row in self.rows
@@ -143,7 +143,7 @@ class Results:
     def one(self, **values: Any) -> Numbers:
         """Return the numbers of the only measured point with these values.
 
-        Raises: MissingPointError if there is none, or more than one.
+        Raises: MissingPointError if no point or more than one point has these values.
         """
         found = self.where(**values)
         if len(found) != 1:
@@ -161,13 +161,13 @@ class Experiment:
     """An experiment.
 
     Args:
-        name: short and unique, as in `python -m lab report NAME`.
+        name: short unique name, as in `python -m lab report NAME`.
         source: section or figure of the thesis, or the theory beyond it.
         claims: keys in `CLAIMS`; the section has one finding for each.
         points: function that lists the points of a quick or a full report.
         measure: module-level function that measures one point, in any process. The device is already chosen.
         conclude: function that judges the results. Raises: MissingPointError if a needed point is missing.
-        is_timing: True if its points measure time. They then run alone, one after the other.
+        is_timing: True if the points measure time. Such points run alone, one after the other.
     """
 
     name: str

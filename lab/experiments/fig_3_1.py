@@ -26,7 +26,7 @@ from lab.experiments.oscillators import SLACK, run_oscillators
 EULER = ("explicit_euler", "implicit_euler")
 INTEGRATORS = (*EULER, "leapfrog")
 RATES = (-0.1, -0.25, -0.5, -0.75, -1.5)
-"""Values of h lambda. For the last one, explicit Euler changes the sign of y in every step."""
+"""Values of h lambda. For the last value, explicit Euler changes the sign of y in every step."""
 
 DRAWN = -0.5
 START = 1e-2

@@ -1,7 +1,8 @@
 """A standing wave with both Euler methods (thesis figure 3.2): the first mode of a row of springs.
 
-The row discretises the wave equation. Its modes and the change of amplitude per step are known exactly:
-explicit Euler multiplies the amplitude by abs(1 + i h w) = sqrt(1 + h^2 w^2), implicit Euler divides by it.
+The row discretises the wave equation. Its modes and the change of amplitude per step are known exactly.
+Explicit Euler multiplies the amplitude by abs(1 + i h w) = sqrt(1 + h^2 w^2). Implicit Euler divides the
+amplitude by this factor.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from taichi_soft.world.bare import bare_world
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
-"""Number of particles between the fixed ends. With more, explicit Euler first amplifies round-off in higher
-modes."""
+"""Number of particles between the fixed ends. With more particles, explicit Euler would amplify round-off in
+higher modes before it visibly amplifies the first mode."""
 
 PERIODS = 2
 AMPLITUDE = 0.05
@@ -50,9 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the displacement of the mode and its amplitude after each step of 1 s, over the initial
-    amplitude.
-    """
+    """Measure the displacement and the amplitude of the mode after each step, relative to the start."""
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2
@@ -85,7 +84,7 @@ def measure(point: Point) -> Numbers:
 
 
 def per_step(integrator: IntegratorName, angle: float) -> float:
-    """Return the exact factor on the amplitude per step; `angle` is h w."""
+    """Return the exact factor by which a step multiplies the amplitude; `angle` is h w."""
     growth = float(np.hypot(1.0, angle))
     return {"explicit_euler": growth, "implicit_euler": 1 / growth}.get(integrator, 1.0)
 

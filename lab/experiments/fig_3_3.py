@@ -31,8 +31,8 @@ LEFT, TOP = -3.0, 2.4
 """Bounds of the plane of h lambda. The lower half mirrors the upper one."""
 
 CLOSE = 1e-3
-"""Distance of the exact factor from 1 below which a point is not judged, because rounding of float32 decides
-there."""
+"""A point is not judged if its exact factor is closer to 1 than this distance, because float32 rounding
+decides there."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -42,8 +42,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def grid(cells: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the real and imaginary parts of h lambda: the imaginary axis, and centres of the cells to its
-    left.
+    """Return the coordinates of the grid: real parts (nx,) and imaginary parts (ny,) of h lambda.
+
+    The real parts are 0 and the centres of the cells to the left of the imaginary axis.
     """
     step = 1.0 / cells
     x = np.append(-(np.arange(round(-LEFT * cells)) + 0.5)[::-1] * step, 0.0)
@@ -52,7 +53,10 @@ def grid(cells: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the largest factor of a step at each point of the grid, row by row from the real axis up."""
+    """Measure the largest factor by which a step multiplies the motion, at each point of the grid.
+
+    The rows of the result begin at the real axis.
+    """
     x, y = grid(point["cells"])
     z = (x + 1j * y[:, None]).ravel()
     factors = step_factors(point["integrator"], np.abs(z) ** 2, -2 * z.real)
@@ -65,7 +69,7 @@ def closed_form(integrator: IntegratorName, z: NDArray[np.complex128]) -> NDArra
 
 
 def conclude(results: Results) -> Section:
-    """Judge for which points the measured and the exact factor lie on different sides of 1."""
+    """Judge each method by the points whose measured and exact factors lie on different sides of 1."""
     rows, wrong_of, worst_of, maps = [], {}, {}, {}
     for name in INTEGRATORS:
         measured = np.array(results.one(integrator=name)["factor"])

@@ -24,13 +24,14 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 POISSONS = (0.0, 0.25)
 STRETCHES = (0.01, 0.3)
-"""Relative stretches: a small one, to compare with the strain tensor, and one as large as in a drawing."""
+"""Relative stretches: a small one for the comparison with the strain tensor, and a large one as in a
+drawing."""
 
 THESIS_ANGLE = 30
 """Angle of figure 4.3 (b) [degrees]."""
 
 WRONG = 0.1
-"""Error of a strain over the stretch above which it counts as wrong."""
+"""A strain counts as wrong if its error exceeds this fraction of the stretch."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -43,9 +44,8 @@ def measure(point: Point) -> Numbers:
     """Measure the strains that CMPM computes for an edge, and the stress on the edge's face.
 
     Returns: "tensile" and "shear", strains of the edge in a body stretched along z by each of `STRETCHES`;
-        "stress", along and across the normal of the face in a bar that is stretched by the first and
-            contracts
-        laterally [Pa].
+        "stress", components along and across the normal of the face [Pa], in a bar that is stretched by the
+        first of `STRETCHES` and contracts laterally.
     """
     turn = np.radians(point["angle"])
     rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
@@ -70,16 +70,18 @@ def measure(point: Point) -> Numbers:
 
 
 def components(angle: float, stretch: float) -> tuple[float, float]:
-    """Return the tensile component of the strain tensor along the edge, and the shear angle, for a small
-    stretch.
+    """Return two components of the strain tensor of a small stretch.
+
+    The first is the tensile strain along the edge, the second is the shear angle.
     """
     turn = np.radians(angle)
     return float(stretch * np.cos(turn) ** 2), float(stretch * np.sin(2 * turn))
 
 
 def traction(angle: float, stretch: float) -> tuple[float, float]:
-    """Return the stress on the edge's face in a bar in tension, along and across its normal [Pa], by Hooke's
-    law.
+    """Return the stress on the edge's face in a bar in tension by Hooke's law [Pa].
+
+    The two components are along and across the normal of the face.
     """
     turn = np.radians(angle)
     pull = float(YOUNG * stretch * np.cos(turn))

@@ -1,5 +1,6 @@
-"""An element that is stretched along many axes (thesis figure 4.5): a tetrahedron instead of the thesis's
-triangle.
+"""An element that is stretched along many axes (thesis figure 4.5).
+
+The element is a tetrahedron, whereas the thesis has a triangle.
 """
 
 from __future__ import annotations
@@ -52,13 +53,13 @@ APEX_ANGLES = (25.0, 30.0, REGULAR, 45.0)
 tetrahedra. The thesis gives no angle."""
 
 STRETCHES = (0.01, 0.3, 1.0)
-"""Relative stretches of the body: small ones, and one as large as in a drawing. The thesis gives none."""
+"""Relative stretches of the body: small ones, and one as large as in a drawing. The thesis gives no value."""
 
 MUCH = 2.0
-"""Shear strain over tensile strain above which shear counts as much larger."""
+"""Ratio of shear strain to tensile strain above which shear counts as much larger."""
 
 SMALL = 0.5
-"""Tensile strain over the stretch below which tension counts as small."""
+"""Ratio of tensile strain to stretch below which tension counts as small."""
 
 
 def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
@@ -74,9 +75,7 @@ def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each law and material along 40 or 400 directions, and the strains of several
-    tetrahedra.
-    """
+    """List the points: each law and material in 40 or 400 directions, and strains of several tetrahedra."""
     count = 40 if effort is Effort.QUICK else 400
     return [
         *({"law": law, "material": name, "directions": count} for law, name in COMBINATIONS),
@@ -85,8 +84,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the stiffness in every direction [Pa], or the strains of an edge at a pulled top vertex with
-    CMPM2.
+    """Measure the stiffness in every direction [Pa], or, for a point with "apex", the strains of an edge.
+
+    The strains are those that CMPM2 computes for an edge at the top vertex, which is pulled.
     """
     if "apex" in point:
         mesh, material = tetrahedron(point["apex"]), MATERIALS[JUDGED]

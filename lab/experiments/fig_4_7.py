@@ -34,10 +34,10 @@ FITTED, SPLIT = "best_fitting_plane", "split_ring_plane"
 LAWS = {FITTED: "best fitting plane", SPLIT: "split ring", "cmpm2": "subfaces (CMPM2)"}
 FAR, MANY = 30.0, 0.1
 """Angle that counts as far from perpendicular [degrees], and fraction of the edges that counts as many. The
-thesis has a box plot without figures."""
+thesis has a box plot without numbers."""
 NEAR, FEW = 10.0, 0.1
-"""Angle between a cheap and a fitted normal up to which the cheap one is a good approximation [degrees], and
-fraction of the edges that may exceed it."""
+"""A cheap normal is a good approximation if its angle to the fitted normal is at most `NEAR` [degrees]. At
+most the fraction `FEW` of the edges may have a larger angle."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -47,11 +47,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the angles between edges and normals, and between fitted and cheap normals, in percentiles
-    [degrees].
+    """Measure percentiles of two angles [degrees]: of edges to normals, and of fitted to cheap normals.
 
-    Edges with two particles around them are omitted. Edges with three have equal fitted and cheap normals,
-    and the angles between normals omit them too.
+    Edges with two particles around them are omitted. The second angle also omits edges with three particles,
+    because the fitted and the cheap normal of such an edge are equal.
     """
     mesh = mesh_of(point["mesh"], point["size"])
     edge, _ = EdgeRings.of(mesh).neighbours
@@ -79,8 +78,9 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the fraction of planes that are far from perpendicular, on a mesh like the thesis's and on
-    others.
+    """Judge the fraction of planes that are far from perpendicular, and the cheap normals, on several meshes.
+
+    One mesh is like that of the thesis.
     """
     beam = results.one(mesh=BEAM)[FITTED]
     rows = [(point["mesh"], numbers) for point, numbers in results.where()]

@@ -30,20 +30,19 @@ from taichi_soft import Material, TetMesh
 YOUNG, DENSITY = 1e6, 1000.0
 LENGTH, WIDTH = 4.0, 1.0
 AGREEMENT = 0.01
-"""Tolerance of stiffness and displacement. Strains of 1e-4 cause errors of a few hundredths of it."""
+"""Relative tolerance of stiffness and displacement. The strains of 1e-4 cause errors of a few hundredths of
+this tolerance."""
 BEAM = ("tension", "shear", "torsion", "bending")
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: every law for nu = 0.3 on a coarse mesh, or for three ratios on a finer mesh."""
+    """List the points: every law on a coarse mesh with nu = 0.3, or on a finer mesh with three nu."""
     cells, ratios = (2, (0.3,)) if effort is Effort.QUICK else (5, (0.0, 0.25, 0.4))
     return [{**variant, "poisson": nu, "cells": cells} for nu in ratios for variant in variants(effort)]
 
 
 def measure(point: Point) -> Numbers:
-    """Measure stiffness and displacement of beam and block over those of linear finite elements on the same
-    mesh.
-    """
+    """Compare stiffness and displacement of a beam and a block with those of linear finite elements."""
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
     beam = irregular_block(LENGTH, WIDTH, point["cells"])
     block = irregular_block(WIDTH, WIDTH, point["cells"])
@@ -171,9 +170,9 @@ def _ratio(numbers: Numbers) -> float:
 
 
 def _why(solid: list[tuple[Point, Numbers]]) -> str:
-    """Return a reason that names the laws that differ most.
+    """Return the reason for a difference, with the name of the law that differs most.
 
-    The mesh is the same, so the model is the cause.
+    Both methods have the same mesh, so the model is the cause.
     """
     furthest = max(solid, key=lambda row: max(abs(_ratio(row[1][load]) - 1) for load in (*BEAM, "block")))
     return f"model: mesh and material are the same in both; {label(furthest[0])} is furthest away"

@@ -1,7 +1,7 @@
 """Tetrahedra that invert on a hard impact (thesis section 6.6): they stay inverted, as dents.
 
-The thesis's sphere is thrown at the floor with three treatments of inverted tetrahedra: that of the thesis,
-none, and one that restores them.
+The thesis's sphere is thrown at the floor with each treatment of inverted tetrahedra: "tolerant" as in the
+thesis, "off", and "recover", which restores them.
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ from taichi_soft.world.bare import bare_world
 
 MATERIAL = Material(young=1e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPEED, HEIGHT = 20.0, 1.05  # initial speed [m/s] and height [m] of the sphere
-STEP = 1 / 700  # length of a step, that of the thesis [s]
+STEP = 1 / 700  # length of a step in the thesis [s]
 SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
 MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
-"""Fraction of inverted tetrahedra that makes a dent; fraction of those inverted at half-time that are still
-inverted at the end; fraction of these in the most compressed quarter (0.25 by chance); extent over that at
-rest above which a body failed."""
+"""Limits of the verdict. The sphere is dented if more than `MANY` of its tetrahedra are inverted at the end,
+more than `STAYS` of those inverted at half-time stay inverted, and more than `PLACED` of the inverted
+tetrahedra are in the most compressed quarter (0.25 by chance). The sphere failed if its extent exceeds
+`APART` times the extent at rest."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -100,9 +101,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether flips leave dents in the compressed region, and whether the other tetrahedra are
-    intact.
-    """
+    """Judge whether flips leave dents in the compressed region, and whether a body runs away."""
     by_flips = {flips: results.one(flips=flips, speed=SPEED) for flips in FLIPS}
     thesis = {point["speed"]: numbers for point, numbers in results.where(flips="tolerant")}
     dented = [speed for speed, numbers in thesis.items() if _is_dented(numbers)]
@@ -178,7 +177,7 @@ def _listed(values: Iterable[float]) -> str:
 
 
 def _is_dented(numbers: Numbers) -> bool:
-    """True if inverted tetrahedra stay, and lie where the compression was largest."""
+    """True if inverted tetrahedra stay inverted, and lie where the compression was largest."""
     return bool(numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS and numbers["in_pressed"] > PLACED)
 
 

@@ -43,8 +43,8 @@ THESIS_GAIN = 100.0
 
 THESIS_RATES = (20.0, 30.0)
 RATE_TOLERANCE = 1.5
-"""Factor by which a gain may lie outside `THESIS_RATES`, because a linear solve costs more on some
-processors."""
+"""A gain agrees if it is within this factor of `THESIS_RATES`, because the cost of a linear solve depends on
+the processor."""
 
 EXPLICIT, IMPLICIT = (0.9, 1.3), (10.0, THESIS_GAIN, 300.0)
 """Step lengths over leapfrog's largest stable step, for leapfrog and for implicit Euler."""
@@ -63,7 +63,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure a fall, or the shortest time of each frame with both integrators [s]."""
+    """Measure a fall, or the shortest time of each frame with each of the two integrators [s]."""
     if point["run"] == "fall":
         return fall(Drop(point["integrator"], point["factor"], point["resolution"]))
     slow, fast = np.array([_in_turns(point) for _ in range(point["repeats"])]).min(axis=0)
@@ -73,7 +73,8 @@ def measure(point: Point) -> Numbers:
 def _in_turns(point: Point) -> tuple[list[float], list[float]]:
     """Return the times of all frames with leapfrog and with implicit Euler [s].
 
-    Frames of both alternate. The worlds are dropped at the end of the call; later calls compile nothing.
+    Frames of the two integrators alternate. The worlds are released at the end of the call. Later calls reuse
+    compiled kernels.
     """
     explicit = Drop("leapfrog", EXPLICIT[0], point["resolution"])
     implicit = Drop("implicit_euler", point["factor"], point["resolution"])
@@ -93,8 +94,9 @@ def _up_to(step: float) -> str:
 def _rate_finding(
     rates: Numbers, keeps_bounce: bool, rebounds: dict[tuple[IntegratorName, float], float]
 ) -> Finding:
-    """Judge the gain in rate by the thesis's range and its tolerance; it agrees only in part if the bounce is
-    lost.
+    """Judge whether the gain in rate is within the tolerance of the thesis's range.
+
+    If the bounce is lost, the verdict is "agrees in part" at best.
     """
     gain = sum(rates["explicit"]) / sum(rates["implicit"])
     low, high = THESIS_RATES[0] / RATE_TOLERANCE, THESIS_RATES[1] * RATE_TOLERANCE

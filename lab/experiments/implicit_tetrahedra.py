@@ -1,7 +1,7 @@
 """Gain of implicit Euler for tetrahedra (thesis section 6.5): its computing time compared with leapfrog's.
 
-A sphere falls onto the floor. The gain grows with the stiffness, because leapfrog then needs shorter steps
-and implicit Euler does not; so three materials are compared.
+A sphere falls onto the floor. A stiffer sphere needs shorter steps with leapfrog but not with implicit Euler,
+so the gain grows with the stiffness. Therefore three materials are compared.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ BODIES: dict[str, tuple[Material, tuple[float, ...]]] = {
     "stiff": (Material(1e8, 0.3, 1000.0, 1000.0, damping_ratio=0.0), (10.0, 30.0, 100.0)),
     "very stiff": (MATERIAL, (10.0, 100.0, 300.0)),
 }
-"""Material, and steps of implicit Euler over leapfrog's largest stable step, up to about one step per
-frame."""
+"""Material of each sphere, and steps of implicit Euler over leapfrog's largest stable step. The longest step
+is about as long as a frame."""
 
 EXPLICIT = 0.9
 """Step of leapfrog over its largest stable step."""
@@ -41,7 +41,7 @@ PAYS = 1.5
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: falls with each step.
+    """List the points: a fall for each sphere, integrator and step.
 
     A quick report uses a coarse sphere and omits the stiffest one.
     """
@@ -57,8 +57,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure a fall, and with implicit Euler also the shortest times of its frames in alternation with
-    leapfrog.
+    """Measure a fall. For implicit Euler, also time the same fall with both integrators in alternation.
+
+    The time of a fall is the sum of the shortest times of its frames [s].
     """
     material, resolution = BODIES[point["body"]][0], point["resolution"]
 

@@ -24,34 +24,34 @@ from lab.experiments.experiment import (
 from lab.experiments.oscillators import run_oscillators
 
 ORDERS = {"explicit_euler": 1, "lazy_leapfrog": 1, "leapfrog": 2, "implicit_euler": 1}
-"""Theoretical orders for position and velocity at the same time. The thesis gives all except that of lazy
-leapfrog."""
+"""Theoretical orders of the error in position and velocity at the same time. The thesis gives all orders
+except that of lazy leapfrog."""
 
 ORDER_TOLERANCE = 0.15
 START = 0.02
 """Initial displacement [m]; errors are divided by it."""
 
 STEPS = (32, 64, 128, 256)
-"""Numbers of steps per period. With more, rounding of float32 dominates."""
+"""Numbers of steps per period. With more steps, rounding of float32 dominates."""
 
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
 """h w and number of periods of the long run."""
 
 NEARLY = 5.0
-"""Largest error over that of leapfrog in the long run that counts as nearly as good."""
+"""An integrator is nearly as good as leapfrog if its error in the long run is at most this multiple of
+leapfrog's."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each integrator over one period with four step lengths, and over ten periods
-    with one.
-    """
-    del effort  # both take about 1 s
+    """List the points: each integrator over one period (four step lengths) and over ten periods (one)."""
+    del effort  # the full run is short enough for a quick report
     return [{"integrator": name, "run": run} for name in ORDERS for run in ("period", "long")]
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the error over one period, or the displacements of the long run, also from a shifted initial
-    velocity.
+    """Measure the errors over one period for each of `STEPS`, or the displacements of the long run.
+
+    The long run starts from rest, and a second time from a shifted initial velocity ("kicked").
     """
     name = point["integrator"]
     if point["run"] == "period":
@@ -63,7 +63,7 @@ def measure(point: Point) -> Numbers:
         return {"errors": [float(gap[: n + 1, i].max()) for i, n in enumerate(STEPS)]}
     k = LONG_ANGLE**2
     steps = round(LONG_PERIODS * 2 * np.pi / LONG_ANGLE)
-    # With half a kick added, leapfrog's first half kick gives the velocity of lazy leapfrog's full kick.
+    # The second start adds half a kick to leapfrog's first half kick. The sum is lazy leapfrog's full kick.
     kicked = ((START, START), (0.0, -k * START / 2))
     u, _ = run_oscillators(name, (k, k), (0.0, 0.0), kicked, steps)
     return {

@@ -15,8 +15,8 @@ def cube(cells: int, seed: int | None = None) -> TetMesh:
 
     Args:
         cells: number of cells along each edge.
-        seed: seed of the random displacements. Vertices on the surface move along it, and Delaunay's rule
-            reconnects all vertices. None keeps a regular grid.
+        seed: seed of the random displacements; None for a regular grid. Vertices on the surface move along
+            it, and Delaunay's rule reconnects all vertices.
     """
     regular = box((1.0, 1.0, 1.0), (cells, cells, cells))
     if seed is None:

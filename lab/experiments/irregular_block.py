@@ -9,7 +9,8 @@ from taichi_soft import TetMesh
 JITTER = 0.12
 """Largest random displacement of a vertex [cell edge]."""
 FLAT = 1e-6
-"""Volume over that of a cell below which the four corners of a tetrahedron lie in one face of the block."""
+"""Smallest volume of a tetrahedron over that of a cell. The corners of flatter tetrahedra lie in one face of
+the block."""
 
 
 def irregular_block(length: float, width: float, cells: int) -> TetMesh:

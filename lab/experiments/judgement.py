@@ -1,6 +1,6 @@
-"""Make findings from booleans: for a claim as a whole, its parts, or several meshes.
+"""Make findings from booleans, and format ranges of numbers.
 
-Format ranges of numbers.
+A finding can judge a claim as a whole, with exceptions, or on several meshes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Span:
     values: Collection[float]
 
     def __format__(self, how: str) -> str:
-        """Format the smallest and the largest number; only one if both look the same."""
+        """Format the smallest and the largest number; only one number if both have the same text."""
         low, high = format(min(self.values), how), format(max(self.values), how)
         return low if low == high else f"{low} to {high}"
 
@@ -47,9 +47,10 @@ def judged_but_for(
 
 
 def judged_on_meshes(claim: str, measured: str, agrees: Collection[bool], why: str) -> Finding:
-    """Make a finding that agrees if all meshes agree, differs if none do, and otherwise cannot be told.
+    """Make a finding from the agreement on each mesh.
 
-    The thesis does not publish its meshes.
+    The verdict is "agrees" if all meshes agree and "differs" if none agrees. Otherwise it is "cannot be
+    told", because the thesis does not publish its meshes.
     """
     if all(agrees) or not any(agrees):
         return judged(claim, measured, all(agrees), why)

@@ -31,8 +31,9 @@ WANTED, FURTHEST = 1.0, 1.2
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each nu with the linearised and the exact strain; two linearised ones in a quick
-    report.
+    """List the points: each nu with the linearised and the exact strain.
+
+    A quick report has two nu with the linearised strain.
     """
     if effort is Effort.QUICK:
         return [{"poisson": nu, "strain": "linear", "steps": 12} for nu in (0.0, 0.4)]
@@ -40,8 +41,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure force over E A s, volume and smallest tetrahedron over their rest values, as far as equilibria
-    exist.
+    """Measure the cylinder at each stretch that has an equilibrium.
+
+    Returns: "stretch"; "force", force over E A s; "volume", volume over that at rest; "smallest", smallest
+        volume of a tetrahedron over that at rest.
     """
     mesh = cylinder(RADIUS, HEIGHT, *MESH)
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)

@@ -25,7 +25,7 @@ class Vibration:
     """Small undamped vibrations about the rest shape."""
 
     frequency: float  # highest angular frequency [1/s]
-    growth_rate: float  # largest [1/s]; forces without an energy can amplify a vibration at any step length
+    growth_rate: float  # largest growth rate [1/s]; without an energy, vibrations can grow at any step length
 
 
 def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
@@ -43,7 +43,7 @@ def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
         stiffness[:, k] = (behind - ahead).ravel() / (2 * nudge)
     mass = np.repeat(bare_world(floor=None, retries=0).add_body(mesh, material, law=law).masses, 3)
     squares = np.linalg.eigvals(stiffness / mass[:, None])
-    squares = squares[np.abs(squares) > 1e-6 * np.abs(squares).max()]  # without rigid motions
+    squares = squares[np.abs(squares) > 1e-6 * np.abs(squares).max()]  # removes rigid motions
     roots = np.sqrt(squares.astype(complex))
     return Vibration(float(roots.real.max()), float(np.abs(roots.imag).max()))
 
@@ -61,7 +61,7 @@ class ShakenBody:
         self.noise = size * np.random.default_rng(0).normal(size=self.rest.shape)
 
     def stays(self, h: float) -> bool:
-        """True if the body stays close to its rest shape over `STEPS` steps of leapfrog of h [s]."""
+        """True if the body stays close to its rest shape over `STEPS` leapfrog steps of length h [s]."""
         far = GROWTH * np.abs(self.noise).max()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UnstableStepWarning)
@@ -74,7 +74,7 @@ class ShakenBody:
         return True
 
     def largest_step(self) -> float:
-        """Return the largest step at which the body is stable [s]; 0 if it is unstable at `SHORTEST`."""
+        """Return the largest stable step [s]; 0 if the body is unstable at `SHORTEST`."""
         guess = self.body.stable_step.limit
         low, high = SHORTEST * guess, LONGEST * guess
         if not self.stays(low):

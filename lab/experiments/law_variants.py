@@ -9,9 +9,10 @@ from taichi_soft.elements.laws import BondLaw
 
 
 def variants(effort: Effort) -> list[Point]:
-    """List {"law": name, "strain": name or None}, first those on tetrahedra.
+    """List the laws as {"law": name, "strain": name or None}, laws on tetrahedra first.
 
-    A quick report omits the exact strain by faces, because its forces equal those of the virial law.
+    A quick report omits the law "face" with the exact strain, because its forces equal those of the virial
+    law.
     """
     every = [
         {"law": law.name, "strain": strain and strain.value}

@@ -1,7 +1,7 @@
 """Leapfrog is reversible (thesis section 3.5.2): with all velocities reversed, a body returns to its start.
 
 Between steps, positions and velocities of a World belong to the same time, so a run can be reversed after any
-step. The remaining error is round-off, and information that the integrator loses.
+step. The body misses its start because of round-off, and because of information that the integrator loses.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MATERIAL = Material(
 )  # undamped, because damping is irreversible
 STRETCH, DT, SUBSTEPS = 1.1, 1 / 60, 8
 REVERSIBLE = 1e-4
-"""Largest remaining distance over the distance travelled of a reversible integrator. Round-off causes a few
-millionths, other integrators more than a hundredth."""
+"""An integrator is reversible if the remaining distance is at most this fraction of the distance travelled.
+Round-off leaves a few millionths, irreversible integrators leave more than a hundredth."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -42,9 +42,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the distance of a stretched cube from its start, after equal numbers of steps forwards and
-    backwards.
-    """
+    """Measure the distance of a stretched cube from its start after equal numbers of steps forth and back."""
     cube = box(cells=(2, 2, 2))
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")

@@ -30,7 +30,7 @@ class FiniteElements:
         self._solvers: dict[bytes, Any] = {}
 
     def solve(self, load: EndLoad) -> tuple[float, Floats]:
-        """Return the stiffness, as `EndLoad.stiffness`, and the displacements of the vertices, (n, 3) [m]."""
+        """Return the stiffness (see `EndLoad.stiffness`) and the displacements of vertices, (n, 3) [m]."""
         held, u = self._held(load)
         pull = self._pull(load)
         free = ~held
@@ -48,7 +48,7 @@ class FiniteElements:
         driven, nodal = load.loading.driven, self._basis.nodal_dofs.T
         held[nodal] = driven
         u[nodal] = np.where(driven, load.loading.displacement, 0.0)
-        if self._quadratic:  # midpoints of edges with two prescribed ends follow their ends
+        if self._quadratic:  # the midpoint of an edge follows its ends if both are prescribed
             first, second = self._skfem_mesh.edges
             middle = self._basis.edge_dofs.T
             held[middle] = driven[first] & driven[second]
@@ -56,7 +56,7 @@ class FiniteElements:
         return held, u
 
     def _pull(self, load: EndLoad) -> Floats:
-        """Return the forces on degrees of freedom from the traction on the right end [N]."""
+        """Return the force on each degree of freedom due to the traction on the right end [N]."""
         from skfem import FacetBasis, LinearForm
 
         if not load.traction.any():

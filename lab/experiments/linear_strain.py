@@ -54,7 +54,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _told(kind: str, amount: float, strain: StrainName) -> float:
-    """Return the strain that the library's forces imply."""
+    """Return the strain that the library's forces imply: the entry along the stretch or off the diagonal."""
     x = TET.vertices @ _deformation(kind, amount).T
     forces = internal_forces(TET, Material(YOUNG, 0.0, 1000.0, damping_ratio=0.0), x, strain=strain)
     arms = x[1:] - x[0]
@@ -83,7 +83,7 @@ def _exact(kind: str, e: float) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the error of the linearised strain, and check that the library computes both."""
+    """Judge the error of the linearised strain, and check the library's linear and exact strain."""
     numbers = {kind: results.one(kind=kind) for kind in KINDS}
     amount = np.array(numbers["stretch"]["amount"])
     errors = {kind: np.array(n["linear"]) / np.array(n["exact"]) - 1 for kind, n in numbers.items()}

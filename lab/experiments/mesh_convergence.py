@@ -33,7 +33,7 @@ stiffness."""
 
 def points(effort: Effort) -> list[Point]:
     """List the points: each law and finite elements with 2 to 6 or 2 to 10 cells across."""
-    counts = (6, 4, 3, 2) if effort is Effort.QUICK else (10, 8, 6, 4, 3, 2)  # later ones reuse fields
+    counts = (6, 4, 3, 2) if effort is Effort.QUICK else (10, 8, 6, 4, 3, 2)  # later points reuse fields
     return [
         {"law": law, "strain": None, "cells": cells} for law in (SOLID, SPRINGS, LINEAR) for cells in counts
     ]
@@ -93,7 +93,7 @@ def conclude(results: Results) -> Section:
         for law, by_load in errors.items():
             for load, values in by_load.items():
                 if law == LINEAR and load == "tension":
-                    continue  # exact up to round-off, far below the others
+                    continue  # exact up to round-off, far below the other curves
                 of_order = f", order {orders[law, load]:.2f}" if (law, load) in orders else ""
                 (line,) = axes.loglog(cells, np.abs(values), styles[law], color=colours[load], markersize=5)
                 line.set_label(f"{names.get(law, law)}, {load}{of_order}")

@@ -1,7 +1,7 @@
 """Small dihedral angles and a high Poisson's ratio reduce stability (thesis section 6.6).
 
-A cube is degraded by flattening one inner tetrahedron or one layer of cells. Its largest stable step is
-estimated at rest, and measured by running it with increasing steps.
+A cube is degraded by flattening one inner tetrahedron or one layer of cells. The largest stable step of the
+cube is estimated at rest, and measured by running the cube with increasing steps.
 """
 
 from __future__ import annotations
@@ -65,14 +65,17 @@ def spoilt_cube(kind: str, share: float) -> TetMesh:
 
 
 def cubes() -> list[tuple[str, float, TetMesh]]:
-    """List kind, share and mesh of all cubes, the regular one first."""
+    """List kind, share and mesh of all cubes. The regular cube is the first."""
     spoilt = [(kind, share, spoilt_cube(kind, share)) for kind in KINDS for share in SHARES[1:]]
     return [("sound", 1.0, spoilt_cube("layer", 1.0)), *spoilt]
 
 
 def measure(point: Point) -> Numbers:
-    """Measure for each cube the smallest dihedral angle, the estimated largest stable step, the longest step
-    at which it was stable, and the shortest at which it was not.
+    """Measure the stability of each cube.
+
+    Returns: "angle", smallest dihedral angle [degrees]; "limit", estimate of the largest stable step [s];
+        "held", longest step at which the cube was stable [s]; "broke", shortest step at which it was unstable
+        [s].
     """
     meshes = [mesh for _, _, mesh in cubes()]
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -112,7 +115,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the largest stable step against the smallest angle and against Poisson's ratio."""
+    """Judge how the largest stable step depends on the smallest angle and on Poisson's ratio."""
     ratios = sorted(point["poisson"] for point, _ in results.where())
     by_ratio = {nu: results.one(poisson=nu) for nu in ratios}
     names = [(kind, share) for kind, share, _ in cubes()]

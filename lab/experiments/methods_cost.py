@@ -25,17 +25,17 @@ from taichi_soft.world.bare import bare_world
 
 LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
-SUBSTEPS, SUBSTEP = 20, 1e-5  # length [s], far below all stability limits
+SUBSTEPS, SUBSTEP = 20, 1e-5  # number of substeps, and their length [s], far below all stability limits
 SAME = 1e-9
 """Largest relative difference between forces that float64 round-off explains."""
 ALIKE = 1.25
 """Largest ratio of times that count as equal."""
 CLEARLY = 1.5
-"""Smallest ratio of times of which one counts as clearly faster."""
+"""Smallest ratio of the times of two laws at which one law counts as clearly faster."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: forces with the thesis's options, or with all options, and times on one mesh."""
+    """List the points: forces with the thesis's options or with all options, and times on one mesh."""
     is_full = effort is Effort.FULL
     modes = [("linear", "tolerant")]
     if is_full:
@@ -50,8 +50,9 @@ def measure(point: Point) -> Numbers:
 
 
 def _forces(point: Point) -> Numbers:
-    """Return the largest difference between both methods over the largest force, and the number of inverted
-    tetrahedra.
+    """Return the largest difference between both methods over the largest force.
+
+    Also return the numbers of inverted tetrahedra and of all tetrahedra that were compared.
     """
     mesh, rng = cube(3, 1), np.random.default_rng(1)
     difference, flipped, looked_at = 0.0, 0, 0
@@ -81,7 +82,7 @@ def _cost(point: Point) -> Numbers:
         for law, world in worlds.items():
             start = perf_counter()
             world.step(SUBSTEPS * SUBSTEP, SUBSTEPS)
-            if turn > 1:  # the first two warm up
+            if turn > 1:  # the first two rounds warm up
                 seconds[law].append((perf_counter() - start) / SUBSTEPS)
     return {
         "seconds": seconds,
@@ -92,7 +93,10 @@ def _cost(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the ratios of times turn by turn, so that a slow phase of the machine affects both laws."""
+    """Judge the forces and the ratios of times.
+
+    A ratio is taken in each round, so that a slow phase of the machine affects both laws.
+    """
     forces = results.where(kind="forces")
     cost = results.one(kind="cost")
     virial = np.array(cost["seconds"]["virial"])

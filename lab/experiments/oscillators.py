@@ -1,6 +1,6 @@
 """Particles of 1 kg, each on a spring to a pinned particle: u'' = -k u - b u'.
 
-They measure statements of chapter 3 about test equations with the integrators of a world. All particles move
+With these particles, the integrators of a world solve the test equations of chapter 3. All particles move
 along their springs, which are linear in this direction.
 """
 
@@ -21,7 +21,7 @@ LENGTH = 1.0
 """Length of the springs [m]; displacements must be much smaller."""
 
 SLACK = 1e-9
-"""Stiffness of a spring that only damps [N/m]; a spring must have one."""
+"""Stiffness of a spring that should only damp [N/m]. The stiffness of a spring must not be zero."""
 
 
 def run_oscillators(
@@ -31,10 +31,9 @@ def run_oscillators(
     start: tuple[ArrayLike, ArrayLike],
     steps: int,
 ) -> tuple[Floats, Floats]:
-    """Return displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m)
-    each.
+    """Return displacements [m] and velocities [m/s] at the start and after each step, (steps + 1, m) each.
 
-    Because steps are 1 s long, k is (h w)^2, and b is h times the damping per mass.
+    Steps are 1 s long. Therefore k is (h w)^2, and b is h times the damping per mass.
     Args:
         stiffness: k [N/m], (m,).
         damping: b [N s/m], (m,).
@@ -63,10 +62,11 @@ def run_oscillators(
 
 
 def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
-    """Return the largest modulus of the eigenvalues of a step for each oscillator, (m,); above 1 it grows.
+    """Return the largest modulus of the eigenvalues of a step for each oscillator, (m,).
 
-    The eigenvalues follow from the states after two and three steps, from two different initial states. The
-    state of the integrator must be position and velocity at the same time.
+    Above 1, the motion grows. The eigenvalues follow from the states after two and three steps, from two
+    different initial states. The state of the integrator must consist of position and velocity at the same
+    time.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     amount = np.full(len(k), 1e-2 * LENGTH)

@@ -1,6 +1,4 @@
-"""Patch test: a law passes if an irregular body under uniform strain has the uniform stress of
-Hooke's law.
-"""
+"""Patch test: under uniform strain, an irregular body must have the uniform stress of Hooke's law."""
 
 from __future__ import annotations
 
@@ -28,10 +26,10 @@ ALONG_EDGES = tuple(law for law in LAWS if law not in TETRAHEDRAL)
 YOUNG, POISSON = 1e6, 0.3
 STRAINS = (1e-4, 1e-3, 1e-2)  # largest entry of the strain
 SMALL = 1e-3
-"""Largest error over the largest force at the smallest strain that passes."""
+"""A law passes only if its error at the smallest strain is below this fraction of the largest force."""
 FALLS = 0.02
-"""Largest error at the smallest strain over that at the largest. An error of second order in the strain gives
-0.01."""
+"""A law passes only if its error at the smallest strain is below this fraction of that at the largest strain.
+An error of second order in the strain gives 0.01."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -45,8 +43,9 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the largest errors of the forces over random strains of each size.
 
-    Returns: "surface", largest difference from the forces of Hooke's stress on the surface at rest, over the
-        largest of these; and "inside", largest force on an inner vertex, which should be zero.
+    Returns: "surface", largest difference from the forces of Hooke's stress on the surface at rest; "inside",
+        largest force on an inner vertex, which should be zero. Both numbers are divided by the largest force
+        of Hooke's stress.
     """
     mesh, rng = cube(3, point["seed"]), np.random.default_rng(point["seed"])
     material = Material(YOUNG, POISSON, 1000.0, damping_ratio=0.0)
@@ -71,7 +70,10 @@ def _hooke(strain: FloatArray) -> FloatArray:
 
 
 def _pull_of(vertices: FloatArray, surface: Any, stress: FloatArray) -> FloatArray:
-    """Return the vertex forces of a body under this stress: a third of each triangle's force, inwards."""
+    """Return the internal forces on the vertices of a body under uniform stress, (n, 3) [N].
+
+    Each surface triangle contributes a third of its force, directed inwards, to each of its vertices.
+    """
     a, b, c = (vertices[surface[:, i]] for i in range(3))
     traction = np.cross(b - a, c - a) / 2 @ stress
     forces = np.zeros_like(vertices)

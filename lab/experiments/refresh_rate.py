@@ -30,7 +30,7 @@ SUBSTEPS = 18
 """Substeps per frame of 1/40 s: 720 per second, close to the thesis's 700."""
 SIZE = 640, 480
 HARDLY = 0.1
-"""Largest fraction of the time spent on drawing that hardly affects the simulation."""
+"""Drawing hardly affects the simulation if it takes at most this fraction of the time."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -65,7 +65,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the fraction of the time that remains for the simulation at 40 FPS."""
+    """Judge the fraction of the time that drawing takes at 40 FPS."""
     numbers = results.one()
     step, read, draw = (float(np.median(numbers[key])) for key in ("step", "read", "draw"))
     reading, drawing = RATE * read, RATE * (read + draw)

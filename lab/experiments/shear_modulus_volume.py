@@ -22,7 +22,7 @@ from lab.experiments.experiment import (
 from lab.experiments.irregular import cube
 from taichi_soft import Material, internal_forces
 
-YOUNG, DENSITY = 3e6, 4e3  # those of chapter 5 [Pa, kg/m^3]
+YOUNG, DENSITY = 3e6, 4e3  # values of chapter 5 [Pa, kg/m^3]
 WAYS = {"stretched": (0.0, 0.0, 1.0), "pressed": (0.0, 0.0, -1.0), "sheared": (1.0, 0.0, 0.0)}
 AMOUNT = {"stretched": 0.2, "pressed": 0.2, "sheared": 0.4}
 LARGEST = 0.5
@@ -30,9 +30,7 @@ LARGEST = 0.5
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: each deformation with several shear moduli over E, on one irregular mesh or on
-    three.
-    """
+    """List the points: each deformation with several shear moduli, on one irregular mesh or on three."""
     is_full = effort is Effort.FULL
     moduli = (0.05, 0.1, 0.2, 0.35, LARGEST) if is_full else (0.1, LARGEST)
     seeds = (1, 2, 3) if is_full else (1,)
@@ -40,7 +38,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume of a cube with its ends attached to moving plates, over its rest volume."""
+    """Measure the volume of a cube that plates at its ends deform, relative to its rest volume."""
     mesh = cube(3, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, 0.3, DENSITY, shear_modulus=point["modulus"] * YOUNG, damping_ratio=0.0)

@@ -29,9 +29,10 @@ SIZES = (1.0, 2.0, 4.0)
 THESIS_RATIO = 8.0
 """Acceleration of a body over that of a body of twice the size, as the thesis states it."""
 TOLERANCE = 0.1
-"""Largest relative deviation from `THESIS_RATIO` that agrees."""
+"""Largest relative deviation from `THESIS_RATIO` that counts as agreement."""
 STEP = 1e-6
-"""Step over which an acceleration is measured [s]; so short that the body hardly moves."""
+"""Length of the step over which an acceleration is measured [s]. The step is so short that the body hardly
+moves."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -51,7 +52,7 @@ def measure(point: Point) -> Numbers:
     body.set_motion(stretched, np.zeros_like(stretched))
     world.step(STEP, 1)
     first = np.array(body.velocities(), dtype=np.float64)
-    world.step(STEP, 1)  # the second step, because leapfrog's first is half a step
+    world.step(STEP, 1)  # measure the second step, because leapfrog's first is half a step
     accelerations = (np.array(body.velocities(), dtype=np.float64) - first) / STEP
     return {"force": _size(forces), "mass": float(body.masses.sum()), "acceleration": _size(accelerations)}
 

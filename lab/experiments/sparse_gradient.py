@@ -1,6 +1,6 @@
 """Gradients of forces by central differences, also for laws without a complete analytic gradient.
 
-Many vertices are moved together if no force depends on two of them.
+Two vertices are moved together if no force depends on both of them.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class SparseGradient:
     """Computes gradients of forces.
 
     Args:
-        reads: sparse, symmetric (n, n), non-zero if the force on one vertex depends on the position of the
-            other.
+        reads: sparse, symmetric matrix (n, n). An entry is non-zero if the force on one vertex depends on the
+            position of the other vertex.
         step: step of the differences [m].
     """
 

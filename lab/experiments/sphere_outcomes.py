@@ -11,7 +11,7 @@ from lab.experiments.experiment import Numbers
 OUTCOMES = ("collapses", "dented", "whole", "explodes")
 
 COLLAPSED = 0.5
-"""Largest volume over that at rest of a collapsed sphere. The thesis has no number."""
+"""Largest volume of a collapsed sphere over its volume at rest. The thesis gives no number."""
 
 Window = tuple[float, float, float, float]
 """Edges returned by `window` [Pa]."""
@@ -20,8 +20,9 @@ Window = tuple[float, float, float, float]
 def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
     """Return the outcome of each sphere: "explodes", "collapses", "dented" or "whole".
 
-    A sphere explodes if it becomes non-finite or doubles in extent. It is dented if more than a hundredth of
-    its tetrahedra stay inverted, and collapses if its volume is then at most `collapsed` of that at rest.
+    A sphere explodes if it becomes non-finite or doubles in extent. If more than a hundredth of its
+    tetrahedra stay inverted, it collapses if its volume is at most `collapsed` times that at rest; otherwise
+    it is dented.
     """
     ends = []
     for volume, flipped, frozen, extent in zip(
@@ -37,10 +38,11 @@ def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
 
 
 def window(numbers: Numbers, collapsed: float = COLLAPSED) -> Window:
-    """Return the edges of the longest range of moduli with whole spheres, each as a bracket [Pa].
+    """Return the longest range of moduli with whole spheres as (low, first, last, high) [Pa].
 
-    The lower edge lies between the last modulus before the range that is neither whole nor dented, and the
-    first of the range. The upper edge lies between the last of the range and the next that explodes.
+    `first` and `last` are the ends of the range. `low` is the last modulus below the range whose sphere is
+    neither whole nor dented, or 0. `high` is the first modulus above the range whose sphere explodes, or
+    infinity. If no sphere is whole, the result is (inf, inf, 0, 0).
     """
     young, ends = numbers["young"], outcomes(numbers, collapsed)
     first, last = _longest_row(end == "whole" for end in ends)

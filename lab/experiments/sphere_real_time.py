@@ -28,7 +28,8 @@ from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
-"""Real-time factor on an AMD XP 1800+ at 1.53 GHz (section 6.6), and number of tetrahedra of that sphere."""
+"""Real-time factor on an AMD XP 1800+ at 1.53 GHz (section 6.6), and number of tetrahedra of the thesis's
+sphere."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -70,7 +71,7 @@ def nanoseconds(factor: float, tets: int) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Compare the real-time factor with the thesis's. A verdict on its processor is not possible."""
+    """Compare the real-time factor with the thesis's. No verdict is possible without its processor."""
     numbers = results.one()
     factor, tets = real_time_factor(numbers), numbers["tets"]
     here, there = nanoseconds(factor, tets), nanoseconds(THESIS_FACTOR, THESIS_TETS)

@@ -1,8 +1,8 @@
 """The dropped sphere for many Young's moduli and Poisson's ratios (thesis section 6.6).
 
 Spheres of all moduli with one Poisson's ratio fall side by side in one world, without contact. The linear
-limit is the modulus whose largest stable step is the thesis's step. It shows how much of the upper edge is
-due to the mesh.
+limit is the modulus whose largest stable step is the thesis's step. This limit shows how much of the upper
+edge is due to the mesh.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ WINDOWS = {0.1: (2e5, 3e6), 0.4: (4e5, 1e6)}
 LEAST, MOST = 1e5, 1e7
 """Range of moduli to try [Pa]."""
 ROUNDING = 1.5
-"""Largest factor between an edge and that of the thesis, which has one digit: 1e6 may stand for 1.5e6."""
+"""Largest factor between an edge and the thesis's edge. The thesis prints one digit: 1e6 can stand for
+1.5e6."""
 EQUAL = 1.1
-"""Largest factor between edges that count as equal; it is smaller than that between two neighbouring
-moduli."""
+"""Largest factor between edges that count as equal. The factor between neighbouring moduli is larger."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
@@ -52,9 +52,9 @@ LINES = tuple(k / 20 for k in range(6, 17))
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: the thesis's Poisson's ratios over 9 moduli, and linear limits.
+    """List the points: drops with 9 moduli for each of the thesis's Poisson's ratios, and linear limits.
 
-    A full report has five ratios over 21 moduli, all treatments of flips, and more meshes.
+    A full report has 21 moduli, five ratios, all treatments of flips, and more meshes.
     """
     meshes = MESHES[:2] if effort is Effort.QUICK else MESHES
     limits: list[Point] = [
@@ -72,7 +72,11 @@ def _drop(mesh: str, nu: float, flips: FlipsName, moduli: int, seconds: float) -
 
 
 def sphere_mesh(name: str) -> TetMesh:
-    """Return a mesh of 4 m^3: the thesis's number of particles, or regular ones of 147 or 923."""
+    """Return a mesh of a sphere of 4 m^3.
+
+    The mesh "thesis" has the number of particles of the thesis. "coarse" and "fine" are regular, with 147 and
+    923 particles.
+    """
     if name == "thesis":
         return load_mesh(ASSETS / "sphere.npz")
     rings = {"coarse": 3, "fine": 6}[name]
@@ -80,8 +84,9 @@ def sphere_mesh(name: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the outcome of a sphere for each modulus, or the modulus for which 1/700 s is the largest
-    stable step.
+    """Measure the outcome of a sphere for each modulus, or the linear limit.
+
+    The linear limit is the modulus for which 1/700 s is the largest stable step [Pa].
     """
     mesh, nu = sphere_mesh(point["mesh"]), point["poisson"]
     if point["part"] == "limit":
@@ -187,7 +192,7 @@ def conclude(results: Results) -> Section:
 
 
 def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
-    """True for the lower and the upper edge if it agrees with that of the thesis."""
+    """Return two booleans: True if the lower edge agrees with the thesis's, True if the upper edge does."""
     low, first, last, high = window(numbers, collapsed)
     thesis_low, thesis_high = WINDOWS[nu]
     return (
@@ -202,8 +207,11 @@ def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
 
 
 def _window_verdict(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> Verdict:
-    """Return "agrees" if all spheres between the thesis's edges are whole, "in part" if some are dented, else
-    "differs".
+    """Return the verdict on the range of whole spheres.
+
+    The verdict is "differs" if an edge is wrong, or if a sphere between the thesis's edges collapses or
+    explodes. Otherwise the verdict is "agrees in part" if a sphere between the edges is dented, and "agrees"
+    if no sphere is.
     """
     if not (all(_edges_agree(numbers, nu, collapsed)) and _is_calm(numbers, nu, collapsed)):
         return Verdict.DIFFERS
@@ -297,9 +305,9 @@ def _window_finding(results: Results, nu: float) -> Finding:
 
 
 def _from_the_other(results: Results, nu: float) -> str:
-    """Describe the upper edge that the thesis's other range implies.
+    """Describe the upper edge that follows from the thesis's upper edge for the other Poisson's ratio.
 
-    The ratio of both upper edges hardly depends on the mesh.
+    The ratio of the two upper edges hardly depends on the mesh.
     """
     (other,) = (each for each in WINDOWS if each != nu)
     shares = [
@@ -311,7 +319,7 @@ def _from_the_other(results: Results, nu: float) -> str:
 
 
 def _edge(young: float) -> float | str:
-    """Format an edge for a table; "none tried" beyond the range of moduli."""
+    """Format an edge for a table. Beyond the range of moduli, return "none tried"."""
     return "none tried" if young in (0.0, np.inf) else float(f"{young:.3g}")
 
 

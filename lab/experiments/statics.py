@@ -1,7 +1,7 @@
-"""Equilibria of a body under any law, without time steps: some coordinates are prescribed, forces act on the
-others.
+"""Equilibria of a body under any law, without time steps.
 
-Newton's method runs in float64, with the stiffness from central differences of the forces.
+Some coordinates are prescribed, and forces act on the other coordinates. Newton's method runs in float64,
+with the stiffness from central differences of the forces.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from taichi_soft.elements.laws.bonds import Ring
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
-"""Step of the differences over the shortest edge. Truncation and rounding each cause a relative error of
-about 1e-10."""
+"""Step of the finite differences over the shortest edge. Truncation and rounding each cause a relative error
+of about 1e-10."""
 SLOW = 0.5
-"""Fraction of the residual. If a step leaves more, the stiffness is computed again and steps are halved."""
+"""If a step of Newton's method leaves more than this fraction of the residual, the stiffness is computed
+again."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
-"""First displacement over the size of the body above which the body is not constrained."""
+"""A body is not constrained if its first displacement exceeds this multiple of its size."""
 
 
 class NoEquilibriumError(TaichiSoftError):
@@ -144,7 +145,7 @@ class StaticBody:
 
 
 def factorised(matrix: Any) -> Any:
-    """Return a function that solves for a right-hand side.
+    """Factorise a sparse matrix. Returns: a function that solves the linear system for a right-hand side.
 
     Raises: NoEquilibriumError for a singular matrix.
     """
@@ -158,9 +159,7 @@ def factorised(matrix: Any) -> Any:
 
 
 def _dependence(mesh: TetMesh, material: Material, law: LawName) -> Any:
-    """Return the sparsity pattern, symmetric (n, n): non-zero if a vertex's force depends on the other
-    vertex.
-    """
+    """Return a sparse, symmetric (n, n) matrix: non-zero for vertices whose forces depend on each other."""
     from scipy.sparse import coo_matrix
 
     chosen = LAWS[law]

@@ -14,7 +14,7 @@ def draw_stiffness_dots(
 
     Args:
         rows: ratio by load, for each law.
-        expected: name of the value 1.
+        expected: name of the stiffness that the ratios refer to, for the label of the axis.
         limits: limits of the axis; marks outside are drawn at its ends.
     """
     axes = figure.add_subplot()

@@ -36,16 +36,14 @@ UNEVEN = ((0.0, 40.0, 130.0, 170.0, 260.0), (0.0, 110.0, 150.0, 240.0, 265.0, 33
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: both readings of eq. 4.12, on even rings of three to eight particles and two uneven
-    rings.
-    """
+    """List the points: both readings of eq. 4.12, on even rings of 3 to 12 particles and two uneven rings."""
     sizes = (4, 6, 7) if effort is Effort.QUICK else (3, 4, 5, 6, 7, 8, 10, 12)
     rings = [f"{size} even" for size in sizes] + [f"{len(ring)} uneven" for ring in UNEVEN]
     return [{"law": law, "ring": ring} for law in LAWS for ring in rings]
 
 
 def mesh_of(ring: str) -> TetMesh:
-    """Make an edge in the ring with this name."""
+    """Make an edge in a ring of particles, by the name of the ring, such as "6 even"."""
     count, kind = ring.split()
     if kind == "even":
         return ringed_edge(int(count))
@@ -54,10 +52,10 @@ def mesh_of(ring: str) -> TetMesh:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the rotation of the plane about the axis of the shear, and across it, for each of `ANGLES`
-    [rad].
+    """Measure the rotation of the plane for each of `ANGLES` [rad].
 
-    In a shear along the edge, lines across the edge rotate by the angle, and the edge keeps its direction.
+    Returns: "tilt", rotation about the axis of the shear; "aside", rotation across this axis. In a shear
+        along the edge, lines across the edge rotate by the shear angle, and the edge keeps its direction.
     """
     mesh = mesh_of(point["ring"])
     found = []

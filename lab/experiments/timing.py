@@ -16,6 +16,9 @@ def seconds_of(call: Callable[[], object]) -> float:
 def in_turns(
     one: Callable[[], object], other: Callable[[], object], repeats: int
 ) -> tuple[list[float], list[float]]:
-    """Return the durations of both calls in alternation [s], after one call of each to warm up."""
+    """Call both functions in alternation, after one call of each to warm up.
+
+    Returns: durations of the calls of `one` and of `other`, `repeats` each [s].
+    """
     pairs = [(seconds_of(one), seconds_of(other)) for _ in range(repeats + 1)][1:]
     return [pair[0] for pair in pairs], [pair[1] for pair in pairs]

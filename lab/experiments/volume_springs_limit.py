@@ -24,15 +24,18 @@ from lab.experiments.judgement import Span
 from taichi_soft import Material, TetMesh, internal_forces
 from taichi_soft.meshing.arrays import FloatArray
 
-YOUNG, DENSITY = 3e6, 4e3  # thesis [Pa, kg/m^3]; it gives neither damping nor step
+YOUNG, DENSITY = 3e6, 4e3  # values of the thesis [Pa, kg/m^3], which gives no damping and no step
 CELLS = 3
 STEADY = 0.1
-"""Largest growth rate of a steady motion [1/s]: 10 % per second, or round-off."""
+"""Growth rate up to which a motion counts as steady [1/s]. A growth of 10 % per second can be round-off."""
 THESIS_LIMIT, CLOSE = 0.3, 0.05
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: several dampings and none, on one irregular mesh, or on two and a regular one."""
+    """List the points: several dampings and none, on one irregular mesh.
+
+    A full report has two irregular meshes and a regular one.
+    """
     is_full = effort is Effort.FULL
     dampings = (0.0, 30.0, 100.0, 300.0, 1000.0, 3000.0) if is_full else (0.0, 1000.0, 3000.0)
     ratios = [round(0.05 * k, 2) for k in range(10)] if is_full else [0.0, 0.1, 0.2, 0.3, 0.4]
@@ -49,7 +52,7 @@ def measure(point: Point) -> Numbers:
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     mass = np.repeat(mesh.vertex_volumes * DENSITY, 3)[plates.free][:, None]
-    springs, volume = (_gradient(plates, nu) for nu in (0.0, 0.3))  # at rest linear in nu
+    springs, volume = (_gradient(plates, nu) for nu in (0.0, 0.3))  # at rest, gradients are linear in nu
     braking = -point["damping"] * _edge_matrix(mesh)[np.ix_(plates.free, plates.free)]
     zero, one = np.zeros_like(springs), np.eye(len(springs))
     growth, step = [], []

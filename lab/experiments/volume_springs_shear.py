@@ -23,7 +23,7 @@ from lab.experiments.irregular import cube
 from lab.experiments.judgement import Span, judged, judged_on_meshes
 from taichi_soft import Material, internal_forces
 
-YOUNG, DENSITY = 3e6, 4e3  # those of the thesis [Pa, kg/m^3]
+YOUNG, DENSITY = 3e6, 4e3  # values of the thesis [Pa, kg/m^3]
 POISSON = (0.0, 0.3)
 CELLS = 4
 REGULAR = "regular grid"
@@ -32,7 +32,7 @@ TOPS = 0.35, 0.75
 HALF = 0.5
 """Shear beyond which the volume drops in the thesis."""
 FAR_BELOW = 0.7
-"""Slope over G A below which a slope is far below it."""
+"""A slope is far below G A if it is less than this fraction of G A."""
 SLIGHT = 0.15
 """Largest relative change of a force that counts as slight."""
 
@@ -45,9 +45,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume, and the forces on the top while it moves sideways by up to the height of
-    the cube.
-    """
+    """Measure the volume and the forces on the top, which moves sideways by up to the cube's height."""
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -164,7 +162,10 @@ def _name(seed: int | None) -> str:
 
 
 def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
-    """Judge whether nu = 0.3 has the same effect at a shear of 0.5 and at the end, on every mesh."""
+    """Judge whether nu = 0.3 slightly lowers the tensile force on every mesh.
+
+    The forces are compared at a shear of 0.5 and at the end.
+    """
     everywhere = [row["volume-springs-tension"] for row in meshes]
     if all(everywhere) or not any(row["tension-at-the-end"] for row in meshes):
         why = "springs along edges resist a shear by the directions of the edges, whatever nu does"
@@ -179,7 +180,10 @@ def _tension_finding(measured: str, meshes: list[dict[str, Any]]) -> Finding:
 
 
 def _read(without: Numbers, with_3: Numbers) -> dict[str, Any]:
-    """Compare the two runs of one mesh. Returns: numbers, and whether each claim holds."""
+    """Compare the runs of one mesh with nu = 0 and nu = 0.3.
+
+    Returns: measured numbers by name, and for each claim True if it holds.
+    """
     found: dict[str, Any] = {}
     for name, nu, n in (("0", 0.0, without), ("3", 0.3, with_3)):
         shear, volume = np.array(n["shear"]), np.array(n["volume"])

@@ -1,8 +1,8 @@
 """The drop in Bullet (zlib licence) through PyBullet: a deformable body of stable neo-Hookean material.
 
 Bullet's constants differ from Lame's: 4/3 mu and lambda + 5/6 mu give Hooke's law for small strain (Smith, de
-Goes and Kim 2018, section 3.4). All vertices have the same mass, which PyBullet cannot change. The body
-floats above the floor by the collision margin, which is therefore small. The floor is a box, because the body
+Goes and Kim 2018, section 3.4). PyBullet gives all vertices the same mass, which cannot be changed. The body
+floats above the floor by the collision margin, so the margin is small. The floor is a box, because the body
 would float 0.1 m above Bullet's plane.
 """
 
@@ -19,7 +19,7 @@ from lab.peers.silence import silenced
 from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 
 FIRST = 2
-"""Number of steps per 1 / RATE s, from Bullet's default step of 1/240 s."""
+"""Number of steps per 1 / RATE s with Bullet's default step of 1/240 s."""
 
 MARGIN = 1e-3
 """Gap between body and floor [m]."""

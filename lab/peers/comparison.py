@@ -34,7 +34,7 @@ class Entry:
 
     @property
     def cost(self) -> float:
-        """Median time to simulate 1/60 s [s]."""
+        """Median computing time for 1/60 s of simulation [s]."""
         return float(np.median(self.trajectory.frame_times))
 
     @property
@@ -59,7 +59,7 @@ def compare(
     """Simulate the drop in taichi-soft, in the reference, and in each installed engine, in this order.
 
     Args:
-        drop: drop to simulate; the default drop by default.
+        drop: drop to simulate; None for the default drop.
         on_frame: called with (name, frames done, total frames) after each frame.
     """
     drop = Drop() if drop is None else drop

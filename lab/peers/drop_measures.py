@@ -34,7 +34,7 @@ def measure(drop: Drop, trajectory: Trajectory) -> Outcome:
     about = slice(max(landed, turn - 6), turn + 7)
     lowest = about.start + int(tops[about].argmin())
     size = float(np.ptp(drop.mesh.vertices[:, 2]))
-    rest = float(centers[0]) - drop.height  # of the centre when the body touches down
+    rest = float(centers[0]) - drop.height  # height of the centre when the body touches down
     return Outcome(1.0 - _extreme(tops, lowest) / size, (_extreme(centers, again) - rest) / drop.height)
 
 

@@ -1,7 +1,7 @@
 """The drop in MuJoCo (Apache-2.0): a flex with one body per vertex and St. Venant-Kirchhoff's law.
 
-The contact stiffness is that of the flex in MuJoCo's documentation of modeling. A flex gives all vertices the
-same mass; here each vertex gets the mass of the drop.
+The contact stiffness is that of the flex in MuJoCo's documentation of modeling. MuJoCo gives all vertices of
+a flex the same mass. Here, each vertex gets its mass in the drop.
 """
 
 from __future__ import annotations
@@ -36,9 +36,7 @@ CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 
 def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop with the integrator that MuJoCo recommends for flexes, which is implicit together
-    with contact.
-    """
+    """Simulate the drop with the integrator that MuJoCo recommends for flexes. Contact is implicit, too."""
     return _simulate(drop, "discrete", on_frame)
 
 
@@ -88,9 +86,10 @@ def _advance(model: Any, data: Any, steps: int) -> None:
 
 
 def _positions(model: Any, data: Any) -> NDArray[np.float64]:
-    """Return the positions of the vertices, recomputed, because MuJoCo stores those before the step.
+    """Recompute and return the positions of the vertices, (n, 3) [m]; NaN after an instability.
 
-    MuJoCo resets if it detects an instability, which counts as an explosion.
+    The positions that MuJoCo stores are those before the step. After an instability, MuJoCo resets the
+    simulation, which counts as an explosion.
     """
     import mujoco
 

@@ -1,9 +1,9 @@
 """The reference drop in NumPy: float64, a textbook law, and much shorter steps than those of any engine.
 
-The law psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984) is that of none of the engines.
-The floor is a stiff spring under each vertex, so contact dissipates no energy. The surface of a real body has
-no mass, and the energy that a vertex would lose in an impact depends only on the mesh. With half the step and
-a floor of four times the stiffness, squash and bounce change by at most 0.6 %.
+No engine uses the law psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984). The floor is a
+stiff spring under each vertex, so contact dissipates no energy. Without the springs, each impact of a vertex
+would dissipate energy that depends only on the mesh, whereas the surface of a real body has no mass. With
+half the step and a floor of four times the stiffness, squash and bounce change by at most 0.6 %.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ FLOOR = 1.6e7
 """Stiffness of the floor per mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
 
 FRACTION = 0.05
-"""Step over the time in which sound crosses the smallest altitude of a tetrahedron."""
+"""Length of a step over the time in which sound crosses the smallest altitude of a tetrahedron."""
 
 
 class Reference:
-    """A body that steps by Verlet's method.
+    """A body whose motion is integrated by Verlet's method.
 
     Tensors of tetrahedra are (3, 3, m): rows, columns, tetrahedra.
     """
@@ -87,7 +87,7 @@ def simulate_reference(drop: Drop, on_frame: Progress | None = None) -> Trajecto
 
 
 def _edges(positions: Floats, corners: NDArray[np.int32]) -> Floats:
-    """Return the edges from the first vertex to the others, as columns, (3, 3, m)."""
+    """Return the edges from the first vertex of each tetrahedron to the others, as columns, (3, 3, m) [m]."""
     places = positions.T[:, corners]
     edges: Floats = places[:, 1:] - places[:, :1]
     return edges

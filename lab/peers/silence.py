@@ -1,4 +1,4 @@
-"""Discard the output of engines written in C, which does not use Python's streams."""
+"""Discard the output of engines written in C. This output does not pass through Python's streams."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ FRAME = 1 / 60
 """Simulated time whose cost is reported [s]."""
 
 FARTHEST = 3.0
-"""Distance of a vertex over the initial height above which the body counts as exploded."""
+"""A body counts as exploded if a coordinate exceeds this multiple of the largest initial coordinate."""
 
 MOST_HALVINGS = 6
 """Number of times that a step is halved before an engine counts as failed."""
@@ -38,7 +38,10 @@ class Trajectory:
     step: float  # step of the engine [s]
 
     def at(self, time: float) -> Floats:
-        """Return the vertices at a time [s], (n, 3) [m], interpolated linearly; constant after the end."""
+        """Return the positions of the vertices at a time [s], (n, 3) [m].
+
+        Positions between records are interpolated linearly. After the end, the last positions are returned.
+        """
         place = min(max(time * RATE, 0.0), len(self.positions) - 1.0)
         before = min(int(place), len(self.positions) - 2)
         share = place - before
@@ -61,7 +64,7 @@ def record(
     """Simulate a drop with the longest step at which the body stays intact.
 
     Args:
-        make: function that returns an engine with this number of steps per 1 / RATE s.
+        make: function that creates an engine's simulation with a number of steps per 1 / RATE s.
         first: number of steps that the engine's authors recommend; it is doubled after each explosion.
         on_frame: called with (frames done, total frames) after each frame.
     Raises: StateError if no step is stable.

@@ -64,7 +64,7 @@ def draw_wall(drop: Drop, entries: Sequence[Entry], time: float, size: tuple[int
 
 
 class _Wall:
-    """Draws panels in rows of at most three, each with a line at the top of the reference."""
+    """Draws panels in rows of at most three. A line in each panel marks the top of the reference."""
 
     def __init__(self, drop: Drop, entries: Sequence[Entry], size: tuple[int, int], pace: str) -> None:
         self.entries, self.size, self.pace = entries, size, pace

@@ -1,1 +1,1 @@
-"""Report experiments as a page, as files of numbers, and in the terminal."""
+"""Write the results of experiments as a page and as files of numbers, and print them in the terminal."""

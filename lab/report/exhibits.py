@@ -26,7 +26,7 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.render.opencv import cv2
 
 LONG = 12
-"""Largest number of rows of a table that is not folded."""
+"""Largest number of rows of a table that is shown in full; longer tables are folded."""
 
 WIDE = 640
 """Width above which an image is placed in a separate row [pixels]."""

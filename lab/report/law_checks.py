@@ -25,9 +25,7 @@ DEPTH = 1
 
 
 def law_table(sections: Sequence[Concluded]) -> Table | None:
-    """Return a table with a row for each law and a column for each check that was made; None without
-    checks.
-    """
+    """Return a table with a row for each law and a column for each check; None if no check was made."""
     results = {experiment.name: results for experiment, results, _ in sections}
     checks: dict[str, tuple[float, Values]] = {}
     if "patch-test" in results:

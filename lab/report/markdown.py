@@ -16,5 +16,5 @@ def escaped(value: Any) -> str:
         return value
     text = " ".join(str(value).split())
     text = re.sub(r"([\\`*_\[\]<>|&~$])", r"\\\1", text)
-    # Characters at the start of a line that begin or underline a heading, or begin a list.
+    # Escape characters at the start of a line that begin or underline a heading, or begin a list.
     return re.sub(r"^(?=#|[-+](?:\s|$)|[-=]+$)|^(\d+)(?=[.)](?:\s|$))", lambda at: (at[1] or "") + "\\", text)

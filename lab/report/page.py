@@ -1,4 +1,4 @@
-"""Write the report: one self-contained page, the same in Markdown, and all numbers as CSV."""
+"""Write the report: a self-contained HTML page, the same page in Markdown, and all numbers as CSV."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def write_report(
         effort: extent of the report.
         facts: names and values of the machine and of versions.
     Returns: the path of `report.html`, which needs no other file.
-    Raises: OptionError without the extra `lab`, for duplicate names, findings on unknown claims, rows or
-        images of a wrong shape, or a folder that cannot be written. Existing files then stay unchanged.
+    Raises: OptionError if the extra `lab` is missing, for duplicate names, findings on unknown claims, rows
+        or images of a wrong shape, or a folder that cannot be written. Existing files then stay unchanged.
     """
     require_report()
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
@@ -105,7 +105,7 @@ def _replace(directory: Path, files: dict[str, bytes]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             parts[target] = target.with_name(f".{target.name}.part")
             parts[target].write_bytes(data)
-        for target, part in parts.items():  # the pages come last
+        for target, part in parts.items():  # the pages are the last files
             os.replace(part, target)
     except OSError as error:
         raise OptionError(f"cannot write the report to {directory}: {error.strerror or error}") from error

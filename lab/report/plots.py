@@ -73,7 +73,7 @@ def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
 
 
 def _with_palette(file: io.BytesIO) -> bytes:
-    """Convert a PNG image to a palette, which takes a third of the bytes."""
+    """Convert a PNG image to a palette, which reduces the file to a third of its size."""
     from PIL import Image  # a dependency of matplotlib
 
     smaller = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The sweep of `drop-test`: compute and store its cells, count the verdicts by law, and print them."""
+"""The sweep of `drop-test`: compute and store its cells, count the verdicts by law, and print the results."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ from taichi_soft.core.types import ArchName
 from taichi_soft.meshing.delaunay import scipy_spatial
 
 TIME_LIMIT = 600.0
-"""Time limit of a cell [s]. A cell that exceeds it has no result and is retried."""
+"""Time limit of a cell [s]. A cell that exceeds the limit has no result and is retried."""
 
 SOFT_MACH, SOFT_SAG = 0.5, 0.1
-"""Values above which a line mentions them. A body that hits the floor at its speed of sound is crushed."""
+"""A printed line mentions the Mach number of the impact and the sag if they exceed these values. A body that
+hits the floor at its speed of sound is crushed."""
 
 COLUMNS = (
     Verdict.OK,
@@ -58,8 +59,7 @@ CRITERION = (
 def run_sweep(
     cells: Sequence[Cell], folder: Path, console: Console, *, workers: int | None, arch: ArchName
 ) -> list[Result]:
-    """Compute the cells that `folder` does not contain yet, group by group, and store each result
-    immediately.
+    """Compute the cells that `folder` does not contain yet, and store each result immediately.
 
     Args:
         workers: number of processes; None for one per core.
@@ -137,8 +137,9 @@ def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
 
 
 def _unwell(rows: Sequence[Result]) -> list[Result]:
-    """Return the cells of the default law that are not OK; those of all laws if no cell has the
-    default law.
+    """Return the cells of the default law that are not OK.
+
+    If no cell has the default law, return the cells of all laws that are not OK.
     """
     unwell = [row for row in rows if verdict_of(row) is not Verdict.OK]
     if any(row.point["law"] is None for row in rows):

@@ -40,9 +40,9 @@ from taichi_soft.core.types import ArchName
 
 
 def choose_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Return the experiments with these names in the order of the report, all if no name is given.
+    """Return the experiments with these names, or all experiments, in the order of the report.
 
-    Raises: OptionError.
+    Raises: OptionError for an unknown name.
     """
     for name in names:
         if name not in EXPERIMENTS:
@@ -131,7 +131,10 @@ def _results(points: Sequence[Point], store: Store) -> Results:
 
 
 def _conclude(experiment: Experiment, results: Results) -> Concluded:
-    """Conclude an experiment. If that fails and points are missing, all its verdicts are "cannot be told"."""
+    """Conclude an experiment.
+
+    If this fails and points are missing, all verdicts of the experiment are "cannot be told".
+    """
     try:
         return experiment, results, _legible(section_of(experiment, results))
     except Exception as error:

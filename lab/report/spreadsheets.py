@@ -19,8 +19,9 @@ def csv_of_table(table: Table) -> str:
 
 
 def csv_of_points(results: Results) -> str:
-    """Return a CSV row for each point: varied and measured values (lists as JSON), error, and
-    computing time.
+    """Return a CSV row for each point: varied and measured values, error, and computing time.
+
+    Lists are written as JSON.
     """
     varied = list(dict.fromkeys(name for row in results.rows for name in row.point))
     measured = list(dict.fromkeys(name for row in results.rows for name in row.numbers or {}))

@@ -25,7 +25,7 @@ MOST_ROWS = 20
 """Largest number of printed rows of a table; the report has all rows."""
 
 BETWEEN, WIDEST = 3, 40
-"""Number of characters between columns, and of the longest cell that is not wrapped."""
+"""Number of characters between columns, and largest number of characters of a cell that is not wrapped."""
 
 
 def print_section(console: Console, experiment: Experiment, results: Results, section: Section) -> None:

@@ -19,9 +19,7 @@ def plain(value: Any) -> Any:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> tuple[bool, ...]:
-    """Return True for each of `count` columns that contains only numbers and empty cells, to align it
-    right.
-    """
+    """Return True for each of the `count` columns that contains only numbers and empty cells."""
     columns = [[plain(row[k]) for row in rows] for k in range(count)]
     filled = [[value for value in column if value is not None and value != ""] for column in columns]
     return tuple(bool(column) and all(_is_number(value) for value in column) for column in filled)

@@ -33,7 +33,7 @@ def show_progress(console: Console, total: int) -> Iterator[Advance]:
         *columns,
         console=console,
         disable=not console.is_terminal,
-        refresh_per_second=2,  # rare, to leave timings undisturbed
+        refresh_per_second=2,  # seldom, so that updates do not disturb timings
         speed_estimate_period=600,
     )
     with bar:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
 _ABOVE = {"report", "cli", "__main__.py"}
-"""Layers above the experiments. They show results and cannot change them."""
+"""Layers above the experiments. These layers only show results, so changes to them leave results valid."""
 
 
 def origin(arch: str) -> dict[str, str]:

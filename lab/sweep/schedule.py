@@ -14,7 +14,8 @@ TIME_LIMIT = 1800.0
 """Time limit of a point [s]."""
 
 LOOK = 0.5
-"""Interval between checks of time limits, and of Ctrl-C on systems where it does not interrupt a wait [s]."""
+"""Interval between checks of time limits, and of Ctrl-C on systems where Ctrl-C does not interrupt a wait
+[s]."""
 
 
 def compute_all(
@@ -74,8 +75,8 @@ class Waiting:
     def take(self, known: set[str]) -> Task | None:
         """Remove and return the next point for a worker; None if no point is left.
 
-        A point of a group that the worker has already computed comes first, then one of a group that no
-        worker has started, then one of the group with most points left.
+        The worker first gets points of groups that it has already computed, then a point of a group that no
+        worker has started, then a point of the group with the most points left.
         Args:
             known: groups that the worker has computed; the point's group is added.
         """

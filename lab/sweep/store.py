@@ -26,7 +26,8 @@ class Store:
         origin: sources, versions and device of the results, from `sweep.origin`.
     Attributes:
         set_aside: new path of a file with results of another origin, or None.
-    Raises: SweepError if the file has another format, in which case it stays unchanged, or cannot be written.
+    Raises: SweepError if the file has another format or cannot be written. A file of another format stays
+        unchanged.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, str]) -> None:

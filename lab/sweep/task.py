@@ -20,8 +20,7 @@ class Task:
 
     Args:
         group: name of the point's group. Points of a group share compiled kernels, so one process should
-            compute
-            them.
+            compute them.
         function: function that computes the point and returns plain data. Other processes import it by name.
         is_alone: True if nothing else may run at the same time.
     """
@@ -47,7 +46,7 @@ def compute(
     """Compute a point in this process, on one CPU thread or on `arch`.
 
     Results are converted to JSON and back, so that results from a process and from a file are equal. Warnings
-    are ignored, because experiments deliberately do what games are warned about.
+    are ignored, because experiments deliberately use settings that cause warnings.
     """
     start = time.perf_counter()
     try:

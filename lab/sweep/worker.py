@@ -26,7 +26,7 @@ class Worker:
     """A process that computes one point at a time. If it is lost, the next point starts another process.
 
     `concurrent.futures` is not sufficient: before Python 3.14 it cannot end a process that hangs, it does not
-    report how a process ended, and if the parent process is killed, its workers remain.
+    report how a process ended, and its workers remain if the parent process is killed.
     """
 
     def __init__(self, arch: ArchName, time_limit: float) -> None:
@@ -44,7 +44,7 @@ class Worker:
 
     @property
     def pipe(self) -> Connection:
-        """Pipe that becomes readable when `look` may return an outcome."""
+        """Pipe that becomes readable when `look` can return an outcome."""
         assert self._pipe is not None
         return self._pipe
 
@@ -57,7 +57,7 @@ class Worker:
             self.pipe.send((task.function, task.point))
 
     def look(self) -> tuple[Task, Outcome] | None:
-        """Return the point and its outcome; None while it is computed."""
+        """Return the point and its outcome; None while the process still computes the point."""
         task = self._task
         assert task is not None
         try:
@@ -88,7 +88,7 @@ class Worker:
     def end(self) -> str:
         """Wait until the process exits, and kill it after `END_LIMIT`.
 
-        Returns: a description of how it ended.
+        Returns: a description of how the process ended.
         """
         if self._process is None:
             return ""
@@ -101,12 +101,12 @@ class Worker:
         return f"exit code {code}" if code is None or code >= 0 else f"killed by {signal.Signals(-code).name}"
 
     def _start(self) -> None:
-        """Start a process that ignores Ctrl-C. It ends when the pipe is closed."""
+        """Start a process that ignores Ctrl-C. The process ends when the pipe is closed."""
         self._is_starting = True
         self._pipe, theirs = CONTEXT.Pipe()
         self._process = CONTEXT.Process(target=_serve, args=(theirs, self._arch), daemon=True)
         if hasattr(signal, "pthread_sigmask"):
-            resource_tracker.ensure_running()  # otherwise it starts below and unblocks signals
+            resource_tracker.ensure_running()  # otherwise `start` starts the tracker, which unblocks signals
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             self._process.start()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -20,15 +20,16 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 DROP, DROP_TIME = 2.0, 2.5
-"""Height of the drop [m] and simulated time [s]: a fall of 0.64 s, an impact, and a second fall."""
+"""Height of the drop [m], and simulated time [s]. The time covers a fall of 0.64 s, the impact, and a second
+fall."""
 
 RECOVERY_TIME, CALM_TIME = 10.0, 0.5
 """Time within which all inverted tetrahedra must recover, and time for which none may invert again [s]."""
 
 REST_SPEED, LONGEST_REST = 1e-4, 60.0
 """Largest speed at rest (root mean square weighted by mass) [sizes of the body per second], and time limit
-[s]. After the recovery, gravity is off, and the body must come to rest within this limit and within
-`REST_CROSSINGS` crossings of a wave."""
+[s]. After the recovery, gravity is switched off. The body must then come to rest within this time limit and
+within the time in which a wave crosses the body `REST_CROSSINGS` times."""
 
 REST_CROSSINGS = 60.0
 
@@ -140,9 +141,10 @@ class _Run:
             self.world.step(self.dt)
 
     def recover(self, steps: int, crossing: float) -> None:
-        """Step until no tetrahedron is inverted, then without gravity and with damping until the body rests.
+        """Simulate until no tetrahedron is inverted, and then without gravity until the damped body rests.
 
         Args:
+            steps: largest number of steps until all tetrahedra have recovered.
             crossing: time in which a wave crosses the body once [s].
         """
         calm = 0
@@ -172,7 +174,7 @@ class _Run:
         """Return the measurements.
 
         Args:
-            fastest: largest speed of the fall [m/s]; infinite after a strong deformation.
+            fastest: largest speed of the fall [m/s]; infinite for a body that started strongly deformed.
         """
         body = self.body
         now = body.positions().astype(np.float64)

@@ -19,8 +19,9 @@ from taichi_soft.core.types import FlipsName, LawName
 from taichi_soft.elements.laws import LAWS, EnergyLaw, StressLaw
 
 Cell = dict[str, Any]
-"""Keys: group, name, mesh, scale, young, poisson, density, dt, wreck (a name in `WRECKS`, or None), seed; law
-and flips (None for the defaults), and damping, a name in `DAMPINGS`."""
+"""A cell has the keys group, name, mesh, scale, young, poisson, density, dt, wreck, seed, law, flips and
+damping. `wreck` is a name in `WRECKS`, or None for a drop. `law` and `flips` are None for the defaults.
+`damping` is a name in `DAMPINGS`."""
 
 MESHES: dict[str, Callable[[], TetMesh]] = {**OWN_MESHES, **FOREIGN_MESHES}
 
@@ -42,7 +43,7 @@ AXES: dict[str, tuple[float, ...]] = {
     "scale": (0.01, 0.1, 1.0, 10.0),
     "dt": (1 / 30, 1 / 60, 1 / 120),
 }
-"""Values that the group `cells` combines. Its meshes are about 1 m wide at scale 1."""
+"""Values that the group `cells` combines. The meshes of this group are about 1 m wide at scale 1."""
 
 CELL_COUNT = 153
 CELL_MESHES = ("sphere 4", "beam 3", "cylinder 3", "torus 2")
@@ -62,8 +63,9 @@ WRECKED_SEEDS = range(3)
 
 
 def law_variants() -> list[tuple[str | None, str | None]]:
-    """List pairs of law and flips: the defaults (None, None), then each law on tetrahedra with each flips
-    that it supports.
+    """Return pairs of law and flips. The first pair, (None, None), stands for the defaults.
+
+    The other pairs combine each law on tetrahedra with each treatment of flips that the law supports.
     """
     laws = [law for law in LAWS.values() if isinstance(law, StressLaw | EnergyLaw)]
     return [(None, None), *((law.name, flips.value) for law in laws for flips in law.flips)]
@@ -81,11 +83,13 @@ def choose_cells(
     """Choose cells by group, law and damping.
 
     Args:
-        groups: names in `GROUPS`; None for all.
-        law: name of a law, or "default" for the default law and flips; None for all.
-        flips: treatment of inverted tetrahedra; None for all that each law supports.
-        damping: a name in `DAMPINGS`; None for "default" with the default law, and all with named laws.
-        count: size of a random sample of each group; larger samples contain smaller ones. None for all.
+        groups: names in `GROUPS`; None for all groups.
+        law: name of a law, or "default" for the default law and flips; None for all laws.
+        flips: treatment of inverted tetrahedra; None for all treatments that each law supports.
+        damping: a name in `DAMPINGS`. None chooses "default" for the default law, and all dampings for the
+            other laws.
+        count: size of a random sample of each group; None for all cells. A larger sample contains all smaller
+            samples.
         wrecks: number of random deformed bodies to add if `groups` is None or contains "wrecked".
     Raises: OptionError for unknown names.
     """
@@ -122,7 +126,10 @@ def _require_known(option: str, name: str, known: Any) -> None:
 
 
 def _sample(total: int, count: int) -> list[int]:
-    """Choose `count` of `total` indices at random, with a fixed seed. Larger samples contain smaller ones."""
+    """Choose `count` of `total` indices at random, with a fixed seed.
+
+    A larger sample contains all smaller samples.
+    """
     return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 
@@ -137,9 +144,7 @@ def _foreign() -> Iterator[Cell]:
 
 
 def _grid() -> Iterator[Cell]:
-    """Yield all combinations of two axes with the others at their defaults, then random cells of the full
-    grid.
-    """
+    """Yield cells that combine two axes, with defaults for the other axes; then random cells of all axes."""
     names = list(AXES)
     usual = tuple(USUAL[name] for name in names)
     chosen = {
@@ -193,4 +198,5 @@ GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {
     "cells": _grid,
     "wrecked": _wrecked,
 }
-"""Functions that yield the cells of each group, by name. These cells have no law, flips or damping yet."""
+"""Functions that yield the cells of a group, by name of the group. These cells have no law, flips or damping
+yet."""

@@ -1,4 +1,7 @@
-"""Meshes as users bring them, from seeded random points: with slivers, graded, plates, rods and letters."""
+"""Irregular meshes like those of users, made from seeded random points.
+
+There are bodies with slivers, graded bodies, plates, rods and letters.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,8 @@ Loops = tuple[tuple[tuple[float, float], ...], ...]
 """Outlines (x, y) of a flat figure, filled by the even-odd rule."""
 
 FLATTEST_OUTSIDE = 0.002
-"""Volume over the cube of the longest edge (0.118 for a regular tetrahedron), below which tetrahedra at the
-surface are removed, as meshers do. Flat tetrahedra inside the body stay."""
+"""Smallest volume of a tetrahedron at the surface over the cube of its longest edge (0.118 if it is regular).
+Flatter tetrahedra at the surface are removed, as meshers do. Flat tetrahedra inside the body stay."""
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:
@@ -56,7 +59,7 @@ def delaunay_body(points: Floats) -> TetMesh:
 
 
 def ball_cloud(size: float, count: int, spacing: float, seed: int) -> TetMesh:
-    """Mesh random points in a ball, at least `spacing` times its diameter apart."""
+    """Mesh random points in a ball. Points are at least `spacing` times the ball's diameter apart."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(-0.5, 0.5, (8 * count, 3))
     points = points[np.linalg.norm(points, axis=1) < 0.5][:count]
@@ -74,7 +77,7 @@ def box_cloud(size: tuple[float, float, float], count: int, seed: int, spacing: 
 def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
     """Mesh evenly spread points on a sphere and a few random points inside.
 
-    The result resembles that of a mesher that cannot refine the surface.
+    Meshers that cannot refine the surface make similar meshes.
     """
     rng = np.random.default_rng(seed)
     k = np.arange(count) + 0.5
@@ -88,8 +91,8 @@ def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
 def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh:
     """Mesh a cubic lattice with each point moved at random by up to `jitter` cells along each axis.
 
-    The corners of a cell's face lie almost in a plane and on a circle, so Delaunay's rule joins many of them
-    into slivers.
+    The corners of a cell's face lie almost in a plane and on a circle, so Delaunay's rule joins many of these
+    corners into slivers.
     """
     rng = np.random.default_rng(seed)
     points = np.indices((cells + 1,) * 3).reshape(3, -1).T + rng.uniform(
@@ -99,7 +102,7 @@ def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh
 
 
 def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
-    """Mesh a cube whose edges are `ratio` times longer in one corner than in the opposite corner."""
+    """Mesh a cube. Edges of tetrahedra are `ratio` times longer in one corner than in the opposite corner."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(size=(40 * count, 3)) ** (1 + np.log10(ratio))
     away = np.linalg.norm(points, axis=1) / 3**0.5
@@ -147,7 +150,10 @@ def _along(loop: Floats, spacing: float) -> Floats:
 
 
 def _is_inside(points: Floats, outline: list[Floats]) -> NDArray[np.bool_]:
-    """True for points (n, 2) inside the outline: a ray to the right crosses it an odd number of times."""
+    """Return True for each of the points (n, 2) that lies inside the outline, (n,).
+
+    A ray from such a point to the right crosses the outline an odd number of times.
+    """
     crossings = np.zeros(len(points), dtype=np.int64)
     for loop in outline:
         for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True):
@@ -322,5 +328,5 @@ FOREIGN_MESHES: dict[str, Maker] = {
         )
     },
 }
-"""The 49 meshes by name. Their smallest dihedral angles, 0.02 to 20 degrees, are listed by `python -m lab
-drop-test --sweep`."""
+"""Functions that make the 49 meshes, by name. The smallest dihedral angles of the meshes are 0.02 to 20
+degrees. `python -m lab drop-test --sweep` lists these angles."""

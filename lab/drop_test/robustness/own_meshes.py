@@ -13,7 +13,7 @@ Maker = Callable[[], TetMesh]
 
 
 def _frame(cells: int) -> TetMesh:
-    """Make a mesh of the twelve edges of a cube, each `cells` cells thick."""
+    """Make a mesh of bars along the twelve edges of a cube, each `cells` cells thick."""
     side = 4 * cells
     index = np.arange(side)
     is_outer = (index < cells) | (index >= side - cells)

@@ -19,7 +19,8 @@ SPEED_TOLERANCE = 1.5
 class Verdict(Choice):
     """Verdicts, worst first.
 
-    `TOO_SOFT`: inverted, but `World.build` warned of it. `NO_RESULT`: the run failed.
+    `TOO_SOFT` means that tetrahedra are inverted, and that `World.build` warned of it. `NO_RESULT` means that
+    the run failed.
     """
 
     FROZEN = "frozen"
@@ -38,10 +39,10 @@ class Ending:
     """Measurements at the end of a run."""
 
     tets: int
-    failure: str | None  # reason why the body froze; None if it did not
+    failure: str | None  # reason why the body froze; None if it is not frozen
     is_finite: bool
     flipped: int  # number of inverted tetrahedra
-    speed: float  # root mean square, weighted by mass [m/s]
+    speed: float  # root mean square speed, weighted by mass [m/s]
     fastest: float  # largest speed of the fall [m/s]; infinite for a strongly deformed start
     distance: float = 0.0  # distance from the rest shape after a strongly deformed start [body sizes]
 

@@ -1,4 +1,4 @@
-"""Strongly deformed initial shapes of bodies, from which they must recover."""
+"""Strong initial deformations, from which a body must recover its shape."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def wrecked(x: Floats, wreck: str, seed: int) -> Floats:
 def distance_from_rest(rest: Floats, now: Floats, masses: Floats) -> float:
     """Return the distance of a body from its rest shape after the best rigid motion (Kabsch 1976).
 
-    The result is a root mean square weighted by mass, in units of the longest edge of the rest shape's
-    bounding box.
+    The distance is a root mean square over vertices, weighted by mass. Its unit is the longest edge of the
+    rest shape's bounding box.
     """
     weights = masses / masses.sum()
     a, b = rest - weights @ rest, now - weights @ now

@@ -46,8 +46,9 @@ class Beam:
 
 
 def euler_bernoulli_frequency(beam: Beam, *, is_held: bool) -> float:
-    """Return the first natural frequency of a cantilever (`is_held`) or a free beam without shear [Hz], a
-    closed form.
+    """Return the first natural frequency of a cantilever (`is_held`) or a free beam [Hz].
+
+    Euler-Bernoulli theory ignores shear and gives a closed form.
     """
     root = 1.87510407 if is_held else 4.73004074
     speed = np.sqrt(beam.young * beam.inertia / (beam.density * beam.area))
@@ -60,7 +61,7 @@ def timoshenko_frequency(beam: Beam, *, is_held: bool) -> float:
     weights = weights * beam.length / 2
     values = legendre.legvander(at, DEGREE)
     slopes = np.stack([legendre.legval(at, legendre.legder(row)) for row in np.eye(DEGREE + 1)], axis=1)
-    if is_held:  # polynomials times the distance from the clamp are zero there
+    if is_held:  # multiply by the distance from the clamp, so that the deflection there is zero
         slopes = slopes * (at + 1)[:, None] + values
         values = values * (at + 1)[:, None]
     slopes = slopes * 2 / beam.length
@@ -82,7 +83,7 @@ def first_shape(along: Floats, *, is_held: bool) -> Floats:
     """Return the deflection in the first mode of an Euler-Bernoulli beam, scaled to a maximum of about 1.
 
     Args:
-        along: positions over the length, from 0 (at the clamp) to 1.
+        along: positions along the beam over its length, from 0 (at the clamp) to 1.
     """
     if is_held:
         k, s = 1.87510407, 0.73409551

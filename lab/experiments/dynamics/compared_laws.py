@@ -6,7 +6,7 @@ from lab.experiments.experiment import Effort
 from taichi_soft import LAWS
 
 TETRAHEDRAL = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
-"""Laws that compute stress in tetrahedra; all others act along edges."""
+"""Laws that compute stress in tetrahedra. All other laws act along edges."""
 
 VARIANTS = ("cmpm2", "best_fitting_plane", "split_ring_plane", "tilted_plane", "tilted_plane_printed")
 """Laws of chapter 4 that need no Voronoi faces."""

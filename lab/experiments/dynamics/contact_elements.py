@@ -1,4 +1,4 @@
-"""Press a body onto a rigid plane without friction: finite elements (scikit-fem) with small strain."""
+"""Contact of a body with a rigid plane without friction, by finite elements (scikit-fem), small strain."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def contact_forces(
 ) -> list[float]:
     """Return the force on a plane for each height of the plane above the lowest vertex [N].
 
-    The plane only pushes, and no vertex may lie below it. Only few vertices can touch it. From their
-    displacements under unit forces, minimising the energy becomes a least-squares problem with non-negative
-    forces.
+    The plane can only push, and no vertex may lie below it. The few vertices that can touch it are moved by
+    unit forces, one at a time. With these displacements, minimising the energy is a least-squares problem
+    with non-negative forces.
     Args:
         held: indices of fixed vertices.
         lifts: heights of the plane above the lowest vertex [m].

@@ -1,8 +1,8 @@
 """Energy budget of a falling, bending bar (not in the thesis).
 
 A bar clamped at one end is released from the horizontal, falls, and swings about its bent shape. The work of
-gravity must equal the kinetic energy, the strain energy and the energy lost in the edges' dampers together.
-All energies are computed here, in float64, from positions and velocities only.
+gravity must equal the sum of the kinetic energy, the strain energy and the energy lost in the edges' dampers.
+This experiment computes all energies in float64 from positions and velocities only.
 """
 
 from __future__ import annotations
@@ -33,15 +33,16 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 DAMPING = 150.0  # [N s/m]
 WITH_ENERGY = ("st_venant_kirchhoff", "neo_hookean")
 GRAVITY = 9.81
-PART = 0.5  # [stable substep]; the error of leapfrog's energy grows with the square of the step
+PART = 0.5  # [stable substep]; leapfrog's energy error grows with the square of the substep
 FRAMES = 120
 UNDAMPED, DAMPED = 1e-3, 1e-3
-"""Largest error of the budget over the work of gravity, without and with damping."""
+"""Largest error of the budget, as a fraction of the work of gravity, without and with damping."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: two laws with an energy, undamped and damped, and the thesis's law without one,
-    undamped.
+    """List the points: two laws with an energy, undamped and damped, and the thesis's law, undamped.
+
+    The thesis's law has no energy.
     """
     seconds = 0.6 if effort is Effort.QUICK else 6.0
     rows = [(law, damping) for law in WITH_ENERGY for damping in (0.0, DAMPING)]
@@ -49,9 +50,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure kinetic, elastic and potential energy and the energy lost to damping over time [J], and their
-    sum.
-    """
+    """Measure over time [J]: kinetic, elastic and potential energy, energy lost to damping, and their sum."""
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
     material = Material(YOUNG, POISSON, DENSITY, point["damping"], damping_ratio=0.0)
     held = np.flatnonzero(mesh.vertices[:, 0] < -0.5 + 1e-9)
@@ -91,9 +90,10 @@ def _edges(mesh: TetMesh, positions: Floats) -> Floats:
 
 
 def _energy_density(law: LawName, F: Floats) -> Floats:
-    """Return the energy density for deformation gradients (m, 3, 3) [J/m^3].
+    """Return the energy density for deformation gradients (m, 3, 3), (m,) [J/m^3].
 
-    A law without energy gets that of Hooke's law, which is the same for the strains of F F^T and F^T F.
+    A law without an energy gets the energy of Hooke's law, which is the same for the strains of F F^T and F^T
+    F.
     """
     mu, lam = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
     if law == "neo_hookean":  # Smith, de Goes and Kim 2018, eq. 14 with the constants of their section 3.4
@@ -108,7 +108,11 @@ def _energy_density(law: LawName, F: Floats) -> Floats:
 
 
 def _damping_power(mesh: TetMesh, x: Floats, v: Floats, damping: float) -> float:
-    """Return the power of dampers b on all edges, the sum of b (n . dv)^2 [W]."""
+    """Return the power lost in the dampers of all edges [W].
+
+    The power is the sum of b (n . dv)^2, with the damping b, the unit vector n along an edge, and the
+    velocity difference dv of its ends.
+    """
     p, q = mesh.edges.T
     along = x[q] - x[p]
     closing = ((v[q] - v[p]) * along).sum(axis=1) / np.linalg.norm(along, axis=1)

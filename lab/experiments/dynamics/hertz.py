@@ -41,17 +41,17 @@ ELEMENTS = "finite elements"
 QUICK_LAWS, FULL_LAWS = ("virial", "neo_hookean", "springs"), (*TETRAHEDRAL, "springs", "volume_springs")
 EXPONENT, EXPONENT_TOLERANCE = 1.5, 0.1
 FROM_HERTZ = 0.1
-"""Largest relative difference from Hertz at any depth. Finite elements differ by 8 %, because few vertices
-touch the plane at first."""
+"""Largest relative difference from Hertz's force at any depth. Finite elements differ from it by 8 %, because
+few vertices touch the plane at first."""
 SAME_MESH = 0.03
-"""Largest relative difference from finite elements at the smallest depth. They assume small strain. The
-strain below the contact is about half the root of depth over radius, 4 to 10 %."""
+"""Largest relative difference from finite elements at the smallest depth. Finite elements assume small
+strain. The strain below the contact is about half the root of depth over radius, 4 to 10 %."""
 
 
 def points(effort: Effort) -> list[Point]:
     """List the points: some laws and finite elements on the graded mesh, and finite elements on an even mesh.
 
-    A full report has all laws, a finer mesh, and a collider instead of the floor.
+    A full report adds more laws, a finer mesh, and a collider in place of the floor.
     """
     laws = QUICK_LAWS if effort is Effort.QUICK else FULL_LAWS
     rows = [(law, COARSE, GRADED, "floor") for law in (*laws, ELEMENTS)]
@@ -63,7 +63,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the force at each depth [N], and its exponent: the slope of log(force) over log(depth)."""
+    """Measure the force at each depth [N] and its exponent: the slope of log(force) over log(depth)."""
     mesh = graded_sphere(point["pieces"], point["grading"])
     if point["law"] == ELEMENTS:
         forces = contact_forces(mesh, MATERIAL, cap(mesh), [RADIUS * depth for depth in DEPTHS])
@@ -175,7 +175,11 @@ def conclude(results: Results) -> Section:
 
 
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
-    """Name the cause of a deviation: the model if finite elements on the mesh are closer, else the mesh."""
+    """Name the cause of a deviation.
+
+    The cause is the mesh if finite elements deviate too and the laws agree with them; otherwise it is the
+    model.
+    """
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:
         return f"the mesh: finite elements on it are off by up to {left:.1%}, and the laws are near to these"

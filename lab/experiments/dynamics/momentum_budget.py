@@ -1,6 +1,4 @@
-"""Momentum and angular momentum of a free, tumbling and vibrating body under every law (not in the
-thesis).
-"""
+"""Momentum and angular momentum of a free, tumbling, vibrating body under every law (not in the thesis)."""
 
 from __future__ import annotations
 
@@ -34,8 +32,8 @@ VELOCITY, SPIN = np.array([1.0, 0.5, -0.3]), np.array([0.5, 3.0, 1.0])  # [m/s],
 STRETCH, SHEAR = 1.05, 0.05
 FRAMES = 60
 CENTRAL = (*TETRAHEDRAL, "springs", "volume_springs")
-"""Laws whose forces should not rotate a body. The laws of chapter 4 also push both ends of an edge
-sideways."""
+"""Laws whose forces should not rotate a body. The laws of chapter 4 are left out, because they also push both
+ends of an edge sideways."""
 ROUND_OFF = 1e-5
 """Largest relative change that counts as round-off. Float32 causes about 1e-7, torques cause 1e-2 or more."""
 
@@ -61,11 +59,11 @@ def measure(point: Point) -> Numbers:
     body.set_motion(start, VELOCITY + np.cross(SPIN, start))
     first = _momenta(body.masses, body.positions(), body.velocities())
     dt = point["seconds"] / FRAMES
-    substeps = 2 * world.stable_substeps(dt)  # undamped, some laws become unstable at the limit
+    substeps = 2 * world.stable_substeps(dt)  # undamped bodies of some laws are unstable at the limit
     changes = np.zeros((FRAMES + 1, 2))
     turning = np.ones(FRAMES + 1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # -1 reports it
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the result -1 reports a frozen body
         for frame in range(1, FRAMES + 1):
             world.step(dt, substeps)
             if body.is_frozen:
@@ -90,7 +88,7 @@ def _momenta(masses: Floats, positions: NDArray[Any], velocities: NDArray[Any]) 
 
 
 def conclude(results: Results) -> Section:
-    """Judge momentum under every law, and angular momentum under the laws without sideways forces."""
+    """Judge momentum under every law, and angular momentum under the laws in `CENTRAL`."""
     rows = results.where()
     sound = [(p, n) for p, n in rows if n["times"]]
     momentum = max(n["momentum"] for _, n in sound)

@@ -50,14 +50,12 @@ SAME_MESH = 0.01
 """Largest relative difference between a law on tetrahedra and finite elements with the same mesh and
 masses."""
 EXTRAPOLATED = 0.02
-"""Largest relative difference between theory and the extrapolation from two meshes. Finite elements differ by
-1.4 %."""
+"""Largest relative difference between theory and the extrapolation from two meshes. Finite elements differ
+from theory by 1.4 %."""
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: every law and finite elements on the coarse mesh, some laws and finite elements on
-    finer ones.
-    """
+    """List the points: every law and finite elements on the coarse mesh, and a selection on finer meshes."""
     laws: list[Point] = [{"law": law, "cells": FINE} for law in ("virial", "springs")]
     laws += [{"law": law, "cells": COARSE} for law in laws_of(effort)]
     elements: list[Point] = [{"law": ELEMENTS, "cells": cells} for cells in (COARSE, FINE)]
@@ -69,8 +67,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the frequency of both beams [Hz] and the growth of the amplitude per period; 0 if the beam
-    fails.
+    """Measure the frequency of both beams [Hz] and the growth of their amplitudes per period.
+
+    Both numbers are 0 for a beam that fails.
     """
     mesh = beam_mesh(point["cells"])
     numbers: Numbers = {"tets": len(mesh.tets)}
@@ -168,7 +167,7 @@ def _finding(results: Results, support: str, claim: str) -> Finding:
     worst = max(abs(parts[law]) for law in TETRAHEDRAL)
     expected, promised = theory(support), _extrapolated(results, support)
     agrees = worst < SAME_MESH and abs(promised / expected - 1) < EXTRAPOLATED
-    others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # not failed
+    others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # -1: failed beam
     return judged_but_for(
         claim,
         f"the laws on tetrahedra are within {worst:.1g} of finite elements on the same mesh, which is "

@@ -14,10 +14,11 @@ Floats = NDArray[np.float64]
 RADIUS = 0.5  # [m]
 MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 GRADED = 0.6
-"""Refinement towards the lowest point. With 0.6, edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
+"""Strength of the refinement towards the lowest point. At 0.6, edges near that point are (1 - 0.6) / (1 +
+0.6) = 1/4 as long."""
 DEPTHS = (0.005, 0.01, 0.02, 0.04)  # [radius]
 FRICTIONLESS, BRAKE = 0.0, 100.0  # friction, damping rate [1/s]
-DT, LOWERING, RESTING = 0.005, 10, 30  # length of a step [s]; steps to each depth, and at rest there
+DT, LOWERING, RESTING = 0.005, 10, 30  # length of a step [s]; steps to each depth, steps at that depth
 
 
 def hertz_force(depth: float) -> float:
@@ -29,7 +30,7 @@ def hertz_force(depth: float) -> float:
 def graded_sphere(resolution: int, grading: float) -> TetMesh:
     """Make a ball with smaller tetrahedra near its lowest point.
 
-    A Moebius map of the ball onto itself moves the vertices down. It preserves spheres and angles.
+    A Moebius map of the ball onto itself moves the vertices down. The map preserves spheres and angles.
     """
     ball = sphere(1.0, resolution)
     x, a = ball.vertices, np.array([0.0, 0.0, -grading])
@@ -39,7 +40,7 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Return the indices of the vertices above half the radius, which are fixed."""
+    """Return the indices of the fixed vertices, which lie more than half a radius above the centre."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
@@ -65,7 +66,7 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
-    """Return the force on a plane after raising it by each depth [N], from the impulse on it."""
+    """Return the force on a plane, from its impulse, after the plane is raised by each depth [N]."""
     ground = float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
@@ -83,7 +84,10 @@ def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def _descent() -> list[list[float]]:
-    """Return the depth after each step, for each of `DEPTHS`: on the way there and at rest [m]."""
+    """Return the depth after each step [m], as one list for each of `DEPTHS`.
+
+    A list first moves to its depth and then stays there.
+    """
     starts = (0.0, *DEPTHS[:-1])
     return [
         [

@@ -44,16 +44,16 @@ def theory(support: str) -> float:
 
 
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
-    """Return the frequency of the vibrating beam [Hz], and its amplitude over that one period earlier.
+    """Return the frequency of the vibrating beam [Hz], and the growth of its amplitude in one period.
 
-    Both are 0 if the beam fails.
+    The growth is the ratio of the later to the earlier amplitude. Both numbers are 0 if the beam fails.
     """
     shape, held = mode_shape(mesh, support)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     material = replace(MATERIAL, damping=NEEDS_DAMPING.get(law, 0.0))
     body = world.add_body(mesh, material, law=law, pinned=held)
     world.build()
-    if support == "free":  # remove momentum and angular momentum
+    if support == "free":  # remove the momentum and the angular momentum of the mode
         weight = np.sqrt(body.masses)
         rigid = np.stack([np.ones(len(weight)), mesh.vertices[:, 0]], axis=1) * weight[:, None]
         shape[:, 2] -= (rigid @ np.linalg.lstsq(rigid, shape[:, 2] * weight, rcond=None)[0]) / weight
@@ -63,7 +63,7 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     substeps = world.stable_substeps(dt)
     mode = body.masses * shape[:, 2] / (body.masses @ shape[:, 2] ** 2)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FrozenBodyWarning)  # a frequency of 0 reports it
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the frequency 0 reports a frozen body
         while len(crossings) < 5 and len(deflections) < 8 * FRAMES and not body.is_frozen:
             world.step(dt, substeps)
             before, now = deflections[-1], float(mode @ (body.positions()[:, 2] - mesh.vertices[:, 2]))
@@ -75,5 +75,5 @@ def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     turns = [round(time / dt) for time in crossings]
     early, late = (
         np.abs(deflections[turns[i] : turns[i + 1]]).max() for i in (0, 2)
-    )  # one period apart, to the same side
+    )  # two deflections to the same side, one period apart
     return 2 / (crossings[4] - crossings[0]), float(late / early)

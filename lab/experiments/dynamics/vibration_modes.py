@@ -18,8 +18,8 @@ def bending_frequency(
     Args:
         shape: displacements of the vertices, (n, 3).
         held: indices of fixed vertices.
-        is_lumped: True for masses at the vertices, a quarter of each tetrahedron's, as in the models of the
-            thesis; otherwise they are spread over the elements.
+        is_lumped: True puts a quarter of each tetrahedron's mass at each of its vertices, as in the models of
+            the thesis. False spreads the mass over the elements.
     """
     from scipy.sparse import diags
     from scipy.sparse.linalg import eigsh

@@ -1,8 +1,8 @@
 """A pressure pulse travels along a long bar under every law (not in the thesis).
 
-The bar is released from rest, displaced along its axis in the shape of half a bell at its free end. By
-d'Alembert's formula, half of the displacement travels away as a bell. Its speed is sqrt(E / rho) if the bar
-is thin compared with the bell.
+The bar starts at rest. Its free end is displaced along the axis in the shape of half a bell curve. By
+d'Alembert's formula, half of this displacement travels away as a bell-shaped pulse. The speed of the pulse is
+sqrt(E / rho) if the bar is thin compared with the pulse.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ TOLERANCE = 0.01
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: every law for nu = 0.3, laws with stress also for nu = 0, and some on a finer mesh."""
+    """List the points: every law for nu = 0.3, laws on tetrahedra also for nu = 0.
+
+    A full report adds some laws on a finer mesh.
+    """
     rows: list[Point] = [{"law": law, "poisson": POISSONS[0], "cells": 2} for law in laws_of(effort)]
     rows += [{"law": law, "poisson": POISSONS[1], "cells": 2} for law in TETRAHEDRAL]
     if effort is Effort.FULL:
@@ -51,8 +54,10 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the speed of the pulse [m/s], the deviation from a constant speed, and its shape at
-    some times.
+    """Measure the motion of the pulse.
+
+    Returns: "speed" [m/s]; "scatter", largest distance of the pulse from a uniform motion [m]; "profiles",
+        displacements [m] at the "places" along the bar [m], at some "times" [s].
     """
     cells = point["cells"]
     mesh = box((LENGTH, THICKNESS, THICKNESS), (round(LENGTH / THICKNESS) * cells, cells, cells))
@@ -95,8 +100,9 @@ def measure(point: Point) -> Numbers:
 
 
 def _peak(places: Floats, profile: Floats) -> float:
-    """Return the position of a bell's maximum [m]: that of a parabola fitted to values above 0.7 of the
-    largest.
+    """Return the position of a bell's maximum [m].
+
+    The function fits a parabola to the values above 0.7 of the largest value.
     """
     top = int(profile.argmax())
     low, high = top, top
