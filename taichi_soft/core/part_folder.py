@@ -17,10 +17,10 @@ PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:
-    """A new folder in `parent`. It first removes abandoned folders of ended processes.
+    """A new temporary folder in `parent`. Creating it first removes the folders of processes that have ended.
 
     A process locks a file in its folder. The system releases the lock when the process ends, even if the
-    process is killed. So a folder whose lock is free is abandoned.
+    process is killed. A folder whose lock is free is therefore abandoned.
     Raises: OSError if the folder cannot be created.
     """
 
@@ -41,9 +41,9 @@ class PartFolder:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Remove abandoned folders in `parent`."""
+    """Remove the temporary folders in `parent` whose processes have ended."""
     for folder in parent.glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):  # already removed, in use, or not permitted
+        with contextlib.suppress(OSError):  # the folder is already removed, in use, or protected
             if _is_abandoned(folder):
                 shutil.rmtree(folder)
 
