@@ -29,7 +29,7 @@ take days to compute."""
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
     """Convert `value` to a float, and check that it is in [low, high].
 
-    Raises: OptionError. Its message describes the valid values by `text`, or by the range if `text` is empty.
+    Raises: OptionError. The message describes valid values by `text`, or by the range if `text` is empty.
     """
     wanted = text or f"a number from {low:g} to {high:g}"
     if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
@@ -114,7 +114,7 @@ def to_array(values: Any, name: str) -> NDArray[Any]:
 
 
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
-    """Copy `values` to a float64 array, and check its shape and that all its numbers are finite.
+    """Copy `values` to a float64 array. Check the shape of the array, and that all its numbers are finite.
 
     None in `shape` allows any length. Raises: OptionError.
     """

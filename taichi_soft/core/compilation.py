@@ -1,4 +1,4 @@
-"""Log the compilation and loading of kernels. If this takes long, show the progress on a terminal.
+"""Log the compilation and loading of kernels, and show the progress of long compilations on a terminal.
 
 The logger `taichi_soft.core.compilation` logs each kernel with its time at level DEBUG.
 """
@@ -33,11 +33,11 @@ def _show_on_terminal(text: str) -> None:
 
 
 class Burst:
-    """Counts kernels that are compiled or loaded in quick succession."""
+    """Counter of kernels that are compiled or loaded in quick succession."""
 
     def __init__(self) -> None:
         self.show: Show = _show_on_terminal
-        self.made, self.found = 0, 0  # number of kernels compiled, and number loaded, in this process
+        self.made, self.found = 0, 0  # numbers of compiled and of loaded kernels in this process
         self._count, self._seconds, self._last = 0, 0.0, 0.0
 
     def begin(self, name: str) -> float:

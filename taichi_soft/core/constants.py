@@ -11,8 +11,8 @@ block. Blocks of four are slower. Blocks of sixteen take much longer to compile 
 
 HALF = LANES // 2
 """Number of edges in half a block. All edges of a half have the same first particle. A particle has about
-nine edges, and each edge is the edge of only one of its two particles. Few particles would therefore fill a
-block of eight edges, but most particles fill a half of four edges."""
+nine edges, and it is the first particle of only some of them. Few particles would therefore fill a block of
+eight edges, but most particles fill a half of four edges."""
 
 ROW_BITS = (1 << 28) - 1
 """Mask that leaves every row number of a field unchanged. The mask proves to the compiler that adding a lane

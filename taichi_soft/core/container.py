@@ -15,7 +15,7 @@ _DIGEST = 16
 
 def seal(mark: bytes, version: int, parts: list[bytes]) -> bytes:
     """Return a container of the mark, the version, the lengths of the parts, the parts, and a BLAKE2b digest
-    of all these.
+    of everything before the digest.
     """
     lengths = [_LENGTH.pack(len(part)) for part in parts]
     whole = b"".join([_HEAD.pack(mark, version, len(parts)), *lengths, *parts])
@@ -53,7 +53,7 @@ def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
 
 
 def name_of_sealed(data: bytes) -> bytes:
-    """Return the digest of a container, as a name that is different for each content."""
+    """Return the digest of a container. Containers with different content have different digests."""
     return bytes(memoryview(data).cast("B")[-_DIGEST:])
 
 

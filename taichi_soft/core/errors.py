@@ -49,7 +49,7 @@ class SlowStepWarning(UserWarning):
 
 
 class TooSoftWarning(UserWarning):
-    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that it collapses."""
+    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that the body collapses."""
 
 
 class UnstableStepWarning(UserWarning):

@@ -18,14 +18,16 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""`number` of a field that is float32 in a world, and float64 if forces are evaluated in double precision."""
+"""Value of `number` for a field that is float32 in a world, and float64 if forces are evaluated in double
+precision."""
 
 LOADED = "loaded"
-"""`start` of a field whose initial values depend on the bodies. The group's `load` fills the field."""
+"""Value of `start` for a field whose initial numbers depend on the bodies. The group's `load` fills the
+field."""
 
 ANY = float("inf")
 FINITE = float(np.finfo(np.float32).max)
-"""`most` of a field whose numbers can be any float (ANY), or any finite float (FINITE)."""
+"""Values of `most` for a field whose numbers can be any float (ANY), or any finite float (FINITE)."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
@@ -34,7 +36,7 @@ COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid ce
 OUTER means the particles of surfaces. A field of WORLD has a single row."""
 
 SHAPE = "shape"
-"""`keep` of fields with the rest shapes of tetrahedra, which change only if the body is plastic."""
+"""Value of `keep` for the rest shapes of tetrahedra, which change only if the body is plastic."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,9 @@ class Declaration:
     layout: Any
 
     def __get__(self, group: object, kind: type) -> Any:
-        """Return the declaration of a class; raise an AttributeError for a group without the field.
+        """Return this declaration for a class. For a group, raise an AttributeError.
 
-        If a group has the field, Python finds the field and does not call this method.
+        Python calls this method only for groups without the field.
         """
         if group is None:
             return self
@@ -191,7 +193,7 @@ class FieldGroup:
     """
 
     owner: ClassVar[str] = ""
-    """Folder of the kernels that can write the group; "" if all kernels can."""
+    """Folder of the kernels that can write the group; "" if all kernels can write it."""
     when: ClassVar[str] = ""
     """Attribute of the capacity that is true if the world has the group; "" if every world has it."""
 

@@ -72,7 +72,7 @@ class Handles:
         self._known[serial] = handle
 
     def find(self, serial: int, kind: type[Kind]) -> Kind | None:
-        """Return the handle with a serial number, or None if it no longer exists or is not a `kind`."""
+        """Return the handle with a serial number, or None if it no longer exists or is not of type `kind`."""
         handle = self._known.get(serial)
         return handle if isinstance(handle, kind) else None
 
@@ -104,7 +104,7 @@ def undo(world: Handle, data: bytes) -> None:
 
 
 def recorded(method: Method) -> Method:
-    """Decorate a public method that changes a world. A recorder of the world records each call."""
+    """Decorate a public method that changes a world. The recorder of the world, if any, records each call."""
 
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:

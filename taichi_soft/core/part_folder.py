@@ -17,7 +17,7 @@ PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:
-    """A new temporary folder in `parent`. Creating it first removes the folders of processes that have ended.
+    """A new temporary folder in `parent`. The constructor first removes the folders of ended processes.
 
     A process locks a file in its folder. The system releases the lock when the process ends, even if the
     process is killed. A folder whose lock is free is therefore abandoned.
@@ -49,7 +49,7 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def _is_abandoned(folder: Path) -> bool:
-    """True if no process holds the lock of a folder. Raises: OSError if that cannot be determined."""
+    """True if no process holds the lock of a folder. Raises: OSError if this cannot be determined."""
     if sys.platform == "win32":
         (folder / "new").unlink()  # fails while the file is open
         return True

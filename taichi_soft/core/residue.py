@@ -30,10 +30,10 @@ def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
 
 
 def weighted_sum(weights: Floats, rows: Floats) -> Floats:
-    """Return the sum of rows (n, 3) times weights (n,), (3,). The order of the sum is fixed."""
+    """Return the weighted sum of rows (n, 3), a vector (3,). The order of the additions is fixed."""
     return np.asarray((weights[:, None] * rows).sum(axis=0))
 
 
 def kept(rows: Floats) -> Floats:
-    """Set rounding residues to zero, and round to 32-bit floats, as a world stores numbers."""
+    """Set rounding residues to zero, and round all numbers to 32-bit floats, as a world stores them."""
     return without_residue(rows).astype(np.float32).astype(np.float64)

@@ -69,7 +69,7 @@ __all__ = [
 Result = TypeVar("Result")
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Environment variable. The value 1 turns on index checks in kernels, which are slow and only for tests."""
+"""Environment variable. The value 1 turns on index checks in kernels. The checks are slow. Use them in tests."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
@@ -103,9 +103,10 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     """Start Taichi for this process.
 
     `World.build` and other functions that need Taichi call this function. To choose the arguments, call it
-    before them, from any thread. A process that is forked after the start of Taichi cannot use Taichi: start
-    processes with "spawn". A second call with compatible arguments does nothing, because a restart would
-    destroy the fields of every world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels check every index.
+    before these functions, from any thread. A process that is forked after the start of Taichi cannot use
+    Taichi: start processes with "spawn". A second call with compatible arguments does nothing, because a
+    restart would destroy the fields of every world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels
+    check every index.
     Args:
         arch: "auto" or "cpu", or a GPU: "cuda", "vulkan" or "metal". "auto" uses the CPU, which is faster for
             typical games (docs/speed.md) and leaves the GPU for rendering. "vulkan" and "metal" are untested.
@@ -132,7 +133,7 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     there = available_cores()
     taken = (
         () if _device is None else _device.cores
-    )  # stay valid even if the caller has moved its own threads to other cores
+    )  # these cores stay valid if the caller has since moved its own threads to others
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 _QUICK: Any = import_module("_signal")
-"""C module behind `signal`. `signal` converts its results to enumerations, which is slow in every step."""
+"""C module behind `signal`. `signal` converts results to enumerations, which would slow down each step."""
 
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes for signals: 128 plus the number of the signal, as in shells."""

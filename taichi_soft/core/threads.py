@@ -1,4 +1,4 @@
-"""Exclude concurrent calls: a world refuses a concurrent call; a function that uses Taichi waits."""
+"""Exclude concurrent calls. A world refuses a concurrent call. A function that uses Taichi waits."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Flips(Choice):
 
     TOLERANT = "tolerant"  # the mirrored shape counts as a rest shape too (thesis)
     RECOVER = "recover"  # forces turn the tetrahedron back
-    OFF = "off"  # not handled
+    OFF = "off"  # no treatment
 
 
 class DampingModel(Choice):

@@ -109,7 +109,7 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angle(sine: float, cosine: float) -> float:
-    """Return the angle with a sine and a cosine [rad]. The cosine must be 0 or more.
+    """Return the angle that has this sine and this cosine [rad]. The cosine must be 0 or more.
 
     Gregory's series is evaluated for the tangent of a quarter of the angle.
     """

@@ -4,7 +4,8 @@ from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Lower limit of divisors. A smaller divisor means a length of zero in float32. Its numerator is zero too."""
+"""Lower limit of divisors. If a divisor is smaller, a length is zero in float32, and the numerator is zero
+too."""
 
 
 @ti.func
@@ -24,7 +25,7 @@ def closest_point_on_triangle(x, a, b, c):
     scale = 1.0 / ti.max(n.dot(n), _TINY)
     v, w = ax.cross(ac).dot(n) * scale, ab.cross(ax).dot(n) * scale
     is_inside = ti.min(v, w, 1.0 - v - w) >= 0.0
-    v, w = ti.select(is_inside, v, 0.0), ti.select(is_inside, w, 0.0)  # if x projects outside, corner a
+    v, w = ti.select(is_inside, v, 0.0), ti.select(is_inside, w, 0.0)  # corner a if the projection is outside
     gap = ax - ab * v - ac * w
     best = gap.dot(gap)
     for edge in ti.static(range(3)):
@@ -67,8 +68,8 @@ def pierce_triangle(a, b, c):
 def solid_angle(a, b, c):
     """Return the solid angle of a triangle seen from the origin [sr]; negative if the front is visible.
 
-    The sum over a closed surface that faces outward is 4 pi inside and 0 outside (Van Oosterom and Strackee
-    1983).
+    For a closed surface that faces outward, the sum over its triangles is 4 pi if the origin is inside, and 0
+    if the origin is outside (Van Oosterom and Strackee 1983).
     """
     la, lb, lc = a.norm(), b.norm(), c.norm()
     down = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb

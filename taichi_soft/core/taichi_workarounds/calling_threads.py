@@ -48,7 +48,7 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
         make(self, snode)
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
-    accessor.__init__ = make_in_turn  # Taichi adds other kernels to the same list while the GIL is released
+    accessor.__init__ = make_in_turn  # uses a list of kernels that Taichi extends with the GIL released
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
 
@@ -86,7 +86,7 @@ def at_home(function: Callable[[], Result]) -> Result:
 
 def _serve() -> None:
     global _home
-    if _is_served.acquire(blocking=False):  # Ctrl-C can cause two threads: only one serves
+    if _is_served.acquire(blocking=False):  # only one thread serves, even if Ctrl-C caused a second start
         _home = threading.get_ident()
         while True:
             _jobs.get()()

@@ -30,7 +30,7 @@ def let_any_number_of_threads_run() -> None:
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # Before a loop begins, its bounds can compile a real function that contains other loops.
+            # The bounds of a loop can call a real function. Compiling it begins other loops first.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:

@@ -10,9 +10,9 @@ the file of the short body. Taichi finds that file by the hash of the short body
 If Taichi does not find the file, it compiles the short body itself. The short body only sets a flag. If the
 flag is set after the launch, the kernel is created from its source and launched.
 
-This file is unnecessary once Taichi looks for a kernel before it processes its source, as its fork Quadrants
-does (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). The main branch does not. It was planned in
-https://github.com/taichi-dev/taichi/issues/4401.
+This file is unnecessary once Taichi looks for a kernel before it processes the kernel's source. Quadrants, a
+fork of Taichi, does this (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). The main branch does
+not. https://github.com/taichi-dev/taichi/issues/4401 planned the change.
 """
 
 from __future__ import annotations

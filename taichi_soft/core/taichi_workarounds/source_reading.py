@@ -1,12 +1,12 @@
 """Read the source of kernels and functions once.
 
 Taichi reads the lines around each function when the function is defined, which takes more than half of the
-time to import this package. It reads the whole source again for every call of a `ti.func`, and formats the
-lines around every expression for a possible message.
+time to import this package. Taichi reads the whole source again for every call of a `ti.func`, and formats
+the lines around every expression for a possible message.
 
 This file is unnecessary once Taichi's `_inside_class` reads no source and `get_pos_info` caches its results.
 The main branch does neither. https://github.com/taichi-dev/taichi/issues/7711 asked for a faster import.
-Quadrants, a fork of Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
+Quadrants, a fork of Taichi, works on both faults: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
 """
 
 from __future__ import annotations
