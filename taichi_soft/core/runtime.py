@@ -69,7 +69,7 @@ __all__ = [
 Result = TypeVar("Result")
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Environment variable. The value 1 turns on index checks in kernels. The checks are slow. Use them in tests."""
+"""Environment variable. The value 1 turns on index checks in kernels. Use the slow checks in tests only."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
