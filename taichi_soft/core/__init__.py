@@ -1,3 +1,4 @@
-"""Foundation of the package, which knows no bodies: errors, checks, types, the start of Taichi,
-serialisation.
+"""Foundation of the package: errors, checks, types, the start of Taichi, and serialisation.
+
+No module in this folder depends on bodies.
 """

@@ -1,4 +1,4 @@
-"""Check arguments of the public interface before anything is changed."""
+"""Check arguments of the public interface before a call changes anything."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ LARGEST_COUNT = 1_000_000
 """Largest number of substeps, bodies or pixels. Larger numbers would take too long or exceed 32 bits."""
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Range of the length of fixed steps [s]. Shorter steps vanish in float32; longer ones would take days to
-compute."""
+"""Range of the length of fixed steps [s]. A shorter step vanishes in float32; a longer step would
+take days to compute."""
 
 
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
-    """Convert `value` to a float within [low, high]. Raises: OptionError with `text`, or with the range if
-    `text` is "".
+    """Convert `value` to a float, and check that it is in [low, high].
+
+    Raises: OptionError. The message describes valid values by `text`, or by the range if `text` is empty.
     """
     wanted = text or f"a number from {low:g} to {high:g}"
     if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
@@ -51,12 +52,12 @@ def as_positive(value: Any, name: str, unit: str) -> float:
 
 
 def as_step(dt: float) -> float:
-    """Check the length of a fixed step [s]. Raises: OptionError."""
+    """Check the length of a fixed step [s], and return it. Raises: OptionError if it is out of range."""
     return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
 
 
 def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> int:
-    """Check that `value` is an integer from `low` to `high`. Raises: OptionError."""
+    """Check that `value` is an integer from `low` to `high`, and return it. Raises: OptionError if not."""
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
         raise OptionError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
@@ -64,7 +65,7 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
 
 
 def choose_one_of(names: Iterable[str], given: Any) -> str:
-    """Return advice for an unknown name: the known names, and the closest of them."""
+    """Return advice for an unknown name: all known names, and the known name most similar to `given`."""
     known = list(names)
     close = get_close_matches(given, known, n=1) if isinstance(given, str) else []
     guess = f". Did you mean {close[0]!r}?" if close else ""
@@ -72,7 +73,7 @@ def choose_one_of(names: Iterable[str], given: Any) -> str:
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """Check that `value` is True or False. Raises: OptionError."""
+    """Check that `value` is True or False, and return it. Raises: OptionError if not."""
     if not isinstance(value, (bool, np.bool_)):
         raise OptionError(f"{name} must be True or False, got {value!r}")
     return bool(value)
@@ -83,7 +84,7 @@ def _is_plain(value: Any) -> bool:
 
 
 def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
-    """Convert `value` to three numbers with absolute values up to `limit`. Raises: OptionError."""
+    """Convert `value` to three floats with absolute values below `limit`, (3,). Raises: OptionError."""
     if isinstance(value, tuple) and len(value) == 3 and all(_is_plain(x) and abs(x) < limit for x in value):
         return np.array(value, dtype=np.float64)  # fast path: games move many objects per frame
     vector = as_array(value, name, (3,), unit)
@@ -105,7 +106,7 @@ def as_friction(value: Any) -> float:
 
 
 def to_array(values: Any, name: str) -> NDArray[Any]:
-    """Convert `values` to an array of any type. Raises: OptionError if rows have unequal lengths."""
+    """Convert `values` to an array of any dtype. Raises: OptionError if rows have unequal lengths."""
     try:
         return np.asarray(values)
     except (ValueError, TypeError) as error:
@@ -113,8 +114,9 @@ def to_array(values: Any, name: str) -> NDArray[Any]:
 
 
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
-    """Copy `values` to a finite float64 array with a shape, in which None means any length. Raises:
-    OptionError.
+    """Copy `values` to a float64 array. Check the shape of the array, and that all its numbers are finite.
+
+    None in `shape` allows any length. Raises: OptionError.
     """
     lengths = ", ".join("n" if length is None else str(length) for length in shape)
     wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
@@ -125,8 +127,8 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
         want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
     ):
         raise OptionError(f"{name} must have shape {wanted}, got shape {array.shape}")
-    real = array.astype(np.float64)  # always a copy
-    # Check the sum first, which is faster than checking every number.
+    real = array.astype(np.float64)  # `astype` always makes a copy
+    # Check the sum first, because this is faster than checking every number.
     if not np.isfinite(real.sum()) and not np.isfinite(real).all():
         first = int(np.argmin(np.isfinite(real.reshape(len(real), -1)).all(axis=1)))
         raise OptionError(f"{name} must be finite, but entry {first} is {real[first].tolist()}")
@@ -147,10 +149,9 @@ def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
 
 
 def as_buffer(out: Any, name: str, count: int) -> Floats32:
-    """Check that `out` can receive (count, 3) positions or normals, and return it; for None, return a new
-    array.
+    """Check that `out` is an array for `count` positions or normals, (count, 3), and return it.
 
-    Raises: OptionError.
+    If `out` is None, return a new array. Raises: OptionError.
     """
     if out is None:
         return np.empty((count, 3), dtype=np.float32)
@@ -178,10 +179,12 @@ def as_path(value: Any) -> Path:
 
 
 def as_rotation(value: Any) -> Floats:
-    """Convert a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation to a rotation matrix.
+    """Convert a rotation to a rotation matrix, (3, 3).
 
-    Raises: OptionError for a matrix that is not orthonormal with determinant +1, or a quaternion that is not
-        of length 1.
+    Args:
+        value: matrix (3, 3), quaternion (x, y, z, w), or None for no rotation.
+    Raises: OptionError for a matrix that is not orthonormal with determinant +1, or for a quaternion whose
+        length is not 1.
     """
     if value is None:
         return np.eye(3)
@@ -205,7 +208,7 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # their squares could overflow
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # excluded, because a product could overflow
     sound = matrices[~bad]
     gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
     bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)

@@ -9,4 +9,4 @@ class Clock:
 
     steps: int = 0
     time: float = 0.0  # simulated time [s]
-    last_dt: float = 0.0  # length of the last fixed step [s], 0 before the first
+    last_dt: float = 0.0  # length of the last fixed step [s], 0 before the first step

@@ -1,4 +1,4 @@
-"""Log the compilation and loading of kernels, and show progress on a terminal if they take long.
+"""Log the compilation and loading of kernels, and show the progress of long compilations on a terminal.
 
 The logger `taichi_soft.core.compilation` logs each kernel with its time at level DEBUG.
 """
@@ -16,26 +16,28 @@ Show = Callable[[str], object]
 _log = logging.getLogger(__name__)
 
 PATIENCE = 1.0
-"""Time of compilation after which a terminal shows the progress [s]. Loading a small world takes less."""
+"""Time of compilation after which a terminal shows the progress [s]. Loading the kernels of a small
+world takes less time."""
 
 PAUSE = 5.0
-"""Time without a new kernel after which counting restarts [s]."""
+"""Pause between two kernels after which the count of kernels starts again at 0 [s]."""
 
 
 def _show_on_terminal(text: str) -> None:
-    """Replace the current line of the terminal. An empty text clears the line. Without a terminal, do
-    nothing.
+    """Replace the current line of the terminal by `text`. An empty text clears the line.
+
+    If stderr is not a terminal, do nothing.
     """
     if sys.stderr is not None and sys.stderr.isatty():
         print(f"\r{text:<79}\r", end="", file=sys.stderr, flush=True)
 
 
 class Burst:
-    """Counts kernels that are compiled or loaded in quick succession."""
+    """Counter of kernels that are compiled or loaded in quick succession."""
 
     def __init__(self) -> None:
         self.show: Show = _show_on_terminal
-        self.made, self.found = 0, 0  # kernels compiled and kernels loaded since the start of the process
+        self.made, self.found = 0, 0  # numbers of compiled and of loaded kernels in this process
         self._count, self._seconds, self._last = 0, 0.0, 0.0
 
     def begin(self, name: str) -> float:
@@ -49,7 +51,13 @@ class Burst:
         return now
 
     def end(self, name: str, start: float, is_found: bool) -> None:
-        """Record the first run of a kernel. `is_found` is True if the kernel was loaded from the cache."""
+        """Record the first run of a kernel.
+
+        Args:
+            name: name of the kernel.
+            start: result of `begin` [s].
+            is_found: True if the kernel was loaded from the cache, False if it was compiled.
+        """
         self._last = time.perf_counter()
         took = self._last - start
         if self._seconds > PATIENCE:
@@ -64,8 +72,9 @@ BURST = Burst()
 
 @contextlib.contextmanager
 def shown_by(show: Show) -> Iterator[None]:
-    """Context in which `show` receives the progress lines instead of the terminal. An empty line clears the
-    last one.
+    """Context in which `show` receives the progress lines instead of the terminal.
+
+    An empty line clears the previous line.
     """
     before, BURST.show = BURST.show, show
     try:

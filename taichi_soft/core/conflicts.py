@@ -13,7 +13,11 @@ class Conflict:
     solution: str
 
     def message(self, option: str = "", feature: str = "") -> str:
-        """Return the text of an error. Args: option, feature: more specific names for this case."""
+        """Return the error message of this conflict.
+
+        Args:
+            option, feature: more specific names for the message; "" for the names of the pair.
+        """
         said = f"{option or self.option} does not support {feature or self.features}"
         return f"{said}, because {self.reason}: {self.solution}"
 

@@ -6,21 +6,21 @@ GRAVITY_EARTH = 9.81
 """Gravity on Earth [m/s^2], the value of the thesis."""
 
 LANES = 8
-"""Tetrahedra per block. Eight float32 fill one AVX register, so that the compiler vectorises a block. Blocks
-of four are slower; blocks of sixteen compile much longer and are no faster."""
+"""Number of tetrahedra per block. Eight float32 numbers fill one AVX register, so the compiler vectorises a
+block. Blocks of four are slower. Blocks of sixteen take much longer to compile and are no faster."""
 
 HALF = LANES // 2
-"""Number of edges per particle in half a block of edges. A particle has about nine edges. Since each edge
-belongs to one of its two particles, few particles can own eight edges, but most can own four, so that half
-blocks leave no gaps."""
+"""Number of edges in half a block. All edges of a half have the same first particle. A particle has about
+nine edges, and it is the first particle of only some of them. Few particles would therefore fill a block of
+eight edges, but most particles fill a half of four edges."""
 
 ROW_BITS = (1 << 28) - 1
-"""Mask that preserves every row number of a field. It proves to the compiler that adding a lane does not
-overflow, which vectorisation requires."""
+"""Mask that leaves every row number of a field unchanged. The mask proves to the compiler that adding a lane
+number to a row number does not overflow, which vectorisation requires."""
 
 POSITION_LIMIT = 1.0e7
-"""Largest valid coordinate [m]. Beyond it, float32 cannot resolve a body (the spacing is 1 m), so a particle
-gets there only by an explosion."""
+"""Largest valid coordinate [m]. At this distance, the spacing of float32 is 1 m, too coarse for a body. A
+particle exceeds the limit only if the simulation explodes."""
 
 VELOCITY_LIMIT = 2.0e4
 """Largest valid velocity [m/s]: about twice Earth's escape velocity. The limit stops an explosion while the

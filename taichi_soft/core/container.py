@@ -1,4 +1,4 @@
-"""Container for bytes, with a magic mark, a version, parts of any length, and a checksum."""
+"""Container format for bytes: a magic mark, a version, parts of any length, and a checksum."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _DIGEST = 16
 
 
 def seal(mark: bytes, version: int, parts: list[bytes]) -> bytes:
-    """Join parts into one container. It begins with their lengths and ends with a BLAKE2b digest of
-    everything before.
+    """Return a container of the mark, the version, the lengths of the parts, the parts, and a BLAKE2b digest
+    of everything before the digest.
     """
     lengths = [_LENGTH.pack(len(part)) for part in parts]
     whole = b"".join([_HEAD.pack(mark, version, len(parts)), *lengths, *parts])
@@ -25,7 +25,8 @@ def seal(mark: bytes, version: int, parts: list[bytes]) -> bytes:
 def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
     """Check a container and return its parts.
 
-    Raises: OptionError for data that is not bytes; SnapshotError for other data, another version, or damage.
+    Raises: OptionError if `data` is not bytes; SnapshotError if the mark or the version differs, or if the
+        data is damaged.
     """
     if not isinstance(data, (bytes, bytearray, memoryview)):
         raise OptionError(f"{name} must be bytes, got {type(data).__name__}")
@@ -52,7 +53,7 @@ def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
 
 
 def name_of_sealed(data: bytes) -> bytes:
-    """Return a name for a container that is unique to its content: its digest."""
+    """Return the digest of a container. Containers with different content have different digests."""
     return bytes(memoryview(data).cast("B")[-_DIGEST:])
 
 

@@ -27,7 +27,7 @@ def can_bind() -> bool:
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
-    """Check that cores are distinct and all among the cores `there`. Raises: OptionError."""
+    """Check that `cores` are distinct numbers of the cores `there`, and return them. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"
@@ -48,8 +48,8 @@ def thread_ids() -> set[int]:
 
 
 def number_now() -> int:
-    """Return the id of a thread that starts now. The system assigns ids in ascending order, and wraps
-    around.
+    """Start and end a thread, and return its id. The system assigns ids in ascending order, and continues
+    with small ids after the largest id.
     """
     thread = threading.Thread(target=int)
     thread.start()
@@ -59,11 +59,13 @@ def number_now() -> int:
 
 
 def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None:
-    """Bind the youngest threads to one core each. The oldest of them gets the first core.
+    """Bind the threads that started last to one core each, in the order in which the threads started.
 
     Args:
-        threads: ids of threads that were started after the thread `since`.
-    Raises: DeviceError if the system refuses, with no binding changed.
+        threads: ids of threads that started after the thread `since`.
+        since: id of an earlier thread, see `number_now`.
+        cores: core of each thread to bind.
+    Raises: DeviceError if the system refuses. All bindings are then as before the call.
     """
     masks: dict[int, set[int]] = {}
     try:

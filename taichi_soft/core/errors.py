@@ -1,4 +1,4 @@
-"""Errors and warnings. Every message contains the value received and what to do."""
+"""Errors and warnings. Every message contains the value that was received, and says what to do."""
 
 
 class TaichiSoftError(Exception):
@@ -9,7 +9,7 @@ class TaichiSoftError(Exception):
 
 
 class MeshError(TaichiSoftError, ValueError):
-    """A mesh or its file cannot be simulated."""
+    """A mesh or a mesh file cannot be simulated."""
 
 
 class MaterialError(TaichiSoftError, ValueError):
@@ -45,11 +45,11 @@ class BakeError(TaichiSoftError, OSError):
 
 
 class SlowStepWarning(UserWarning):
-    """A step takes more than 500 substeps. The text contains the body, the cause and what to do."""
+    """A step takes more than 500 substeps. The text names the body and the cause, and says what to do."""
 
 
 class TooSoftWarning(UserWarning):
-    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that it collapses."""
+    """A body's pressure on its base exceeds a fifth of its Young's modulus, so that the body collapses."""
 
 
 class UnstableStepWarning(UserWarning):
@@ -61,7 +61,7 @@ class FrozenBodyWarning(UserWarning):
 
 
 class DroppedEventsWarning(UserWarning):
-    """Events were dropped, because too many were waiting for `drain_events`."""
+    """Events were dropped, because too many events were waiting for `drain_events`."""
 
 
 class SolverWarning(UserWarning):

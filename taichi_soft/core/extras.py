@@ -1,4 +1,4 @@
-"""Extras: optional packages, and advice how to install missing ones."""
+"""Extras: groups of optional packages, and advice on how to install a missing package."""
 
 from __future__ import annotations
 
@@ -25,16 +25,26 @@ EXTRAS = {
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }
-"""Modules of each extra and the packages that provide them, as in pyproject.toml."""
+"""Modules of each extra, with the package that provides each module, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
-    """Return the missing packages of an extra; if `modules` are given, only of these."""
+    """Return the packages of an extra that are not installed.
+
+    Args:
+        extra: key of `EXTRAS`.
+        modules: modules to check; by default all modules of the extra.
+    """
     return missing_among(EXTRAS[extra], *modules)
 
 
 def missing_among(packages: Mapping[str, str], *modules: str) -> list[str]:
-    """Return the missing packages of a table by module; if `modules` are given, only of these."""
+    """Return the packages of a table that are not installed.
+
+    Args:
+        packages: name of the package that provides each module.
+        modules: modules to check; by default all modules of the table.
+    """
     return [packages[module] for module in modules or packages if not _is_there(module)]
 
 
@@ -49,8 +59,8 @@ def require_extra(extra: str, what: str, *modules: str) -> None:
     """Raise a MissingExtraError if a package of the extra is missing.
 
     Args:
-        what: feature that needs the extra, with a verb: "a film needs".
-        modules: required modules of the extra; all by default.
+        what: start of the error message: the feature that needs the extra, and a verb, as in "a film needs".
+        modules: required modules; by default all modules of the extra.
     """
     missing = missing_packages(extra, *modules)
     if missing:

@@ -21,8 +21,9 @@ class Loader:
         self._waiting: list[tuple[Any, NDArray[Any]]] = []
 
     def fill(self, field: Any, rows: NDArray[Any]) -> None:
-        """Set the first rows of a field, and all other rows to zero. The field must have at most one
-        dimension. `write` applies this.
+        """Prepare to set the first rows of a field to `rows`, and all other rows to zero.
+
+        `write` writes the numbers. The field must have at most one dimension.
         """
         width = getattr(field, "n", 1)
         whole = np.zeros((_rows_of(field), width), np.int32 if field.dtype == ti.i32 else np.float64)
@@ -31,8 +32,9 @@ class Loader:
         self._waiting.append((field, whole.reshape(-1)))
 
     def fill_all(self, field: Any, number: float) -> None:
-        """Set all numbers of a field to `number`. The field must have at most one dimension. `write` applies
-        this.
+        """Prepare to set all numbers of a field to `number`.
+
+        `write` writes the numbers. The field must have at most one dimension.
         """
         rows = np.full(_rows_of(field) * getattr(field, "n", 1), number)
         self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
@@ -64,9 +66,9 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        # Taichi compiles serial loops into one function. With many fields, that takes much longer to compile
-        # than one function per field. With the few fields of a collider, starting threads would take longer
-        # than the loops.
+        # Taichi compiles serial loops into one function. With many fields, this function takes much longer
+        # to compile than one function per field. With the few fields of a collider, starting threads would
+        # take longer than the loops.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

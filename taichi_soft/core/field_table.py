@@ -18,31 +18,32 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""Type of a field's numbers: float32 in a world, float64 in fields made to evaluate forces in double
+"""Value of `number` for a field that is float32 in a world, and float64 if forces are evaluated in double
 precision."""
 
 LOADED = "loaded"
-"""`start` of a field whose initial values depend on the bodies. `load` of the group fills the field."""
+"""Value of `start` for a field whose initial numbers depend on the bodies. The group's `load` fills the
+field."""
 
 ANY = float("inf")
 FINITE = float(np.finfo(np.float32).max)
-"""`most` of a field whose numbers can be any float, or any finite float."""
+"""Values of `most` for a field whose numbers can be any float (ANY), or any finite float (FINITE)."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
 """Values of `rows`: the thing that a row of a field belongs to. A contact is a pair of a body and a collider.
-OUTER means the particles of surfaces, and WORLD a single row."""
+OUTER means the particles of surfaces. A field of WORLD has a single row."""
 
 SHAPE = "shape"
-"""`keep` of rest shapes of tetrahedra, which change only if the body is plastic."""
+"""Value of `keep` for the rest shapes of tetrahedra, which change only if the body is plastic."""
 
 
 @dataclass(frozen=True)
 class Below:
     """Bounds of integers: from 0 up to, but not including, the number of `things` plus `beside`."""
 
-    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; with "", `beside` alone is the bound
+    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; if "", `beside` is the upper bound
     beside: int = 0
 
 
@@ -51,7 +52,7 @@ FRAME = "frame"
 
 @dataclass(frozen=True, eq=False)
 class Declaration:
-    """Properties of a field, see `declare`."""
+    """Properties of a field. `declare` describes them."""
 
     rows: str | int
     number: Any
@@ -70,7 +71,10 @@ class Declaration:
     layout: Any
 
     def __get__(self, group: object, kind: type) -> Any:
-        """Raise an AttributeError if a group lacks the field. A field that exists hides this method."""
+        """Return this declaration for a class. For a group, raise an AttributeError.
+
+        Python calls this method only for groups without the field.
+        """
         if group is None:
             return self
         name = next(name for name, each in kind.declarations().items() if each is self)  # type: ignore[attr-defined]
@@ -87,7 +91,7 @@ class Declaration:
         return isinstance(self.number, ti.lang.struct.StructType)
 
     def count(self, counts: Mapping[str, int]) -> int:
-        """Return the number of rows."""
+        """Return the number of rows of the field, from the number of each kind of thing."""
         rows = self.rows if isinstance(self.rows, int) else counts[self.rows]
         return rows * self.each + self.beyond
 
@@ -105,9 +109,12 @@ class Declaration:
         return ti.Matrix.field(*self.size, number, shape, **options)
 
     def require(self, rows: NDArray[Any], things: Mapping[str, int]) -> None:
-        """Check rows of a snapshot. Raises: ValueError with the value and the bounds.
+        """Check the rows of the field in a snapshot.
 
-        Args: things: numbers of things, by their names in `Below`.
+        Args:
+            rows: rows of the field.
+            things: number of each kind of thing, by the names in `Below`.
+        Raises: ValueError with the invalid value and the bounds.
         """
         if rows.dtype.kind == "f":
             size = float(np.abs(rows).max(initial=0.0))
@@ -145,19 +152,20 @@ def declare(
             members.
         size: number of numbers per row; (rows, columns) for a matrix.
         unit: SI unit of the numbers.
-        each, beyond: number of rows per thing, and of spare rows after the last, which code can read.
+        each: number of rows per thing.
+        beyond: number of spare rows after the rows of the last thing. Code can read spare rows.
         start: initial number in all rows; LOADED if the numbers depend on the bodies; None if a step writes
             the rows before it reads them.
         keep: group of rows in a snapshot that contains the field; "" if the next step does not depend on the
             field.
-        native_keep: `keep` in snapshots of the C library only, because Python stores the data with the
+        native_keep: value of `keep` for snapshots of the C library. Python stores the same data with the
             handles.
-        below: bounds of integers in a snapshot; for rows with members, a dictionary by member.
+        below: bounds of integers in a snapshot; for rows with members, a dictionary of bounds by member.
         most: largest absolute value of floats in a snapshot.
         native: True if the C library reads or writes the field between steps.
         inherited: True if each piece of a cut body gets the values of the body.
         when: attribute of the capacity that is true if the group has the field; "" if it always has it.
-        layout: a `ti.Layout` other than the default.
+        layout: a `ti.Layout`; None for Taichi's default.
     """
     return Declaration(
         rows,
@@ -179,12 +187,13 @@ def declare(
 
 
 class FieldGroup:
-    """A group of fields with one owner, declared by a subclass. Kernels receive a group or a `State` as a
-    template.
+    """Base class of groups of fields with one owner. A subclass declares the fields of its group.
+
+    Kernels receive a group or a `State` as a template argument.
     """
 
     owner: ClassVar[str] = ""
-    """Folder of the kernels that can write the group; "" if all kernels can."""
+    """Folder of the kernels that can write the group; "" if all kernels can write it."""
     when: ClassVar[str] = ""
     """Attribute of the capacity that is true if the world has the group; "" if every world has it."""
 
@@ -192,14 +201,19 @@ class FieldGroup:
         holds_fields(cls)
 
     def __init__(self, capacity: Any, real: Any) -> None:
-        """Allocate the fields. Args: capacity: object with the `counts` of rows; real: type of REAL."""
+        """Allocate the fields.
+
+        Args:
+            capacity: object with `counts`, the number of each kind of thing.
+            real: type of the numbers of REAL fields.
+        """
         for name, each in self.declarations().items():
             if not each.when or getattr(capacity, each.when):
                 setattr(self, name, each.make(capacity.counts, real))
 
     @classmethod
     def declarations(cls) -> dict[str, Declaration]:
-        """Return the declarations of all fields by name, those of base classes first."""
+        """Return the declarations of all fields by name. The fields of base classes come first."""
         return {
             name: value
             for base in reversed(cls.__mro__)
@@ -208,8 +222,9 @@ class FieldGroup:
         }
 
     def declared(self) -> list[tuple[str, Declaration, Any]]:
-        """Return name, declaration and field of each allocated field. For rows with members, return one entry
-        per member.
+        """Return the name, the declaration and the Taichi field of each allocated field.
+
+        A field whose rows have members has one entry per member.
         """
         found = []
         for name, each in self.declarations().items():
@@ -226,7 +241,7 @@ class FieldGroup:
         return found
 
     def fill_starts(self, loader: Loader) -> None:
-        """Fill the fields whose initial number is the same in all worlds."""
+        """Make `loader` fill the fields whose initial number is the same in all worlds."""
         for _, each, field in self.declared():
             if isinstance(each.start, (int, float)):
                 loader.fill_all(field, each.start)

@@ -1,4 +1,4 @@
-"""Handles of a world. Their serial numbers are equal in worlds with the same history."""
+"""Handles of a world. In worlds with the same history, the same handles have the same serial numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Recorder(Protocol):
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call and record it."""
+        """Call a method of a handle, record the call, and return the result of the method."""
 
 
 class Handle:
@@ -34,11 +34,11 @@ class Handle:
     _serial: int
 
     def _keep(self) -> bytes | None:
-        """Return a snapshot as `keep` does. Only worlds implement this."""
+        """Return a snapshot for the function `keep`. Only worlds implement this method."""
         raise NotImplementedError
 
     def _undo(self, data: bytes) -> None:
-        """Restore a snapshot as `undo` does. Only worlds implement this."""
+        """Restore a snapshot for the function `undo`. Only worlds implement this method."""
         raise NotImplementedError
 
     def __init_subclass__(cls) -> None:
@@ -49,18 +49,21 @@ class Handle:
 
 
 class Handles:
-    """Numbers the handles of a world, and finds those that still exist."""
+    """Registry that numbers the handles of a world and finds the handles that still exist."""
 
     def __init__(self) -> None:
-        """Start without handles. Number 0 is the world itself."""
+        """Start without handles. Number 0 is reserved for the world itself."""
         self.count = 1
         self.turn = Turn()
         self.recorder: Recorder | None = None
         self._known: WeakValueDictionary[int, Handle] = WeakValueDictionary()
 
     def enlist(self, handle: Handle, serial: int | None = None) -> None:
-        """Assign a number to a new handle: the next one, or `serial`, its number in an earlier state of the
-        world.
+        """Assign a serial number to a new handle.
+
+        Args:
+            handle: handle to register.
+            serial: number of the handle in an earlier state of the world; None for the next free number.
         """
         if serial is None:
             serial = self.count
@@ -69,36 +72,39 @@ class Handles:
         self._known[serial] = handle
 
     def find(self, serial: int, kind: type[Kind]) -> Kind | None:
-        """Return the handle with a number, or None if it no longer exists or has another type."""
+        """Return the handle with a serial number, or None if it no longer exists or is not of type `kind`."""
         handle = self._known.get(serial)
         return handle if isinstance(handle, kind) else None
 
 
 def serial_of(handle: Handle) -> int:
-    """Return the number of a handle; 0 for the world."""
+    """Return the serial number of a handle; 0 for the world."""
     return handle._serial
 
 
 def handles_of(handle: Handle) -> Handles:
-    """Return all handles of the same world."""
+    """Return the registry of all handles of the world to which `handle` belongs."""
     return handle._handles
 
 
 def keep(world: Handle) -> bytes | None:
-    """Return a snapshot for `undo`, before changes for a step; None if this world refuses no step."""
+    """Return a snapshot for `undo`, taken before changes for the next step.
+
+    Return None if the world never refuses a step, because `undo` is then not needed.
+    """
     return world._keep()
 
 
 def undo(world: Handle, data: bytes) -> None:
-    """Restore the state of a world at `keep`. No step must have been made since.
+    """Restore the snapshot that `keep` returned. The world must not have made a step since then.
 
-    Unlike `World.restore`, this keeps waiting events and does not change `restore_count`.
+    Unlike `World.restore`, this function keeps waiting events and does not change `restore_count`.
     """
     world._undo(data)
 
 
 def recorded(method: Method) -> Method:
-    """Decorate a public method that changes a world. If the world has a recorder, it records the calls."""
+    """Decorate a public method that changes a world. The recorder of the world, if any, records each call."""
 
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:

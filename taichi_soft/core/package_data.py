@@ -1,4 +1,7 @@
-"""Folders of the demos and of the thesis's meshes: inside the package, or next to it in a source checkout."""
+"""Folders with the demos and with the meshes of the thesis.
+
+The folders are inside the package or, in a source checkout, next to it.
+"""
 
 from pathlib import Path
 
@@ -14,5 +17,5 @@ DEMOS = _folder("demos")
 """Folder of Python files that each define a stage."""
 
 ASSETS = _folder("assets")
-"""Folder with the bodies of the thesis's experiments as .npz, see `assets/README.md` in the source
-checkout."""
+"""Folder with the bodies of the thesis's experiments as .npz files. `assets/README.md` in the source checkout
+describes the files."""

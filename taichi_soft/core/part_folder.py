@@ -17,10 +17,10 @@ PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:
-    """A new folder in `parent`. It first removes abandoned folders of ended processes.
+    """A new temporary folder in `parent`. The constructor first removes the folders of ended processes.
 
     A process locks a file in its folder. The system releases the lock when the process ends, even if the
-    process is killed. So a folder whose lock is free is abandoned.
+    process is killed. A folder whose lock is free is therefore abandoned.
     Raises: OSError if the folder cannot be created.
     """
 
@@ -41,15 +41,15 @@ class PartFolder:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Remove abandoned folders in `parent`."""
+    """Remove the temporary folders in `parent` whose processes have ended."""
     for folder in parent.glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):  # already removed, in use, or not permitted
+        with contextlib.suppress(OSError):  # the folder is already removed, in use, or protected
             if _is_abandoned(folder):
                 shutil.rmtree(folder)
 
 
 def _is_abandoned(folder: Path) -> bool:
-    """True if no process holds the lock of a folder. Raises: OSError if that cannot be determined."""
+    """True if no process holds the lock of a folder. Raises: OSError if this cannot be determined."""
     if sys.platform == "win32":
         (folder / "new").unlink()  # fails while the file is open
         return True

@@ -1,4 +1,4 @@
-"""Old public names that still work in the next version."""
+"""Warnings for old public names that still work in this version."""
 
 import warnings
 

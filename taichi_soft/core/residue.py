@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SHARE = 1e-12
-"""Fraction of the largest number below which a number counts as rounding."""
+"""Numbers below this fraction of the largest number count as rounding errors."""
 
 
 def rounded(value: float) -> float:
-    """Round the result of an iteration to five digits, which do not depend on rounding errors."""
+    """Round the result of an iteration to five digits. Rounding errors affect only later digits."""
     return float(f"{value:.5g}")
 
 
 def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
-    """Replace numbers that are negligible relative to the largest number along `axis` by zeros.
+    """Set to zero all numbers that are negligible relative to the largest number along `axis`.
 
     NumPy's products and inverses round differently on different processors. A sum that cancels can be 0 on
     one processor and 1e-17 on another, and 32-bit floats would preserve this difference.
@@ -30,10 +30,10 @@ def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
 
 
 def weighted_sum(weights: Floats, rows: Floats) -> Floats:
-    """Return the sum of rows (n, 3) times weights (n,), added in a fixed order."""
+    """Return the weighted sum of rows (n, 3), a vector (3,). The order of the additions is fixed."""
     return np.asarray((weights[:, None] * rows).sum(axis=0))
 
 
 def kept(rows: Floats) -> Floats:
-    """Round numbers to 32-bit floats without residue, as numbers are stored in a world."""
+    """Set rounding residues to zero, and round all numbers to 32-bit floats, as a world stores them."""
     return without_residue(rows).astype(np.float32).astype(np.float64)

@@ -69,7 +69,7 @@ __all__ = [
 Result = TypeVar("Result")
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Environment variable. The value 1 turns on index checks in kernels, which are slow and only for tests."""
+"""Environment variable. The value 1 turns on index checks in kernels. Use the slow checks in tests only."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
@@ -82,7 +82,7 @@ class Device:
     arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
     threads: int  # CPU worker threads (1 on a GPU, where the host code is serial)
     reason: str  # reason for the choice, one line
-    cores: tuple[int, ...] = ()  # cores that the worker threads are bound to, one each; empty if unbound
+    cores: tuple[int, ...] = ()  # cores to which the worker threads are bound, one each; () if unbound
 
     @property
     def is_gpu(self) -> bool:
@@ -93,31 +93,34 @@ class Device:
 _log = logging.getLogger(__name__)
 
 _device: Device | None = None
-_process = 0  # process that started Taichi
-_checked_kernels: str | None = None  # folder of kernels with index checks, if they are on
-_first_field: Any = None  # has its own layout, because an empty one cannot be exported
+_process = 0  # id of the process that started Taichi
+_checked_kernels: str | None = None  # folder of compiled kernels if index checks are on
+_first_field: Any = None  # field of the first layout, because Taichi cannot export an empty layout
 
 
 @in_turn
 def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
     """Start Taichi for this process.
 
-    `World.build` and other functions that need Taichi call this. A program can call it before them with its
-    own choice, from any thread. In a process that was forked later, calls raise a StateError: start processes
-    with "spawn". A second call with compatible arguments does nothing, because a restart would destroy the
-    fields of every world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels check every index.
+    `World.build` and other functions that need Taichi call this function. To choose the arguments, call it
+    before these functions, from any thread. A process that is forked after the start of Taichi cannot use
+    Taichi: start processes with "spawn". A second call with compatible arguments does nothing, because a
+    restart would destroy the fields of every world. With TAICHI_SOFT_DEBUG=1 in the environment, kernels
+    check every index.
     Args:
         arch: "auto" or "cpu", or a GPU: "cuda", "vulkan" or "metal". "auto" uses the CPU, which is faster for
             typical games (docs/speed.md) and leaves the GPU for rendering. "vulkan" and "metal" are untested.
-        threads: number of unbound CPU worker threads, 1 or more, limited to the available cores. The system
-            moves them between cores and can put two on one core, so short frames may gain little.
-        cores: on Linux, core numbers for as many CPU worker threads, each bound to one core. Choose cores
-            that the rest of the game does not use, and call this before other code starts threads. By default
-            there is one thread per available core. On Linux it is bound to the core if the system permits.
+        threads: number of unbound CPU worker threads, 1 or more, limited to the number of available cores.
+            The system can move the threads between cores and put two threads on one core, so short frames can
+            gain little from them.
+        cores: numbers of CPU cores, on Linux only. Each core gets one worker thread, bound to the core.
+            Choose cores that the rest of the game does not use, and call this function before other code
+            starts threads. By default, each available core gets one thread. On Linux, this thread is bound to
+            the core if the system permits.
     Returns: the device in use.
-    Raises: OptionError for an unknown arch, thread count or core, or if Taichi was started differently;
-        DeviceError if the device is not available, or threads cannot be bound; StateError in a process that
-        was forked after a start.
+    Raises: OptionError for an invalid arch, thread count or core, or if Taichi already runs with other
+        arguments; DeviceError if the device is not available, or threads cannot be bound; StateError in a
+        process that was forked after the start of Taichi.
     """
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
@@ -130,7 +133,7 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     there = available_cores()
     taken = (
         () if _device is None else _device.cores
-    )  # the caller may have moved its own threads off these cores since
+    )  # these cores stay valid if the caller has since moved its own threads to others
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(
@@ -179,14 +182,14 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
-    """Start Taichi, bind its workers to `cores` unless these are empty, and store the device."""
+    """Start Taichi, bind its workers to `cores` if there are any, and store the device in `_device`."""
     global _device, _process, _checked_kernels, _first_field
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     options = {}
     if is_checked:
-        # The cache key ignores the options changed here. But without a cache, Taichi 1.7 confuses kernels
-        # that differ only in the instance of a real function that they call.
+        # Index checks need a separate cache, because the cache key ignores the options for them. Without a
+        # cache, Taichi 1.7 confuses kernels that differ only in the instance of a real function they call.
         options["offline_cache_file_path"] = _checked_kernels = tempfile.mkdtemp()
     else:
         await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
@@ -202,9 +205,9 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             offline_cache_max_size_of_files=1
             << 29,  # the default of 100 MB is too small for a game with many kinds of worlds
             enable_fallback=False,
-            cfg_optimization=False,  # off: halves the compile time at the same speed
-            detect_read_only=False,  # off: on a GPU, a kernel might not see writes of a real function
-            make_cpu_multithreading_loop=False,  # off: it would put up to 512 bodies into one thread
+            cfg_optimization=False,  # off: halves the compile time, and kernels are as fast
+            detect_read_only=False,  # if on, kernels on a GPU might not see writes of real functions
+            make_cpu_multithreading_loop=False,  # if on, one thread would run up to 512 bodies
             unrolling_limit=0,  # turns off a warning
             log_level=ti.ERROR,
             **options,
@@ -216,7 +219,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if has_known:
         FIRST_LAUNCHES.make_flag()
     _first_field = ti.field(ti.i32, ())
-    ti.lang.impl.get_runtime().materialize()  # otherwise the first kernel would do this, in any thread
+    ti.lang.impl.get_runtime().materialize()  # otherwise the first kernel call would do this, in any thread
     if has_known:
         keep_kernels_apart(VERSION)
         FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), code_options()))
@@ -228,12 +231,12 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
 
 
 def kernel_folder() -> Path:
-    """Return the folder in which this process stores compiled kernels for later processes when it ends."""
+    """Return the folder in which this process, when it ends, stores compiled kernels for later processes."""
     return folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)
 
 
 def _end() -> None:
-    """Make Taichi store its compiled kernels now, because the order of its own shutdown is not fixed."""
+    """Store the compiled kernels and shut Taichi down, because Taichi's own shutdown has no fixed order."""
     if os.getpid() == _process:
         with contextlib.suppress(Exception):  # a failure only makes later starts slower
             FIRST_LAUNCHES.close()
@@ -248,11 +251,11 @@ def _end() -> None:
 def _bound(
     chosen: Device, started: set[int], since: int, cores: tuple[int, ...], is_left_to_us: bool
 ) -> Device:
-    """Bind Taichi's workers to cores, and return the device. The workers start after Taichi's compiler
-    threads.
+    """Bind Taichi's workers to cores, and return the device with its cores.
 
-    With the default cores, the workers stay unbound if the system refuses, or if other code has started
-    threads in the meantime, because those must not be bound.
+    The workers are the last threads in `started`, because Taichi starts its compiler threads before them.
+    With the default cores, the workers stay unbound if the system refuses. They also stay unbound if other
+    code has started threads in the meantime, because these threads must not be bound by mistake.
     """
     if is_left_to_us and len(started) != ti.lang.impl.current_cfg().num_compile_threads + chosen.threads:
         return chosen
@@ -266,8 +269,9 @@ def _bound(
 
 
 def make_fields(function: Callable[[], Result]) -> Result:
-    """Call a function that makes Taichi fields, and lay the fields out. Other threads wait, and so does
-    Ctrl-C.
+    """Call a function that makes Taichi fields, lay the fields out, and return the result of the function.
+
+    Other threads and Ctrl-C wait until the fields are laid out.
     """
 
     def make() -> Result:
@@ -279,11 +283,12 @@ def make_fields(function: Callable[[], Result]) -> Result:
 
 
 def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
-    """Write kernels for programs without Python. This process cannot use Taichi after that.
+    """Write kernels for programs without Python. This process cannot use Taichi after the export.
 
-    Kernels are compiled from source, because the short body of a known kernel must not be exported.
+    Kernels are compiled from their source, because the short body of a known kernel must not be exported.
 
     Args:
+        folder: folder to write to.
         kernels: kernels by name, each with its template arguments and an example of each array argument.
         fields: first field of each layout for which the kernels are compiled.
     """
@@ -304,13 +309,14 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
 def _at_home(function: Callable[[], Result], arch: str) -> Result:
     """Call a function in the thread in which Taichi 1.7 must start and lay out fields.
 
-    On a CPU this is a dedicated thread, because the thread of the first caller may end. On a GPU, and with
-    index checks, which would crash a dedicated thread, it is the caller's thread."""
+    On a CPU, this is a dedicated thread, because the thread of the first caller may end. On a GPU, and with
+    index checks, it is the caller's thread. Index checks would crash a dedicated thread.
+    """
     return function() if arch != "cpu" or os.environ.get(DEBUG) == "1" else at_home(function)
 
 
 def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
-    """Lay out fields of other code. Taichi calls this at the next kernel call."""
+    """Lay out fields that other code has made. Taichi calls this function at the next kernel call."""
     if _device is not None and must_go_home():
         _at_home(functools.partial(lay_out, is_first_call), _device.arch)
     else:
@@ -326,12 +332,12 @@ FIRST_LAUNCHES.install()
 
 
 def _after_fork() -> None:
-    """Mark a forked process. It has Taichi's memory but none of Taichi's threads."""
+    """Mark this process as forked. A forked process has Taichi's memory but none of Taichi's threads."""
     if _device is None:
         leave_home()
         return
     leave_behind(_process)
-    # Otherwise this process would wait for these threads when it ends.
+    # Without this reference, the process would wait for the missing threads when it ends.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
 
 

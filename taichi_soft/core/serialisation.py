@@ -1,7 +1,7 @@
 """Convert the parts of worlds to plain data (numbers, texts, lists and dictionaries) for files, and back.
 
-Reading makes only objects of `serialised` classes, and runs the checks of these classes. It never runs code
-from a file.
+Reading creates only objects of `serialised` classes, and runs the checks of these classes. Reading never runs
+code from a file.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _ARRAYS = ("<f4", "<f8", "<i4", "<i8", "|b1")
 
 
 def serialised(*fields: str, make: Callable[..., Any] | None = None) -> Callable[[type[Kind]], type[Kind]]:
-    """Decorate a class whose objects can be written and read.
+    """Decorate a class so that its objects can be written to files and read from files.
 
     Args:
         fields: names of the attributes to store.
-        make: function that makes an object, called with the attributes as keywords; None for the class
-            itself.
+        make: function that receives the stored attributes as keyword arguments and returns an object; None
+            for the class itself.
     """
 
     def register(kind: type[Kind]) -> type[Kind]:
@@ -68,8 +68,9 @@ def as_plain(value: Any) -> Any:
 
 
 def from_plain(data: Any) -> Any:
-    """Convert JSON data to a value. Raises: SnapshotError for unknown data; errors of the checks of a
-    class.
+    """Convert the result of `as_plain` back to a value.
+
+    Raises: SnapshotError for unknown data, and the errors that the checks of a class raise.
     """
     if isinstance(data, list):
         return [from_plain(each) for each in data]
@@ -95,7 +96,7 @@ def _array(data: dict[str, Any]) -> Any:
 
 
 def to_json(data: Any) -> bytes:
-    """Encode plain data as canonical JSON."""
+    """Encode plain data as canonical JSON: equal data gives equal bytes."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
 
@@ -120,13 +121,13 @@ def _finite(text: str) -> float:
 
 @lru_cache(maxsize=256)
 def plain_of(value: Any) -> Any:
-    """Return the cached `as_plain` of an immutable object."""
+    """Return the result of `as_plain` for an immutable object, from a cache if possible."""
     return as_plain(value)
 
 
 @lru_cache(maxsize=256)
 def digest_of(value: Any) -> str:
-    """Return a digest of an immutable object. It is equal only for objects with the same content."""
+    """Return a digest of an immutable object. Only objects with the same content have the same digest."""
     return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()
 
 
@@ -134,17 +135,16 @@ def digest_of(value: Any) -> str:
 
 
 def below(number: Any, limit: int) -> int:
-    """Check that a number is an integer from 0 to below `limit`, and return it. Raises: ValueError,
-    TypeError.
-    """
+    """Check that `number` is from 0 to `limit` - 1, and return it as int. Raises: ValueError, TypeError."""
     if not 0 <= int(number) < limit:
         raise ValueError(f"it has the index {number} of {limit}")
     return int(number)
 
 
 def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float64]:
-    """Check that there are `count` finite numbers with absolute values below `most`, and return them. Raises:
-    ValueError.
+    """Check that `numbers` are `count` numbers with absolute values below `most`, and return them, (count,).
+
+    Raises: ValueError if not.
     """
     vector = np.array(numbers, dtype=np.float64)
     if vector.shape != (count,) or not (np.abs(vector) < most).all():
@@ -153,7 +153,10 @@ def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float6
 
 
 def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
-    """Check that `numbers` are one or more integers from 0 to `limit` - 1. Raises: ValueError if not."""
+    """Check that `numbers` are one or more integers from 0 to `limit` - 1, and return them, (n,).
+
+    Raises: ValueError if not.
+    """
     found = np.array(numbers, dtype=np.int32)
     if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
         raise ValueError("it has invalid vertices")

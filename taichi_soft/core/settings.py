@@ -12,31 +12,31 @@ from taichi_soft.core.types import Integrator, Schedule
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """Checked arguments of a world. Its kernels are compiled for some of them.
+    """Checked arguments of a world. The kernels of the world are compiled for some of these arguments.
 
-    `World.set_gravity` and `World.set_friction` replace them by a copy that differs only in that value.
+    `World.set_gravity` and `World.set_friction` replace the settings by a copy with the new value.
     """
 
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
-    floor: float | None  # height [m]
+    floor: float | None  # height of the floor [m]; None for no floor
     restitution: float | None  # restitution of the floor; None for the elasticity of the bodies
     friction: float  # friction coefficient of the floor
     integrator: Integrator  # integrator of all bodies
-    tolerance: float  # residual of implicit solves, over the load
+    tolerance: float  # residual at which an implicit solve ends, relative to the load
     most_iterations: int  # largest number of iterations of an implicit solve
     retries: int  # maximum retries of a failed step, each with twice the substeps
-    schedule: Schedule  # schedule that `World.build` has chosen; before, the argument
+    schedule: Schedule  # schedule that `World.build` has chosen; before the build, the argument
 
 
 DEFAULT_SLEEP_SPEED = 0.02
 """Default `sleep_speed` [m/s], within the range of rigid-body engines: 0.01 m/s to 0.05 m/s (Box2D, Jolt).
 
 At this speed, a body of 0.1 m to 10 m can stop without a visible jump: it moves a third of a millimetre
-between two frames. With a lower speed, bodies would tremble longer before they fall asleep."""
+between two frames. With a lower value, bodies would tremble longer before they fall asleep."""
 
 DEFAULT_COLLIDER_ROOM = 15
-"""Default `collider_room`. With the floor this makes 16 rows; the number of rows is rounded up to a power of
-two."""
+"""Default `collider_room`. Together with the floor, these colliders fill 16 rows. The number of rows is
+always rounded up to a power of two."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class ContactSettings:
     soft: bool  # True for contact between soft bodies
     sleep_speed: float  # speed below which bodies fall asleep [m/s]; 0 turns sleep off
     collider_room: int  # number of colliders that can be added after `World.build`
-    sample_room: int  # number of grid samples for these colliders
+    sample_room: int  # number of grid samples for colliders that are added after `World.build`
 
 
 @dataclass(frozen=True)
 class ContactRequest:
-    """Contact and sleep arguments of `World`. None stands for the default."""
+    """Contact and sleep arguments of `World`. None means the default."""
 
     soft: bool | None
     sleep_speed: float | None

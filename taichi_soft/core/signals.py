@@ -1,4 +1,4 @@
-"""Signals of the command line: Ctrl-C, even during imports, and SIGTERM.
+"""Handling of signals on the command line: Ctrl-C, even during imports, and SIGTERM.
 
 Importing the package does not change the signal handlers of a program.
 """
@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 _QUICK: Any = import_module("_signal")
-"""C module behind `signal`. It has no enumerations, which would be slow in every step of a world."""
+"""C module behind `signal`. `signal` converts results to enumerations, which would slow down each step."""
 
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes for signals: 128 plus the number of the signal, as in shells."""
 
 
 def watch_imports() -> None:
-    """Make Ctrl-C end the command line with one line of text during its imports, which take 1 s to 2 s."""
+    """Make Ctrl-C end the command line with one line of text during the imports, which take 1 s to 2 s."""
     name = sys.argv[0] if getattr(sys, "argv", None) else ""
     is_command = Path(name).stem == "taichi-soft" or (name == "-m" and "taichi_soft" in sys.orig_argv)
     is_ours = is_command and multiprocessing.parent_process() is None and _is_main_thread()
@@ -34,7 +34,10 @@ def watch_imports() -> None:
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Context in which Ctrl-C raises KeyboardInterrupt, and SIGTERM exits and removes incomplete files."""
+    """Context in which Ctrl-C raises KeyboardInterrupt and SIGTERM raises SystemExit.
+
+    The program can therefore remove incomplete files before it ends.
+    """
     if not _is_main_thread():
         yield
         return
@@ -48,7 +51,7 @@ def ended_by_signals() -> Iterator[None]:
 
 
 class Whole:
-    """Context that delays Ctrl-C until the context ends, in the main thread."""
+    """Context that delays Ctrl-C until the context ends. It has no effect outside the main thread."""
 
     def __enter__(self) -> None:
         self._handler, self._is_asked = None, False

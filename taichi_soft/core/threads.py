@@ -1,4 +1,4 @@
-"""Exclude concurrent calls. A concurrent call of a world is refused; a concurrent use of Taichi waits."""
+"""Exclude concurrent calls. A world refuses a concurrent call. A function that uses Taichi waits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from taichi_soft.core.errors import StateError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _taichi = threading.RLock()
-_left_in: int | None = None  # parent process in which Taichi runs, if this process was forked from it
+_left_in: int | None = None  # id of the process with Taichi from which this process was forked, if any
 
 
 def thread_name(ident: int) -> str:
@@ -29,14 +29,15 @@ class Turn:
     __slots__ = ("holder", "lock")
 
     def __init__(self) -> None:
-        """Start without a holder. Raises: StateError in a forked process, see `require_here`."""
+        """Start without a holder. Raises: StateError of `require_here` in a forked process."""
         require_here()
         self.lock = threading.Lock()
         self.holder = 0  # id of the thread with access, 0 for none
 
     def refuse(self) -> NoReturn:
-        """Raise a StateError that names this thread and the thread with access. In a forked process, see
-        `require_here`.
+        """Raise a StateError that names this thread and the thread with access.
+
+        In a forked process, raise the StateError of `require_here`.
         """
         require_here()
         here, there = thread_name(get_ident()), thread_name(self.holder)
@@ -47,14 +48,14 @@ class Turn:
 
 
 def one_thread(method: Function) -> Function:
-    """Decorate a method of a handle to refuse calls while another thread runs such a method. Calls can be
-    nested.
+    """Decorate a method of a handle, so that it raises a StateError while another thread runs a decorated
+    method of the same world. Calls within one thread can be nested.
     """
 
     @wraps(method)
     def call(
         self: Any, *arguments: Any, **options: Any
-    ) -> Any:  # inlined for speed, because games make hundreds of calls per frame
+    ) -> Any:  # without helper functions, because games make hundreds of calls per frame
         turn, here = self._handles.turn, get_ident()
         if turn.holder == here:
             return method(self, *arguments, **options)
@@ -71,9 +72,9 @@ def one_thread(method: Function) -> Function:
 
 
 def in_turn(function: Function) -> Function:
-    """Decorate a function that uses Taichi to wait until no other thread runs such a function.
+    """Decorate a function that uses Taichi, so that it waits until no other thread runs a decorated function.
 
-    Such a function must not call user code, to avoid deadlocks.
+    To avoid deadlocks, a decorated function must not call user code.
     """
 
     @wraps(function)
@@ -97,6 +98,6 @@ def require_here() -> None:
 
 
 def leave_behind(process: int) -> None:
-    """Record the parent process in which Taichi runs."""
+    """Record in a forked process the id of the parent process, in which Taichi runs."""
     global _left_in
     _left_in = process

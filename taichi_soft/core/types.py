@@ -1,6 +1,6 @@
 """Enums of the public interface. Functions that accept a member also accept its string.
 
-With the `...Name` types, editors complete the strings, and mypy rejects misspelt ones.
+With the `...Name` types, editors complete the strings, and mypy rejects misspelt strings.
 """
 
 from __future__ import annotations
@@ -14,9 +14,7 @@ from taichi_soft.core.errors import OptionError
 
 
 class Choice(str, Enum):
-    """A named option. `parse` converts a user's string to a member, or raises an error with the valid
-    names.
-    """
+    """Base class of options with named values. `parse` converts a user's string to a member."""
 
     @classmethod
     def parse(cls: type[ChoiceT], value: str | ChoiceT) -> ChoiceT:
@@ -44,14 +42,14 @@ class Flips(Choice):
 
     TOLERANT = "tolerant"  # the mirrored shape counts as a rest shape too (thesis)
     RECOVER = "recover"  # forces turn the tetrahedron back
-    OFF = "off"  # not handled
+    OFF = "off"  # no treatment
 
 
 class DampingModel(Choice):
     """Velocity to which the damping constant applies."""
 
     EDGE = "edge"  # relative velocity along each edge, thesis eq. 3.9
-    TET_MEAN = "tet_mean"  # velocity relative to the tetrahedron's mean, rejected in thesis section 6.4
+    TET_MEAN = "tet_mean"  # velocity of a vertex minus the mean of its tetrahedron (rejected in thesis 6.4)
 
 
 class Integrator(Choice):
@@ -67,12 +65,12 @@ class Schedule(Choice):
     """Loop structure of a world's substeps."""
 
     AUTO = "auto"
-    PER_BODY = "per_body"  # one thread per body, which runs all substeps of that body
+    PER_BODY = "per_body"  # one thread runs all substeps of a body
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
 
 
 class Overlap(Choice):
-    """Treatment of a body that is placed inside others."""
+    """Treatment of a body that is placed inside other bodies."""
 
     PART = "part"  # move the bodies apart over the next steps
     REFUSE = "refuse"  # raise an error

@@ -1,1 +1,1 @@
-"""Linear algebra on values: pure Taichi functions for float32 and float64."""
+"""Linear algebra and geometry: Taichi functions for float32 and float64, and functions in NumPy."""

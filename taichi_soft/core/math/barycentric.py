@@ -1,4 +1,4 @@
-"""Barycentric coordinates with NumPy but without LAPACK, whose rounding depends on the processor."""
+"""Barycentric coordinates in NumPy. LAPACK is not used, because its rounding depends on the processor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 def edge_inverses(corners: Floats) -> Floats:
     """Compute A^-1 of thesis eq. 6.1 by Cramer's rule, (..., 3, 3) [1/m], for corners (..., 4, 3) [m].
 
-    Rows are the gradients of the barycentric coordinates of corners 1 to 3.
+    The rows of A^-1 are the gradients of the barycentric coordinates of corners 1 to 3.
     """
     a, b, c = (corners[..., i, :] - corners[..., 0, :] for i in (1, 2, 3))
     normals = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
@@ -24,8 +24,11 @@ def barycentric(points: Floats, corners: Floats) -> Floats:
 
 
 def shares_by(inverses: Floats, arms: Floats) -> Floats:
-    """Return barycentric coordinates from a result of `edge_inverses`, for vectors (..., 3) [m] from the
-    first corners.
+    """Return the barycentric coordinates of points, (..., 4).
+
+    Args:
+        inverses: result of `edge_inverses`.
+        arms: vectors from the first corners to the points, (..., 3) [m].
     """
     x, y, z = arms[..., 0, None], arms[..., 1, None], arms[..., 2, None]
     rest = inverses[..., 0] * x + inverses[..., 1] * y + inverses[..., 2] * z

@@ -1,13 +1,13 @@
 """Compute eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
-The Jacobi method is accurate for equal eigenvalues (a body at rest has three), unlike closed formulas in
-float32 (Golub and Van Loan, Matrix Computations, section 8.5).
+The Jacobi method is accurate even if eigenvalues are equal, as in a body at rest. Closed formulas in float32
+are not accurate in this case (Golub and Van Loan, Matrix Computations, section 8.5).
 """
 
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 6
-"""Number of sweeps. Convergence is quadratic: four sweeps reach float32, six reach float64."""
+"""Number of sweeps. Convergence is quadratic: four sweeps are enough for float32, six for float64."""
 
 NOTHING = 1e-17
 """Relative size below which an off-diagonal entry does not change the diagonal, even in float64."""

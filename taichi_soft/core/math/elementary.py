@@ -1,7 +1,7 @@
-"""Elementary functions that use only arithmetic, bit-identical on every processor and system.
+"""Elementary functions that use only arithmetic, so that every processor and system computes the same bits.
 
-The functions of C libraries, such as `expf`, differ in their last bits between systems. Here arguments are
-reduced to a range near 0, where Taylor series are short. Results are within 4 ulps.
+The functions of C libraries, such as `expf`, differ in their last bits between systems. Here, arguments are
+reduced to a range near 0, in which Taylor series are short. The error is at most 4 ulps.
 """
 
 import math
@@ -21,7 +21,7 @@ class _Kind:
     bias: int  # bias of the exponent
     root_half: int  # bits of the square root of 1/2
     largest: float  # largest x for which e^x and e^-x are normal numbers
-    ln2: tuple[float, float]  # log(2) in two parts; the product of the first with any exponent is exact
+    ln2: tuple[float, float]  # log(2) in two parts; the product of the first part and any exponent is exact
     terms: tuple[int, int, int, int]  # lengths of the series of exp, log, cosine and sine, arctangent
 
 
@@ -49,8 +49,8 @@ _LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
 _HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
 """pi / 2 in two parts. In 64 bits, the product of the first part with any integer below 2^20 is exact."""
 
-# Coefficients after the first terms. The first terms are 1 + x of exp, 2 s of log, 1 and x of cosine and
-# sine, x of arctangent.
+# Coefficients of the series after the first terms: 1 + x for exp, 2 s for log, 1 for cosine, x for sine and
+# arctangent.
 _EXP = [1.0 / math.factorial(k) for k in range(2, 14)]
 _LOG = [2.0 / (2 * k + 1) for k in range(1, 12)]
 _COS = [(-1.0) ** k / math.factorial(2 * k) for k in range(1, 10)]
@@ -65,8 +65,9 @@ def _is_double(x: Any) -> bool:
 
 @ti.func
 def _series(coefficients: ti.template(), count: ti.template(), x, kind: ti.template()):
-    """Return the sum of the first terms coefficients[k] x^k. Coefficients are cast, because constants have 32
-    bits.
+    """Return the sum of coefficients[k] x^k for k below `count`.
+
+    The coefficients are cast, because Taichi's constants have 32 bits.
     """
     total = kind.real(coefficients[count - 1])
     for k in ti.static(range(count - 2, -1, -1)):
@@ -89,7 +90,7 @@ def _exp(x, kind: ti.template()):
 def _log(x, kind: ti.template()):
     # Without the cast, Taichi 1.7 converts the bits of a parameter as if they were a number, and crashes.
     bits = ti.bit_cast(ti.cast(x, kind.real), kind.whole)
-    # The fraction is in [sqrt(1/2), sqrt(2)), close to 1.
+    # The fraction m is in [sqrt(1/2), sqrt(2)), close to 1.
     exponent = (bits - kind.whole(kind.root_half)) >> kind.whole(kind.fraction)
     m = ti.bit_cast(bits - (exponent << kind.whole(kind.fraction)), kind.real)
     s = (m - kind.real(1.0)) / (m + kind.real(1.0))
@@ -129,7 +130,7 @@ def _atan2(y, x, kind: ti.template()):
 
 @ti.func
 def exp(x):
-    """Return e^x, at most e^87 (64 bits: e^708), and 0 for x below -87 (-708)."""
+    """Return e^x, but at most e^87, and 0 for x below -87. With 64 bits, the limits are 708 and -708."""
     return _exp(x, _DOUBLE) if ti.static(_is_double(x)) else _exp(x, _SINGLE)
 
 
@@ -153,7 +154,7 @@ def log_each(v):
 
 @ti.func
 def cos_sin(x):
-    """Return cosine and sine of an angle below 10^6 [rad]."""
+    """Return the cosine and the sine of an angle [rad] with an absolute value below 10^6."""
     return _cos_sin(x, _DOUBLE) if ti.static(_is_double(x)) else _cos_sin(x, _SINGLE)
 
 

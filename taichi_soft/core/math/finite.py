@@ -7,7 +7,7 @@ _EXPONENT = 0x7F800000
 
 @ti.func
 def is_finite(v):
-    """1 if no component of a vec3 is NaN, infinite or beyond float32."""
+    """Return 1 if each component of a vec3 is finite and in the range of float32, otherwise 0."""
     good = 1
     for i in ti.static(range(3)):
         if (ti.bit_cast(ti.cast(v[i], ti.f32), ti.i32) & _EXPONENT) == _EXPONENT:
@@ -17,7 +17,7 @@ def is_finite(v):
 
 @ti.func
 def is_within(v, limit):
-    """1 if the absolute value of every component of a vec3 is below `limit`; 0 for NaN."""
+    """Return 1 if each component of a vec3 has an absolute value below `limit`, otherwise 0. NaN gives 0."""
     good = 1
     for i in ti.static(range(3)):
         good = good & int(ti.abs(v[i]) < limit)

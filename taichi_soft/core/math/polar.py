@@ -4,7 +4,7 @@ from taichi_soft.core.math.tensors import cofactor, determinant, plus
 from taichi_soft.core.runtime import ti
 
 ROUNDS = 6
-"""Number of iterations. Five reach float32 and six reach float64, even for flat matrices (aspect ratio
+"""Number of iterations. Five are enough for float32 and six for float64, even for flat matrices (aspect ratio
 10^8)."""
 
 
@@ -12,10 +12,10 @@ ROUNDS = 6
 def orthogonal_factor(F):
     """Return the orthogonal matrix nearest to F, as columns: a rotation, or a reflection if F mirrors.
 
-    Newton's iteration for the polar decomposition with scaling by norms (Higham 1986), but with cofactors
-    instead of inverses. F and cof F have the same singular vectors, and adding them brings the singular
-    values closer together. So flat matrices are no special case, and the code is branch-free for
-    vectorisation. For a matrix of rank 1 the result is finite but arbitrary.
+    The method is Newton's iteration for the polar decomposition, scaled by norms (Higham 1986), but with
+    cofactors instead of inverses. F and cof F have the same singular vectors, and the singular values of
+    their sum are closer together. Flat matrices need no branch, so the code can be vectorised. For a matrix
+    of rank 1, the result is finite but arbitrary.
     """
     a, b, c = F[0], F[1], F[2]
     side = ti.select(determinant(F) < 0.0, -1.0, 1.0)

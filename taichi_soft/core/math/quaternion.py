@@ -1,4 +1,4 @@
-"""Unit quaternions (x, y, z, w)."""
+"""Rotations by unit quaternions (x, y, z, w)."""
 
 from taichi_soft.core.math.elementary import cos_sin
 from taichi_soft.core.runtime import ti
@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def turned(q, v):
-    """Rotate a vec3 by `q`."""
+    """Return the vec3 `v`, rotated by the quaternion `q`."""
     axis = q.xyz
     t = 2.0 * axis.cross(v)
     return v + q.w * t + axis.cross(t)
@@ -14,7 +14,7 @@ def turned(q, v):
 
 @ti.func
 def turned_back(q, v):
-    """Rotate a vec3 by the inverse of `q`."""
+    """Return the vec3 `v`, rotated by the inverse of the quaternion `q`."""
     axis = q.xyz
     t = 2.0 * v.cross(axis)
     return v + q.w * t + t.cross(axis)
@@ -22,7 +22,7 @@ def turned_back(q, v):
 
 @ti.func
 def spun(q, rotation):
-    """Return the rotation `q` followed by a rotation vector [rad]."""
+    """Return the quaternion of the rotation `q`, followed by the rotation vector `rotation` [rad]."""
     angle2 = rotation.dot(rotation)
     result = q
     if angle2 > 0.0:

@@ -1,25 +1,25 @@
 """Best-fitting rigid motion between two sets of vertices, in 64-bit floats.
 
-For vertices on a line, rounding would decide the rotation about the line. A small weight on the rotation
-avoids this.
+If all vertices lie on a line, rounding errors would determine the rotation about the line. A small weight in
+favour of no rotation prevents this.
 """
 
 from taichi_soft.core.math.rows import row_at
 from taichi_soft.core.runtime import ti
 
 REGULARISATION = 1e-10
-"""Weight of the smallest rotation. It affects only rotations that the vertices do not determine."""
+"""Weight in favour of no rotation. It affects only rotations that the vertices do not determine."""
 
 SWEEPS = 30
 """Number of Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
 
 RESIDUE = 1e-12
-"""Fraction of the largest number below which a number counts as rounding."""
+"""Numbers below this fraction of the largest number count as rounding errors."""
 
 
 @ti.func
 def kept(v):
-    """Round a vec3 to 32-bit floats without residue, as numbers are stored in a world."""
+    """Set rounding residues of a vec3 to zero, and round it to 32-bit floats, as a world stores numbers."""
     size = ti.abs(v).max()
     for k in ti.static(range(3)):
         v[k] = ti.select(ti.abs(v[k]) > RESIDUE * size, ti.cast(ti.cast(v[k], ti.f32), ti.f64), 0.0)
@@ -28,9 +28,13 @@ def kept(v):
 
 @ti.func
 def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.template()):
-    """Return the rotation (3, 3) and translation [m] that map rows of `rest` closest to rows of `now`.
+    """Return the rotation (3, 3) and the translation [m] that best map the rows of `rest` to rows of `now`.
 
-    Args: column: first column of the vectors. weights: weights of the rows, with the sum 1.
+    Args:
+        rest: positions at rest [m].
+        now: array with the present positions [m] in the three columns from `column` on.
+        column: first column of `now` to read.
+        weights: weight of each row, with sum 1.
     """
     rest_center, center = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
     for i in range(weights.shape[0]):
@@ -49,7 +53,7 @@ def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.
 
 @ti.func
 def _nearest_rotation(m):
-    """Return the rotation R with the largest trace of R^T m (Horn 1987); the identity for zeros."""
+    """Return the rotation R with the largest trace of R^T m (Horn 1987); the identity for m = 0."""
     a = ti.Matrix(
         [
             [m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],

@@ -1,7 +1,7 @@
 """Rotations as unit quaternions (x, y, z, w), in float64.
 
 Each sum has an explicit order, so that other languages can compute the same bits. Linear algebra libraries
-round dot products differently, and C libraries sine and arctangent.
+differ in the rounding of dot products, and C libraries in the rounding of sine and arctangent.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
-    """Return the rows of the rotation matrix of a unit quaternion, for numbers or arrays."""
+    """Return the rows of the rotation matrix of a unit quaternion. The arguments can be numbers or arrays."""
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -33,13 +33,13 @@ def length_of(vector: Floats) -> float:
 
 
 def turned(points: Floats, rows: Floats) -> Floats:
-    """Multiply points (n, 3) by a matrix (3, 3)."""
+    """Return the product of the matrix `rows` (3, 3) and each of the points (n, 3)."""
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in rows], axis=1)
 
 
 def quaternion_of(matrix: Floats) -> Floats:
-    """Convert a rotation matrix (3, 3) to a quaternion with non-negative w."""
+    """Convert a rotation matrix (3, 3) to a unit quaternion with non-negative w."""
     # The rows of 4 q q^T are multiples of q. The longest row is the most accurate.
     m = matrix
     trace = m[0, 0] + m[1, 1] + m[2, 2]
@@ -72,7 +72,7 @@ def multiplied(second: Floats, first: Floats) -> Floats:
 
 
 def rotation_vector(start: Floats, end: Floats) -> Floats:
-    """Return the shortest rotation from one quaternion to another, as axis times angle, (3,) [rad]."""
+    """Return the shortest rotation from the quaternion `start` to `end`, as axis times angle, (3,) [rad]."""
     turn = multiplied(end, np.r_[-start[:3], start[3]])
     if turn[3] < 0:
         turn = -turn
@@ -83,7 +83,7 @@ def rotation_vector(start: Floats, end: Floats) -> Floats:
 
 
 def turned_by(quaternion: Floats, vector: Floats) -> Floats:
-    """Return a quaternion followed by a rotation vector [rad], normalised."""
+    """Return the unit quaternion of the rotation `quaternion`, followed by a rotation vector [rad]."""
     angle = length_of(vector)
     cosine, sine = _cos_sin(0.5 * angle)
     axis = vector * (0.5 if angle == 0.0 else sine / angle)
@@ -92,7 +92,10 @@ def turned_by(quaternion: Floats, vector: Floats) -> Floats:
 
 
 def _cos_sin(angle: float) -> tuple[float, float]:
-    """Return cosine and sine by the Taylor series of an eighth of the angle [rad], doubled three times."""
+    """Return the cosine and the sine of an angle [rad].
+
+    The Taylor series is evaluated for an eighth of the angle, and the angle is then doubled three times.
+    """
     part = (angle - math.tau * math.floor(angle / math.tau + 0.5)) / 8.0
     square = part * part
     behind = versine = 0.0  # sine = part (1 - behind), cosine = 1 - versine
@@ -106,8 +109,9 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angle(sine: float, cosine: float) -> float:
-    """Return an angle [rad] by Gregory's series of the tangent of its quarter. The cosine must be 0 or
-    more.
+    """Return the angle that has this sine and this cosine [rad]. The cosine must be 0 or more.
+
+    Gregory's series is evaluated for the tangent of a quarter of the angle.
     """
     tangent = sine / (1.0 + cosine)
     tangent = tangent / (1.0 + math.sqrt(1.0 + tangent * tangent))

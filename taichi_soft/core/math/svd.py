@@ -1,4 +1,4 @@
-"""Signed singular value decomposition of a 3x3 matrix, and the rotation nearest to it."""
+"""Signed singular value decomposition of a 3x3 matrix, and the rotation nearest to the matrix."""
 
 from taichi_soft.core.math.eigen import symmetric_eigen
 from taichi_soft.core.math.tensors import inner_square, times
@@ -9,7 +9,7 @@ from taichi_soft.core.runtime import ti
 def signed_svd(F):
     """Decompose F = U diag(s) V^T with rotations U and V, s0 >= s1 >= |s2|, and s2 negative if F mirrors.
 
-    U is built from the images of V's columns, so it is a rotation even for a flat or zero F.
+    U is computed from the images of V's columns. U is therefore a rotation even for a flat or zero F.
     Args:
         F: matrix as columns.
     Returns: U as columns, s as vec3, V as columns.

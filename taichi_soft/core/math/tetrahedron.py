@@ -5,7 +5,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def shape(x0, x1, x2, x3):
-    """Return the edges from the first vertex, as columns [m] (thesis eq. 6.1 and 6.2)."""
+    """Return the edges from the first vertex to the others, as columns [m] (thesis eq. 6.1 and 6.2)."""
     return x1 - x0, x2 - x0, x3 - x0
 
 
@@ -13,7 +13,8 @@ def shape(x0, x1, x2, x3):
 def area_vectors(B):
     """Return twice the outward area vectors of the faces opposite to vertices 0 to 3 [m^2].
 
-    See thesis eq. 6.8. For an inverted tetrahedron the vectors point inward. Their sum is zero (eq. 6.9).
+    See thesis eq. 6.8. For an inverted tetrahedron, the vectors point inward. The sum of the four vectors is
+    zero (eq. 6.9).
     """
     n1 = B[2].cross(B[1])
     n2 = B[0].cross(B[2])

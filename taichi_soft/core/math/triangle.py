@@ -4,16 +4,17 @@ from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Smallest divisor. Smaller divisors are zero lengths in float32, and their numerators are zero too."""
+"""Lower limit of divisors. If a divisor is smaller, a length is zero in float32, and the numerator is zero
+too."""
 
 
 @ti.func
 def closest_point_on_triangle(x, a, b, c):
-    """Return the barycentric coordinates of the triangle's closest point to x, vec3.
+    """Return the barycentric coordinates of the point of a triangle that is closest to x, vec3.
 
-    The candidates are the projection onto the plane, if it is inside, and the closest points of the three
-    edges. All candidates are points of the triangle for any rounding, so degenerate triangles are no special
-    case.
+    The candidates are the projection of x onto the plane, if it is inside the triangle, and the closest point
+    of each edge. With any rounding errors, all candidates are points of the triangle. Degenerate triangles
+    are therefore no special case.
     Args:
         x, a, b, c: vec3 [m].
     Returns: weights of a, b and c, each from 0 to 1, with sum 1.
@@ -24,7 +25,7 @@ def closest_point_on_triangle(x, a, b, c):
     scale = 1.0 / ti.max(n.dot(n), _TINY)
     v, w = ax.cross(ac).dot(n) * scale, ab.cross(ax).dot(n) * scale
     is_inside = ti.min(v, w, 1.0 - v - w) >= 0.0
-    v, w = ti.select(is_inside, v, 0.0), ti.select(is_inside, w, 0.0)  # otherwise a
+    v, w = ti.select(is_inside, v, 0.0), ti.select(is_inside, w, 0.0)  # corner a if the projection is outside
     gap = ax - ab * v - ac * w
     best = gap.dot(gap)
     for edge in ti.static(range(3)):
@@ -43,13 +44,14 @@ def closest_point_on_triangle(x, a, b, c):
 def pierce_triangle(a, b, c):
     """Intersect the z axis with a triangle.
 
-    For a ray, use axes with the origin at the ray's start and z along the ray. The axis is as thick as
-    float32's resolution at the triangle's distance, so that no ray passes between two triangles. A triangle
-    seen edge-on is not hit, but its neighbours are.
+    For a ray, use axes with the origin at the start of the ray and z along the ray. The test has a tolerance
+    of float32's resolution at the distance of the triangle, so that no ray passes between two adjacent
+    triangles. A triangle that is seen edge-on is not hit, but an adjacent triangle is.
     Args:
         a, b, c: vec3 [m].
-    Returns: -1 if the axis enters through the front (from which a, b, c run counterclockwise), 1 if it leaves
-        through it, 0 if it misses; and the weights of a, b and c at the hit, vec3 with sum 1.
+    Returns: -1 if the axis passes through the triangle from front to back, 1 from back to front, 0 if it
+        misses the triangle; and the weights of a, b and c at the hit, vec3 with sum 1. Seen from the front,
+        a, b, c run counterclockwise.
     """
     areas = ti.Vector([b.x * c.y - b.y * c.x, c.x * a.y - c.y * a.x, a.x * b.y - a.y * b.x])
     across = ti.max(ti.abs(a.x), ti.abs(a.y), ti.abs(b.x), ti.abs(b.y), ti.abs(c.x), ti.abs(c.y))
@@ -64,10 +66,10 @@ def pierce_triangle(a, b, c):
 
 @ti.func
 def solid_angle(a, b, c):
-    """Return the solid angle of a triangle seen from the origin [sr], negative if its front is visible.
+    """Return the solid angle of a triangle seen from the origin [sr]; negative if the front is visible.
 
-    The sum over a closed surface that faces outward is 4 pi inside and 0 outside (Van Oosterom and Strackee
-    1983).
+    For a closed surface that faces outward, the sum over its triangles is 4 pi if the origin is inside, and 0
+    if the origin is outside (Van Oosterom and Strackee 1983).
     """
     la, lb, lc = a.norm(), b.norm(), c.norm()
     down = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
@@ -76,10 +78,10 @@ def solid_angle(a, b, c):
 
 @ti.func
 def triangle_touches_box(a, b, c, half):
-    """True if a triangle touches the box from -half to half, including its faces.
+    """True if a triangle touches or overlaps the box from -half to half.
 
-    The test uses separating axes: the normals of the box and of the triangle, and the cross products of their
-    edges (Akenine-Moeller 2001). For a degenerate triangle, these are the axes of a segment or a point.
+    The test uses separating axes: the normals of the box and of the triangle, and the cross products of the
+    edges of both (Akenine-Moeller 2001). The axes are also valid for a triangle that is a segment or a point.
     """
     normal = (b - a).cross(c - a)
     heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal up to rounding

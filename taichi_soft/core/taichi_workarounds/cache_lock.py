@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 LONGEST_HELD = 30.0
-"""Age from which a lock counts as abandoned, even if clocks differ [s]."""
+"""Age from which a lock counts as abandoned [s]. The age allows for small differences between clocks."""
 
 LOCK = "ticache.lock"
 
@@ -26,7 +26,7 @@ def folder_of(default: str) -> Path:
 
 
 def await_lock(default: str) -> None:
-    """Wait until no other process reads or writes the kernels. Remove the lock if its process was killed.
+    """Wait until no other process reads or writes the kernels. Remove the lock of a process that was killed.
 
     Args:
         default: folder to use if the environment names no folder.

@@ -1,13 +1,13 @@
 """Call Taichi from any thread.
 
-Taichi cannot compile in two threads at once, and one thread can use a kernel that another is still compiling.
-Its binary asserts that it is started and allocates fields in the same thread. Here each kernel call and each
-access to a number of a field excludes other threads. A dedicated thread starts Taichi and allocates fields,
-because a caller's thread may end soon.
+Taichi cannot compile in two threads at once, and lets one thread use a kernel that another thread is still
+compiling. Taichi's binary asserts that fields are allocated in the thread that started Taichi. Here, each
+kernel call and each access to a number of a field excludes other threads. A dedicated thread starts Taichi
+and allocates fields, because a caller's thread may end soon.
 
 This file is unnecessary once Taichi can be used from several threads:
 https://github.com/taichi-dev/taichi/issues/2022 is open, and https://github.com/taichi-dev/taichi/issues/4542
-has the assertion. The main branch has both faults.
+reports the assertion. The main branch has both faults.
 """
 
 import functools
@@ -31,10 +31,11 @@ _home = 0  # identity of the dedicated thread
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
-    """Make threads wait, so that only one at a time calls kernels and accesses numbers of fields.
+    """Make threads wait, so that only one thread at a time calls kernels or accesses numbers of fields.
 
     Args:
-        lay_out_now: calls Taichi's own function that lays out fields, with its argument.
+        lay_out_now: replacement for Taichi's function that lays out fields. It receives Taichi's function and
+            the argument of that function.
     """
     compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
     ti.lang.impl.PyTaichi.inside_kernel = property(
@@ -47,20 +48,21 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
         make(self, snode)
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
-    accessor.__init__ = make_in_turn  # its kernels are stored where Taichi adds others with the GIL released
+    accessor.__init__ = make_in_turn  # uses a list of kernels that Taichi extends with the GIL released
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
 
 
 def must_go_home() -> bool:
-    """True if fields must be laid out and this is not the dedicated thread."""
+    """True if fields must be laid out and this thread is not the dedicated thread."""
     root = ti.lang.impl._root_fb
     return not (root.finalized or root.empty) and threading.get_ident() != _home
 
 
 def at_home(function: Callable[[], Result]) -> Result:
-    """Call a function in the dedicated thread. On Ctrl-C, wait for its end, because an interrupted layout
-    would break all worlds.
+    """Call a function in the dedicated thread, and return its result.
+
+    On Ctrl-C, wait until the function ends, because an interrupted layout would break all worlds.
     """
     found: Future[Result] = Future()
 
@@ -84,15 +86,16 @@ def at_home(function: Callable[[], Result]) -> Result:
 
 def _serve() -> None:
     global _home
-    if _is_served.acquire(blocking=False):  # or another thread serves, if Ctrl-C interrupted its start
+    if _is_served.acquire(blocking=False):  # only one thread serves, even if Ctrl-C caused a second start
         _home = threading.get_ident()
         while True:
             _jobs.get()()
 
 
 def leave_home() -> None:
-    """Forget the dedicated thread in a process that was forked before Taichi started, because threads are not
-    copied.
+    """Forget the dedicated thread in a process that was forked before Taichi started.
+
+    A fork does not copy threads.
     """
     global _is_served
     _is_served = threading.Lock()

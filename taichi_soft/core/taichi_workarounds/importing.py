@@ -1,4 +1,4 @@
-"""Import Taichi without its header, its request to a server for a newer version, and a warning.
+"""Import Taichi without its printed header, its request to a server for the newest version, and a warning.
 
 This file is unnecessary once `import taichi` prints nothing and sends no request. The main branch does both.
 """

@@ -1,7 +1,7 @@
-"""Check indices (`TAICHI_SOFT_DEBUG=1`) in real functions too, and print no overflows.
+"""Extend Taichi's index checks (`TAICHI_SOFT_DEBUG=1`) to real functions, and do not report overflows.
 
 Taichi's bounds check skips the body of a `ti.real_func`. With `debug`, Taichi also prints a line for each
-integer overflow, which hashes cause on purpose.
+integer overflow. Hash functions overflow on purpose.
 
 This file is unnecessary once Taichi runs `check_out_of_bound` on real functions, and once
 https://github.com/taichi-dev/taichi/issues/8725 is closed (an option for the report of overflows). The main
@@ -14,8 +14,9 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def check_real_functions() -> None:
-    """Assert each index in a real function before it is used. A wrong index then becomes 0, so that the
-    process can still report it.
+    """Make Taichi check each index in a real function before the index is used.
+
+    An index out of range is replaced by 0, so that the process does not crash before it reports the index.
     """
     impl = ti.lang.impl
     plain = impl.subscript
@@ -40,10 +41,10 @@ def let_whole_numbers_overflow() -> None:
     plain = program.compile_kernel
 
     def compiled(self: Any, config: Any, *arguments: Any) -> Any:
-        config.debug = False  # the bounds check has its own option; all other checks depend on this one
+        config.debug = False  # all checks depend on this option, except for the bounds check
         try:
             return plain(self, config, *arguments)
         finally:
-            config.debug = True  # needed at the launch, which raises the error
+            config.debug = True  # needed at the launch, which raises errors of the bounds check
 
     program.compile_kernel = compiled

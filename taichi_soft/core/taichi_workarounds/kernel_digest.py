@@ -1,6 +1,6 @@
 """Digests of kernels, which cover everything that the code of a kernel depends on.
 
-This file is part of `known_kernels`, and unnecessary once that is.
+This file is part of `known_kernels`, and is unnecessary once `known_kernels` is unnecessary.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
     """Return a digest of a kernel and its compile-time arguments.
 
     Args:
-        function: the Python function. options: Taichi's options that change code. arguments: a pair for each
-            argument. For a template argument the pair is its value and True; otherwise the feature by which
-            Taichi distinguishes such arguments and False.
-    Raises: UnknownPartError.
+        function: Python function of the kernel.
+        options: Taichi's options that change code, as text.
+        arguments: a pair for each argument. A template argument has its value and True. Any other argument
+            has its features, for which Taichi compiles separate kernels, and False.
+    Raises: UnknownPartError if an argument has no digest.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
     if function.__closure__:
@@ -53,7 +54,7 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
 
 
 def _feature(value: Any) -> str:
-    """Return the type and dimensions of an array, by which Taichi distinguishes arrays."""
+    """Return the features of an argument as text, such as the type and the dimensions of an array."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_feature, value))})"
     text = value.to_string() if hasattr(value, "to_string") else str(value)
@@ -106,7 +107,10 @@ _field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
 def _field_text(field: Any) -> str:
-    """Return type, size and address of a field. They do not change after the field is laid out."""
+    """Return the type, the size and the addresses of a field as text.
+
+    The text does not change after the field is laid out.
+    """
     if field not in _field_texts:
         places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
         size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
@@ -118,8 +122,8 @@ _places: dict[tuple[int, int], str] = {}
 
 
 def _place_of(node: Any) -> str:
-    """Return the address of a number of a field: the field's own, and those of the nodes that contain it. It
-    also depends on the sizes of other fields.
+    """Return the address of one component of a field as text: its node and all nodes that contain it, with
+    their offsets. The address also depends on the sizes of other fields.
     """
     tree, first = node.get_snode_tree_id(), node.id
     if (tree, first) not in _places:

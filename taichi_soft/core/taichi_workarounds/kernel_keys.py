@@ -1,10 +1,10 @@
 """Make the keys of Taichi's disk cache equal on all machines, and different in each version of the package.
 
-Taichi compiles the machine's number of threads into each parallel loop, and adds it to the key. Another
-machine would not find the kernel, or would run it on too few threads.
+Taichi compiles the machine's number of threads into each parallel loop, and adds this number to the key.
+Another machine would not find the kernel, or would run the kernel on too few threads.
 
 This file is unnecessary once Taichi reads the number of threads when a loop starts, and accepts a part of the
-key from its caller. The main branch does neither. We know of no thread about it.
+key from its caller. The main branch does neither. We know of no issue about this.
 """
 
 import threading
@@ -30,7 +30,7 @@ def let_any_number_of_threads_run() -> None:
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # Finding the end of a loop can compile a real function that contains loops.
+            # The bounds of a loop can call a real function. Compiling it begins other loops first.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:
@@ -46,9 +46,10 @@ def let_any_number_of_threads_run() -> None:
 
 
 def keep_kernels_apart(version: str) -> None:
-    """Use different keys in each version of the package. Call this after Taichi has started.
+    """Make the keys different in each version of the package. Call this after Taichi has started.
 
-    The number of threads in the key is replaced by a number made from the version, larger than any machine's.
+    The number of threads in the key is replaced by a number that depends on the version. This number is
+    larger than the number of threads of any machine.
     """
     ti.lang.impl.current_cfg().cpu_max_num_threads = (
         _MOST_THREADS + zlib.crc32(version.encode()) % _MOST_THREADS
@@ -56,7 +57,7 @@ def keep_kernels_apart(version: str) -> None:
 
 
 def code_options() -> str:
-    """Return a list of all options of the running Taichi that change code, as text."""
+    """Return all options of the running Taichi that change code, with their values, as text."""
     config = ti.lang.impl.current_cfg()
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}

@@ -1,18 +1,18 @@
 """Find the kernels that an earlier process compiled, without processing their source.
 
-Taichi stores compiled kernels on disk under a hash of its intermediate code. To compute that hash, it
-processes the source of each kernel at every start, which takes most of a start with a full cache.
+Taichi stores compiled kernels on disk under a hash of its intermediate code. To compute that hash, Taichi
+processes the source of each kernel at every start. With a full cache, this takes most of the time of a start.
 
-Here a known kernel is created with a short body instead. The short body contains a digest of everything that
+Here, a known kernel is created with a short body instead. The short body contains a digest of everything that
 the kernel's code depends on. When the process that compiled the kernel ends, the kernel's code is stored in
 the file of the short body. Taichi finds that file by the hash of the short body, which is quick to compute.
 
 If Taichi does not find the file, it compiles the short body itself. The short body only sets a flag. If the
 flag is set after the launch, the kernel is created from its source and launched.
 
-This file is unnecessary once Taichi looks for a kernel before it processes its source, as its fork Quadrants
-does (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). The main branch does not. It was planned in
-https://github.com/taichi-dev/taichi/issues/4401.
+This file is unnecessary once Taichi looks for a kernel before it processes the kernel's source. Quadrants, a
+fork of Taichi, does this (https://github.com/Genesis-Embodied-AI/quadrants/pull/131). The main branch does
+not. https://github.com/taichi-dev/taichi/issues/4401 planned the change.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ INDEX = "taichi_soft.json"
 """Name of the file with the digests of known kernels, next to Taichi's own files."""
 
 FLAG = "__flag"
-"""Name of the field that the short body sets, in the short body."""
+"""Name of the flag in the source of the short body. The flag is a field that the short body sets."""
 
 HEADER = 1 << 17
-"""Number of bytes at the front of Taichi's file of a kernel that contain the names of its functions."""
+"""Number of bytes at the start of a kernel's file that contain the names of the kernel's functions."""
 
 
 class KnownKernels:
@@ -84,7 +84,7 @@ class KnownKernels:
             _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
 
     def _files_of(self, names: set[str]) -> dict[str, Path]:
-        """Find the file of each kernel, by name."""
+        """Return the files of the kernels with these names, by name."""
         found = {}
         for path in self.folder.glob("*.tic"):
             with path.open("rb") as file:
@@ -100,7 +100,7 @@ class FirstLaunches:
     def __init__(self) -> None:
         self._known: KnownKernels | None = None
         self._flag: Any = None
-        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of its array arguments, digest
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, features of array arguments, digest
 
     def make_flag(self) -> None:
         """Create the flag that short bodies set. Call this when Taichi starts."""
@@ -126,7 +126,7 @@ class FirstLaunches:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:
-        """Replace Taichi's function that creates a kernel."""
+        """Replace Taichi's function that creates a kernel, so that known kernels get the short body."""
         plain = kernels.Kernel.materialize
 
         def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
@@ -142,17 +142,18 @@ class FirstLaunches:
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # reading the flag is a kernel too, which the next process needs
+            _ = self._flag[None]  # compiles the kernel that reads the flag, which the next process needs
 
     def keep(self) -> None:
-        """Store the code of these kernels in the files of their short bodies. Call this after Taichi has
-        ended.
+        """Store the code of kernels that were created from their source in the files of their short bodies.
+
+        Call this after Taichi has ended.
         """
         if self._known is not None:
             self._known.keep({digest: _name_of(kernel, digest) for kernel, _, digest in self._made})
 
     def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
-        """Create a kernel. After its first launch, check the flag."""
+        """Create a kernel. If it has the short body, make its first launch check the flag."""
         name = kernel.func.__name__
         start = BURST.begin(name)
         kernel.runtime.materialize()  # lays out fields, because digests contain their addresses
@@ -203,7 +204,7 @@ class FirstLaunches:
         self._made.append((kernel, features, digest))
 
     def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
-        """Create a kernel with the short body and the same arguments."""
+        """Create a kernel that has the short body, but the arguments of `kernel`."""
         names = [argument.name for argument in kernel.arguments]
         returned = " -> None" if kernel.return_type else ""
         head = f"def {kernel.func.__name__}({', '.join(names)}){returned}:"
@@ -244,25 +245,26 @@ def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
 
 
 def _short_body(digest: str) -> list[str]:
-    """Return statements that set the flag, one per part of the digest. Each statement takes time at every
-    start.
+    """Return statements that set the flag to each part of the digest, and then to 1.
+
+    The parts are large, because each statement takes time at every start.
     """
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return [f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1)]
 
 
 def _name_of(kernel: Any, digest: str) -> str:
-    """Return the name, in Taichi's file, of a kernel that is created from its source."""
+    """Return the name, in Taichi's files, of a kernel that is created from its source."""
     return f"{kernel.func.__name__}_{digest}"
 
 
 def _short_name_of(digest: str) -> str:
-    """Return the name, in Taichi's file, of a kernel with the short body."""
+    """Return the name, in Taichi's files, of a kernel with the short body."""
     return f"known_{digest}"
 
 
 def _write(path: Path, contents: bytes) -> None:
-    """Write a file in one operation, because other processes can read it at the same time."""
+    """Replace a file in one operation, because other processes can read the file at the same time."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.write_bytes(contents)
     part.replace(path)

@@ -1,10 +1,10 @@
 """`ti.min` and `ti.max` with the same bits on every processor.
 
-Taichi uses an instruction of the processor. For -0 and 0, and for a number and NaN, the result differs
-between processors, and WebAssembly has no such instruction.
+Taichi uses an instruction of the processor for `min` and `max`. For -0 and 0, and for a number and NaN, the
+result of this instruction differs between processors. WebAssembly has no such instruction.
 
 This file is unnecessary once Taichi compiles `min` and `max` of floats to a comparison and a selection. The
-main branch uses LLVM's functions. We know of no thread about it.
+main branch uses LLVM's functions. We know of no issue about this.
 """
 
 import functools
@@ -15,10 +15,11 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def choose_by_comparison() -> None:
-    """Compile `min` and `max` to a comparison and a selection, which become one instruction as well.
+    """Make Taichi compile `min` and `max` of floats to a comparison and a selection.
 
-    If the numbers are equal or one is NaN, the result is the second number, or the constant if one of them is
-    constant."""
+    The compiler can still turn these two into one instruction. If both numbers are equal or one number is
+    NaN, the result is the second number. If one number is a constant, the constant counts as the second.
+    """
     ops = ti.lang.ops
 
     def choosing(plain: Callable[..., Any], comes_first: Callable[..., Any]) -> Callable[..., Any]:
@@ -28,7 +29,7 @@ def choose_by_comparison() -> None:
             if not any(_is_real(each) for each in expressions):
                 return plain(a, b)
             first, second = (a, b) if ops.is_taichi_expr(a) else (b, a)
-            # Stored in variables, because Taichi evaluates an expression at each use.
+            # Store the numbers in variables, because Taichi evaluates an expression at each use.
             first, second = ti.lang.impl.expr_init(first), ti.lang.impl.expr_init(second)
             return ops.select(comes_first(first, second), first, second)
 

@@ -1,12 +1,12 @@
 """Read the source of kernels and functions once.
 
 Taichi reads the lines around each function when the function is defined, which takes more than half of the
-time to import this package. It reads the whole source again for every call of a `ti.func`, and formats the
-lines around every expression for a possible message.
+time to import this package. Taichi reads the whole source again for every call of a `ti.func`, and formats
+the lines around every expression for a possible message.
 
-This file is unnecessary once Taichi's `_inside_class` reads no source and its `get_pos_info` caches its
-results. The main branch does neither; https://github.com/taichi-dev/taichi/issues/7711 asked for the import.
-Quadrants, a fork of Taichi, works on both: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
+This file is unnecessary once Taichi's `_inside_class` reads no source and `get_pos_info` caches its results.
+The main branch does neither. https://github.com/taichi-dev/taichi/issues/7711 asked for a faster import.
+Quadrants, a fork of Taichi, works on both faults: https://github.com/Genesis-Embodied-AI/quadrants/pull/804.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from taichi_soft.core.taichi_workarounds.importing import ti
 
 
 def read_sources_once() -> None:
-    """Make Taichi read a source only when it is first compiled. Messages show only the first line of an
-    expression.
+    """Make Taichi read the source of a function only once, when the function is first compiled.
+
+    Messages of Taichi then show only the first line of an expression.
     """
     kernels = ti.lang.kernel_impl
     ti.lang.kernel_impl._inside_class = _is_in_class
@@ -40,14 +41,14 @@ def _is_in_class(level_of_class_stackframe: int) -> bool:
     """True if a decorated function is defined in the body of a class.
 
     Args:
-        level_of_class_stackframe: number of frames from this one to the frame of the class statement, which
-            Taichi reads. The frame before it is the body of the class.
+        level_of_class_stackframe: number of frames from the frame of this function to the frame with the
+            class statement, which Taichi reads. The frame before that frame is the body of the class.
     """
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `look_up` with a cache. It is called once per object, while the object exists."""
+    """Return `look_up` with a cache, which keeps the result for each object as long as the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:
@@ -59,8 +60,8 @@ def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def _place_of(context: Any, node: Any) -> str:
-    """Describe the position of a node in a source: file, line number, function, the line, and a mark below
-    it.
+    """Describe the position of a node in a source: file, line number, function, line, and a mark below the
+    node.
     """
     number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
     start = context.indent + node.col_offset

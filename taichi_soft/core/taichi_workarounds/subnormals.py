@@ -1,11 +1,11 @@
 """Compute subnormal numbers as in IEEE 754, in the thread that calls a kernel and in Taichi's workers.
 
 Taichi makes the processor flush numbers below 1e-38 to zero, in the thread that starts Taichi and in its
-workers. WebAssembly cannot do that, and other libraries change the setting of their own threads. So a kernel
-would compute different bits in different threads and on different platforms.
+workers. WebAssembly cannot flush numbers to zero, and other libraries change the setting of their threads. A
+kernel would therefore compute different bits in different threads and on different platforms.
 
 This file is unnecessary once Taichi has an option for the setting.
-https://github.com/taichi-dev/taichi/pull/2143 made it fixed, as it still is in the main branch.
+https://github.com/taichi-dev/taichi/pull/2143 made the setting fixed. The main branch still has no option.
 `with_usual_floats` around a kernel remains necessary because of other libraries.
 """
 
@@ -28,7 +28,7 @@ Environment = ctypes.c_char * 64
 
 
 def _unchanged(_: Any) -> None:
-    """Replacement for C functions that the system's library lacks."""
+    """Do nothing. Replacement for a C function that the system's library lacks."""
 
 
 try:
@@ -39,8 +39,9 @@ except (AttributeError, OSError):
 
 
 def _usual_environment() -> Any:
-    """Return C's `FE_DFL_ENV`, or the environment of the thread that imports the package if `FE_DFL_ENV` is
-    unknown.
+    """Return the default floating-point environment.
+
+    On Linux, this is C's `FE_DFL_ENV`. Elsewhere, it is the environment of the thread that imports this file.
     """
     here, usual = Environment(), Environment()
     _read(here)
@@ -55,8 +56,9 @@ _usual = _usual_environment()
 
 
 def with_usual_floats(function: Function) -> Function:
-    """Decorate a function to run with IEEE 754 floats. Afterwards, the settings of its thread are
-    restored.
+    """Decorate a function, so that it runs with IEEE 754 floats.
+
+    After each call, the floating-point settings of the thread are restored.
     """
 
     @wraps(function)
@@ -73,10 +75,10 @@ def with_usual_floats(function: Function) -> Function:
 
 
 def give_workers_usual_floats(count: int) -> None:
-    """Revert Taichi's setting in all `count` workers.
+    """Undo Taichi's floating-point setting in all `count` workers.
 
-    A loop has as many parts as there are workers. Each part calls C's `fesetenv` and waits for the other
-    parts, so that no worker runs two parts.
+    A kernel runs a loop with one iteration per worker. Each iteration calls C's `fesetenv` and waits for the
+    other iterations, so that no worker runs two iterations.
     """
     address = ctypes.cast(_write, ctypes.c_void_p).value if _write is not _unchanged else None
     if address is None:
@@ -93,7 +95,7 @@ def give_workers_usual_floats(count: int) -> None:
             while ti.atomic_max(arrived[0], -1) < count:
                 pass
 
-    with not_kept():  # the kernel contains the address of the function
+    with not_kept():  # the kernel contains the address of a function in this process
         set_everywhere(ctypes.addressof(_usual), np.zeros(1, np.int32))
 
 

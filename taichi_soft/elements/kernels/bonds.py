@@ -13,7 +13,7 @@ from taichi_soft.elements.laws.volume_springs import expansion
 
 @ti.func
 def lane_pressure(state: ti.template(), block, lane):
-    """Pressure of one tetrahedron on its edges [Pa]: its expansion modulus, E nu, times dV / V0."""
+    """Pressure of one tetrahedron on its edges [Pa]: dV / V0 times the expansion modulus E nu."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     growth = expansion(
         state.particle_position[p0],
@@ -38,7 +38,7 @@ def store_block_pressures(state: ti.template(), number):
 
 @ti.func
 def accumulate_pressures(state: ti.template(), body):
-    """Store the pressures of a body's tetrahedra, and their sums in `edge_pressure`, in one thread."""
+    """Store the pressures of a body's tetrahedra, and their sum for each edge, in one thread."""
     edges, blocks = state.body_edges[body], state.body_blocks[body]
     for e in range(edges[0], edges[1]):
         state.edge_pressure[e] = 0.0
@@ -55,7 +55,7 @@ def accumulate_pressures(state: ti.template(), body):
 
 @ti.func
 def _corner(state: ti.template(), k, origin):
-    """Corner of a Voronoi face, from ring row `k`, relative to `origin` [m]."""
+    """Position of the corner of a Voronoi face in ring row `k`, relative to `origin` [m]."""
     members, weights = state.ring_members[k], state.ring_weights[k]
     arm = state.particle_position[members[0]] * weights[0] - origin
     for i in ti.static(range(1, 4)):
@@ -65,7 +65,10 @@ def _corner(state: ti.template(), k, origin):
 
 @ti.func
 def _voronoi_normal(state: ti.template(), e, center):
-    """Twice the area vector of a deformed Voronoi face: triangles from the edge's centre (thesis 4.1)."""
+    """Twice the area vector of a deformed Voronoi face [m^2] (thesis 4.1).
+
+    The vector is summed over triangles between the edge's centre and two corners of the face.
+    """
     total = center * 0.0
     ring = state.edge_ring[e]
     if ring[1] > ring[0]:
@@ -79,7 +82,7 @@ def _voronoi_normal(state: ti.template(), e, center):
 
 @ti.func
 def _subface_normal(state: ti.template(), e, xp, r):
-    """Area vector of an edge's subfaces, and its rest direction as carried by the tetrahedra (4.4.1)."""
+    """Return the area vector of an edge's subfaces [m^2], and the carried direction (see `laws.cmpm2`)."""
     total, carried = r * 0.0, r * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -92,7 +95,9 @@ def _subface_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def _fitted_normal(state: ti.template(), e, xp, r):
-    """Normal of the plane that best fits the particles around an edge, and the carried direction (4.4.2)."""
+    """Return the unit normal of the plane that best fits the particles around an edge, and the carried
+    direction (see `laws.best_fitting_plane`).
+    """
     total, carried = r * 0.0, r * 0.0
     s0, s1, s2 = r * 0.0, r * 0.0, r * 0.0
     ring = state.edge_ring[e]
@@ -104,13 +109,16 @@ def _fitted_normal(state: ti.template(), e, xp, r):
         s0 += arm * arm.x
         s1 += arm * arm.y
         s2 += arm * arm.z
-    count = ti.max(ring[1] - ring[0], 3)  # the centre of the edge is the third point if there are two
+    count = ti.max(ring[1] - ring[0], 3)  # with two particles, the edge's centre is the third point
     return plane_normal(count, total, (s0, s1, s2), r), carried
 
 
 @ti.func
 def _split_normal(state: ti.template(), e, xp, r):
-    """Normal of a ring that is split twice, not normalised, and the carried direction (4.4.2)."""
+    """Return the normal of a ring that is split twice, and the carried direction.
+
+    `laws.split_ring_plane` describes both. The normal is not normalised.
+    """
     one, other, carried = r * 0.0, r * 0.0, r * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
@@ -124,7 +132,7 @@ def _split_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def _tilted_normal(state: ti.template(), e, xp, r):
-    """Normal of the plane tilted by the particles around an edge (4.4.3)."""
+    """Unit normal of the plane that the particles around an edge tilt (thesis 4.4.3)."""
     axis = direction_of(r)
     height = axis.x * 0.0
     ring = state.edge_ring[e]
@@ -140,7 +148,9 @@ def _tilted_normal(state: ti.template(), e, xp, r):
 
 @ti.func
 def bond_frame_of(state: ti.template(), law: ti.template(), e):
-    """Frame of an edge: second end minus first [m], unit normal of its plane, and the compared direction."""
+    """Return the vector from the first to the second end of an edge [m], the unit normal of the edge's plane,
+    and the direction that the law compares with the normal.
+    """
     xp = state.particle_position[state.edge_vertices[e][0]]
     r = state.particle_position[state.edge_vertices[e][1]] - xp
     normal, compared = r, r
@@ -159,7 +169,10 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def stored_frame_of(state: ti.template(), law: ti.template(), e):
-    """Result of `bond_frame_of`, read from the last evaluation of forces unless it is quick to compute."""
+    """Return the result of `bond_frame_of`.
+
+    With implicit integration, laws with planes read the result that the last evaluation of forces stored.
+    """
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)
     else:
@@ -170,7 +183,7 @@ def stored_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def ring_tension(state: ti.template(), e):
-    """Pull on the ends of an edge by the tetrahedra around it [N], from their stored pressures."""
+    """Pull of the tetrahedra around an edge on the ends of the edge [N], from the stored pressures."""
     pressure = state.edge_damping[e] * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):

@@ -10,7 +10,10 @@ from taichi_soft.elements.laws.springs import damped_pull, spring_tension
 
 @ti.func
 def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_velocity, tension):
-    """Force on the first end of an edge [N], for laws that use only its two ends and a `tension` [N]."""
+    """Force of a spring, an additional `tension` [N], and damping on the first end of an edge [N].
+
+    For laws without bonds, the force contains only the damping.
+    """
     if ti.static(model.has_bonds):
         pull = spring_tension(r, state.edge_bond[e]) + tension
         return damped_pull(r, relative_velocity, pull, state.edge_damping[e])
@@ -40,10 +43,11 @@ def edge_force_of(state: ti.template(), model: ti.template(), e):
 
 @ti.func
 def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
-    """Add the forces of a block of up to `LANES` edges, vectorised as in `elastic`.
+    """Add the forces of a block of up to `LANES` edges to the particles, vectorised as in `elastic`.
 
-    The edges of each half of the block have the same first end. The kernel also computes the forces of the
-    rows after the block, which belong to the same body or are spare, but discards them.
+    All edges in a half of the block have the same first end. If the block has fewer than `LANES` edges, this
+    function also computes the forces of the next rows, which belong to the same body or are spare. These
+    forces are discarded.
     """
     p = state.edge_vertices[first][0]
     p_later = state.edge_vertices[first + ti.select(count > HALF, HALF, 0)][0]

@@ -1,9 +1,9 @@
 """Elastic forces of tetrahedra: load values, call the law, store corner forces.
 
 The lanes of a block run in one loop that reads fields and writes only local arrays. LLVM's loop vectoriser
-then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). It has
-two requirements. The loop must not write to a field, because the next lane could read the same memory. And
-index arithmetic must provably not overflow, which masking by `BLOCK_BITS` ensures.
+then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). The
+vectoriser has two requirements. The loop must not write to a field, because the next lane could read the same
+memory. Index arithmetic must provably not overflow, which the mask `BLOCK_BITS` ensures.
 """
 
 from taichi_soft.core.constants import LANES
@@ -14,7 +14,7 @@ from taichi_soft.elements.laws.damping import tet_mean_damping_forces
 from taichi_soft.elements.laws.force_model import flipped_forces, upright_forces
 
 BLOCK_BITS = (1 << 22) - 1
-"""Mask that leaves every block number unchanged: memory cannot hold its 33 million tetrahedra."""
+"""Mask for block numbers. It changes no block number, because memory cannot hold 33 million tetrahedra."""
 
 
 @ti.func
@@ -96,7 +96,7 @@ def _flipped_forces_of(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def lane_forces(state: ti.template(), model: ti.template(), block, lane):
-    """Forces of one tetrahedron on its corners [N], flipped or not."""
+    """Forces of one tetrahedron on its corners [N]. The tetrahedron can be flipped."""
     f0, f1, f2, f3, volume6 = _upright_forces_of(state, model, block, lane)
     if ti.static(model.repairs_flips):
         if volume6 < 0.0:
@@ -126,7 +126,7 @@ def _compute_block_forces(
             g1[lane, i] = f1[i]
             g2[lane, i] = f2[i]
             g3[lane, i] = f3[i]
-        # Also written, because gaps in the rows would prevent vector stores.
+        # The zeros are also written, because gaps in the rows would prevent vector stores.
         g0[lane, 3] = 0.0
         g1[lane, 3] = 0.0
         g2[lane, 3] = 0.0
@@ -159,7 +159,7 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                # A variable for the selected matrix would be slow: Taichi would copy it for every lane.
+                # Taichi would copy the selected matrix to a variable for every lane, so there is no variable.
                 force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
                 # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force

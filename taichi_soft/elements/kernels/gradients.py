@@ -1,4 +1,4 @@
-"""Stiffness of a body at its present positions, for each element, or as blocks for conjugate gradients."""
+"""Kernels for the stiffness of a body at its present positions, by element or as blocks of a matrix."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
@@ -15,7 +15,7 @@ from taichi_soft.elements.kernels.linear_system import (
 
 @ti.kernel
 def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.types.ndarray(ndim=3)):
-    """Write the exact - d f_i / d x_j of every tetrahedron of the first body, (m, 12, 12) [N/m]."""
+    """Write the exact stiffness -df/dx of every tetrahedron of the first body, (m, 12, 12) [N/m]."""
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = t // LANES, t % LANES
@@ -30,7 +30,7 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
 
 @ti.kernel
 def compute_bond_stiffness(state: ti.template(), law: ti.template(), out: ti.types.ndarray(ndim=3)):
-    """Write - d f_p / d p of every edge of the first body, exact for fixed normals, (k, 3, 3) [N/m]."""
+    """Write the exact result of `bond_stiffness` for every edge of the first body, (k, 3, 3) [N/m]."""
     ti.loop_config(serialize=True)
     for e in range(out.shape[0]):
         columns = bond_stiffness(state, law, e, False)
@@ -53,7 +53,7 @@ def compute_volume_pull(
 
 @ti.kernel
 def compute_system_stiffness(state: ti.template(), program: ti.template()):
-    """Fill the blocks of the first body with its projected stiffness, without masses and damping."""
+    """Set the blocks of the first body to its projected stiffness, without masses and damping."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         clear_system(state, 0)

@@ -1,10 +1,10 @@
 """System matrix of implicit Euler, M + h D + h^2 K (eq. 3.26), in 3x3 blocks for each particle and edge.
 
-K = - df/dx and D = - df/dv, both projected to be positive semi-definite. Only particles that share an edge
+K = - df/dx and D = - df/dv are both projected to be positive semi-definite. Only particles that share an edge
 interact, so every law fills the same blocks, and a product with the matrix is one pass over the edges. The
 rows of K and D sum to zero, so a product needs only `particle_inertia` and the velocity differences along
-edges. Summing stiff blocks times a velocity common to all particles would leave only rounding errors. Only
-the preconditioner uses the diagonal blocks.
+edges. If all particles have the same velocity, the products of stiff blocks and velocities would cancel and
+leave only rounding errors. Only the preconditioner uses the diagonal blocks.
 """
 
 from taichi_soft.core.constants import LANES
@@ -33,7 +33,7 @@ from taichi_soft.elements.laws.springs import along, spring_tension
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
 EDGES = ((0, 0, 1), (1, 0, 2), (2, 0, 3), (3, 1, 2), (4, 1, 3), (5, 2, 3))
-"""For each of the six edges of a tetrahedron: its index in `state.tet_edges`, and its two corners."""
+"""Six edges of a tetrahedron: index of the edge in `state.tet_edges`, first corner and second corner."""
 
 
 @ti.func
@@ -49,7 +49,7 @@ def clear_system(state: ti.template(), body):
 
 @ti.func
 def _add_pair(state: ti.template(), e, columns):
-    """Add the stiffness or damping between the ends of an edge to their blocks, given as columns."""
+    """Add a matrix to the blocks of both ends of an edge, and subtract it from the block of the edge."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
     state.particle_block[p] = state.particle_block[p] + block
@@ -59,7 +59,7 @@ def _add_pair(state: ti.template(), e, columns):
 
 @ti.func
 def _add_corner_pair(state: ti.template(), e, first, columns):
-    """Add a block of a tetrahedron to an edge; the row of the block belongs to particle `first`."""
+    """Add a tetrahedron's block for two corners to their edge. The block's rows are for particle `first`."""
     block = ti.Matrix.cols([columns[0], columns[1], columns[2]])
     if state.edge_vertices[e][0] != first:
         block = block.transpose()
@@ -68,7 +68,7 @@ def _add_corner_pair(state: ti.template(), e, first, columns):
 
 @ti.func
 def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, projected: ti.template()):
-    """Compute the arguments of `corner_stiffness` for one tetrahedron: rows of its corners, and `element`.
+    """Compute arguments of `corner_stiffness` for a tetrahedron: rows of the four corners, and `element`.
 
     Args:
         projected: True makes the stiffness symmetric and positive semi-definite.
@@ -95,7 +95,11 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
 
 @ti.func
 def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.template()):
-    """- d f_i / d x_j of two corners [N/m], as columns, from the results of `tet_stiffness`."""
+    """Negative derivative of the force on corner i by the position of corner j [N/m], as columns.
+
+    Args:
+        gi, gj, element: rows of the two corners, and `element`, from `tet_stiffness`.
+    """
     if ti.static(model.is_anisotropic and not model.has_energy and not projected):
         return rotating_pair_stiffness(model, element[0], gi, gj, element[2])
     elif ti.static(model.is_anisotropic):
@@ -106,7 +110,7 @@ def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.templa
 
 @ti.func
 def row_of(rows, i):
-    """Row i of a matrix (4, 3) as a vec3. The index i need not be known at compile time."""
+    """Row i of a matrix (4, 3), as a vec3. The index i can be unknown at compile time."""
     return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
 
 
@@ -116,7 +120,7 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         g, element = tet_stiffness(state, model, block, lane, True)
-        # A run-time loop over pairs of corners: ten unrolled copies would dominate the compile time.
+        # The loops over pairs of corners are not unrolled: ten copies would dominate the compile time.
         rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
         for i in range(4):
             p = state.tet_vertices[(block * 4 + i) * LANES + lane]
@@ -132,9 +136,9 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
 
 @ti.func
 def volume_pull(state: ti.template(), t):
-    """Gradients g of V / V0 at the four corners of a tetrahedron, and the pull w on each corner per dV / V0.
+    """Return the gradients g of V / V0 [1/m] and the vectors w [N] of the corners of a tetrahedron.
 
-    The force on the corners is -w dV / V0, so the stiffness is the outer product of w and g.
+    The force on a corner is -w dV / V0. The stiffness is therefore the outer product of w and g.
     """
     block, lane = t // LANES, t % LANES
     v = particles_of(state, block, lane)
@@ -148,9 +152,10 @@ def volume_pull(state: ti.template(), t):
 
 @ti.func
 def _add_volume_stiffness(state: ti.template(), body, scale):
-    """Add the stiffness of tetrahedra that pull their edges together, as the positive part of w g^T.
+    """Add the stiffness of tetrahedra that pull the ends of their edges together.
 
-    The symmetric part of w g^T has the eigenvalues (w.g +- |w||g|) / 2. The positive one belongs to the
+    The stiffness of a tetrahedron is w g^T (`volume_pull`), of which only the positive part is added. The
+    symmetric part of w g^T has the eigenvalues (w.g +- |w||g|) / 2. The positive eigenvalue belongs to the
     direction w/|w| + g/|g|.
     """
     blocks = state.body_blocks[body]
@@ -177,7 +182,10 @@ def _add_volume_stiffness(state: ti.template(), body, scale):
 
 @ti.func
 def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.template()):
-    """- d f_p / d p of a bond with a fixed normal [N/m], as columns; d f_p / d q is the opposite."""
+    """Negative derivative of the force on a bond's first end by the position of this end [N/m], as columns.
+
+    The normal of the bond is fixed. The derivative by the position of the second end is the opposite.
+    """
     r, n, _ = stored_frame_of(state, law, e)
     constants = state.edge_bond[e]
     if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
@@ -216,7 +224,7 @@ def add_stiffness(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def bond_damping_matrix(state: ti.template(), law: ti.template(), e):
-    """- d f_p / d v_p of the damping of an edge [N s/m], as columns."""
+    """Negative derivative of the damping force on an edge's first end by its velocity [N s/m], as columns."""
     _, n, compared = stored_frame_of(state, law, e)
     zero = state.edge_damping[e] * 0.0
     c0, c1, c2 = along_and_across(n, state.edge_damping[e], zero)
@@ -239,7 +247,7 @@ def _add_edge_damping(state: ti.template(), body, scale):
 
 @ti.func
 def _add_tet_damping(state: ti.template(), body, scale):
-    """Add `scale` times the damping d (I - 1/4) between the corners of each tetrahedron."""
+    """Add `scale` times the damping of each tetrahedron: `tet_damping` / 4 between each pair of corners."""
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
@@ -269,7 +277,7 @@ def add_damping(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def add_inertia(state: ti.template(), p, inertia):
-    """Add `inertia` [kg] to a particle: it resists any change of the particle's velocity."""
+    """Add `inertia` [kg] to a particle. The inertia resists any change of the particle's velocity."""
     state.particle_inertia[p] = state.particle_inertia[p] + inertia
     for i in ti.static(range(3)):
         state.particle_block[p][i, i] = state.particle_block[p][i, i] + inertia
@@ -287,7 +295,7 @@ def add_masses(state: ti.template(), body):
 
 @ti.func
 def add_edge_products(state: ti.template(), body, source: ti.template(), target: ti.template()):
-    """Add the edge blocks (K and D) times `source` to `target`, for the particles of one body."""
+    """Multiply the edge blocks (K and D) of one body by `source`, and add the product to `target`."""
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]

@@ -1,4 +1,4 @@
-"""Stress of tetrahedra: at their present positions, for checks in every step, or for given deformations."""
+"""Kernels for the stress of tetrahedra, at their present positions or for an array of deformations."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen
@@ -9,7 +9,8 @@ from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, part
 from taichi_soft.elements.laws.force_model import cauchy_stress
 
 NO_LIMIT = 1e30
-"""Stress that means no limit [Pa]; not infinity, which fast-math compilers assume not to occur."""
+"""Value that turns a limit of stress off [Pa]. It is not infinity, because fast-math compilers assume that
+infinity does not occur."""
 
 
 @ti.func
@@ -30,10 +31,13 @@ def stress_of(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def _largest_principal(mean, squares, determinant):
-    """Largest eigenvalue of mean I + D, from the angle of the cubic's roots; error 1e-4 of the norm of D.
+    """Largest eigenvalue of mean I + D, from the trigonometric formula for cubics.
+
+    The error is 1e-4 of the norm of D.
 
     Args:
-        squares, determinant: D : D and det D of the traceless matrix D.
+        squares: D : D of the traceless matrix D.
+        determinant: det D.
     """
     radius = ti.sqrt(squares / 6.0)
     cosine = 0.5 * determinant / ti.max(radius * radius * radius, 1e-30)
@@ -43,7 +47,7 @@ def _largest_principal(mean, squares, determinant):
 
 @ti.func
 def _read_block(state: ti.template(), model: ti.template(), block, limit, first, out: ti.template()):
-    """Write the rows of `read_stress` for a block's tetrahedra, from row `first` on."""
+    """Write the rows of `read_stress` for the tetrahedra of a block, from row `first` of `out` on."""
     means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     determinants = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):  # vectorised over the lanes, see `elements.kernels.elastic`
@@ -72,13 +76,13 @@ def read_stress(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     out: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Write the von Mises stress of the tetrahedra in `blocks`, and their largest principal stress.
+    """Write the von Mises stress and the largest principal stress of the tetrahedra in `blocks`.
 
     Args:
-        limits: for each block, principal stress above which its direction is also written [Pa]; `NO_LIMIT`
+        limits: for each block, principal stress [Pa] above which its direction is also written; `NO_LIMIT`
             skips the principal stress.
-        out: (blocks times `LANES`, 5): von Mises stress and largest principal stress [Pa]; above the limit,
-            unit vector of its direction in world axes.
+        out: one row per tetrahedron, (blocks times `LANES`, 5): von Mises stress [Pa], largest principal
+            stress [Pa] and, if the principal stress is above the limit, a unit vector along it in world axes.
     """
     for i in range(blocks.shape[0]):
         block = blocks[i] & BLOCK_BITS
@@ -90,7 +94,7 @@ def read_stress(
 
 @ti.func
 def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.template()):
-    """The 3x3 part of matrix `t` that begins at a row and a column, as columns."""
+    """Return the 3x3 part of matrix `t` that begins at a row and a column, as columns."""
     a = ti.Vector([matrices[t, row + i, column] for i in ti.static(range(3))])
     b = ti.Vector([matrices[t, row + i, column + 1] for i in ti.static(range(3))])
     c = ti.Vector([matrices[t, row + i, column + 2] for i in ti.static(range(3))])
@@ -99,7 +103,7 @@ def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.templ
 
 @ti.func
 def _elasticity_from(model: ti.template(), stiffness: ti.template(), t):
-    """Elasticity in the form of `elasticity_of`, from a stiffness matrix (6, 6)."""
+    """Return the elasticity that belongs to stiffness matrix `t`, in the form of `elasticity_of`."""
     if ti.static(model.is_anisotropic):
         normal, mixed = _columns_of(stiffness, t, 0, 0), _columns_of(stiffness, t, 0, 3)
         return normal, mixed, _columns_of(stiffness, t, 3, 3)
@@ -114,10 +118,11 @@ def compute_stress(
     stiffness: ti.types.ndarray(dtype=ti.f64, ndim=3),
     out: ti.types.ndarray(dtype=ti.f64, ndim=3),
 ):
-    """Write the `cauchy_stress` of m deformation gradients F, (m, 3, 3) [Pa], in float64.
+    """Write the `cauchy_stress` of m deformation gradients F to `out`, (m, 3, 3) [Pa], in float64.
 
     Args:
-        stiffness: (m, 6, 6) [Pa], as `Stiffness.matrix`.
+        deformations: deformation gradients F, (m, 3, 3).
+        stiffness: matrices like `Stiffness.matrix`, (m, 6, 6) [Pa].
     """
     for t in range(deformations.shape[0]):
         F = _columns_of(deformations, t, 0, 0)

@@ -145,14 +145,14 @@ def element_model(
     flips: FlipsName | None = None,
     damping_model: DampingModelName = DampingModel.EDGE,
 ) -> ElementModel:
-    """Return the force model with the given choices.
+    """Return the force model of a law with options.
 
     Args:
         law: a key of `LAWS`, such as "neo_hookean".
-        strain: "linear" or "exact"; None: the law's default.
-        flips: "tolerant", "recover" or "off"; None: the law's default.
+        strain: "linear" or "exact"; None for the law's default.
+        flips: "tolerant", "recover" or "off"; None for the law's default.
         damping_model: "edge", the default, or "tet_mean".
-    Raises: OptionError for a name that is unknown or that the law does not support.
+    Raises: OptionError for an unknown name, or for an option that the law does not support.
     """
     if not isinstance(law, str) or law not in LAWS:
         raise OptionError(f"unknown law {law!r}: {choose_one_of(LAWS, law)}")
@@ -171,9 +171,9 @@ def element_model(
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
     """Return the name of the default law for a material and options.
 
-    "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial` and for options that only the
-    thesis's laws have; else "neo_hookean", because with it no body froze and every inverted body recovered
-    (`python -m lab drop-test --sweep`).
+    The default is "springs" for a `SpringMaterial`. It is "virial" for an `AnisotropicMaterial`, and for
+    options that only the laws of the thesis support. Otherwise it is "neo_hookean", because with this law no
+    body froze and every inverted body recovered (`python -m lab drop-test --sweep`).
     """
     if isinstance(material, SpringMaterial):
         return "springs"
@@ -183,9 +183,9 @@ def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsNa
 
 
 def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
-    """Return `model` adapted to a mesh and a material.
+    """Return `model`, adapted to a mesh and a material.
 
-    Raises: MeshError or MaterialError if the law does not support them.
+    Raises: MeshError if the law does not support the mesh; MaterialError if it does not support the material.
     """
     law = model.law
     if not isinstance(mesh, BodyMesh):

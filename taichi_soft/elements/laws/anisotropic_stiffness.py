@@ -1,8 +1,9 @@
 """Derivatives of an anisotropic tetrahedron's forces by its vertices, for implicit integration.
 
-The law of St. Venant-Kirchhoff involves no rotation. The laws of thesis chapter 6 do: with F = R U and
-S = C : eps(U), the forces are -V P g with P = R Q and Q = S cof(U). A change dF changes both U and R. With
-U = A diag(s) A^T and G = A^T R^T dF A,
+The law of St. Venant-Kirchhoff involves no rotation. The laws of thesis chapter 6 involve the rotation R of
+F = R U. With S = C : eps(U), Q = S cof(U) and P = R Q, the force on a vertex is -V P g. g is the gradient of
+the barycentric coordinate of the vertex. A change dF changes both U and R. With U = A diag(s) A^T and
+G = A^T R^T dF A,
 
     dU = A [(s_a G_ab + s_b G_ba) / (s_a + s_b)] A^T,    R^T dR = A [(G_ab - G_ba) / (s_a + s_b)] A^T.
 
@@ -35,7 +36,7 @@ MIN_VOLUME = 0.05
 
 @ti.func
 def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
-    """S = C : eps of the model's strain [Pa], as columns."""
+    """Stress S = C : eps in the axes of the rest shape [Pa], as columns, for the model's strain eps."""
     if ti.static(model.strain == Strain.EXACT):
         return anisotropic_stress(scaled_plus_identity(U, 1.0, -1.0), stiffness)
     else:
@@ -44,9 +45,10 @@ def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
 
 @ti.func
 def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
-    """Arguments that replace F and S of `pair_stiffness` for a law of chapter 6: positive semi-definite.
+    """Return the arguments F and `stress` of `pair_stiffness`, as columns, for a law of thesis chapter 6.
 
-    For an inverted tetrahedron with `flips="recover"`, they contain only the modulus of `recovering_piola`.
+    With these arguments, the stiffness is positive semi-definite. For an inverted tetrahedron with
+    `flips="recover"`, these arguments contain only the modulus of `recovering_piola`.
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -69,10 +71,12 @@ def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
 
 @ti.func
 def rotating_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
-    """Exact - d f_i / d x_j of two vertices [N/m], as columns, for a law of chapter 6.
+    """Exact negative derivative of the force on vertex i by the position of vertex j [N/m], as columns.
+
+    The model must have a law of thesis chapter 6.
 
     Args:
-        gi, gj: as for `pair_stiffness`.
+        gi, gj: see `pair_stiffness`.
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -116,7 +120,7 @@ def _strain_change(model: ti.template(), U, dU):
 
 @ti.func
 def _parts(G, s):
-    """dU and R^T dR in the axes of U, as columns; for G see the top of this file."""
+    """Return dU and R^T dR in the axes of U, as columns. The top of this file defines G and the formulas."""
     least = 1e-9
     xy, xz, yz = ti.max(s.x + s.y, least), ti.max(s.x + s.z, least), ti.max(s.y + s.z, least)
     u_xy = (s.x * G[1].x + s.y * G[0].y) / xy
@@ -141,12 +145,13 @@ def _mixed_cofactor(M, N):
 
 @ti.func
 def pair_stiffness(F, gi, gj, stress, stiffness):
-    """- d f_i / d x_j of two vertices [N/m], as columns, for forces -V F S g_i with S = `green_stress`.
+    """Negative derivative of the force -V F S g_i by the position of vertex j [N/m], as columns.
 
     The matrix is F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of vertex i to strain.
     Args:
-        gi, gj: rows of A^-1 of the vertices, times the root of the rest volume.
-        stress: S, or the part of S to include, as columns.
+        gi, gj: rows of A^-1 that belong to the vertices, times the square root of the rest volume.
+        stress: S, the result of `green_stress`, or the part of S to include, as columns.
+        stiffness: C, see `anisotropic_stress`.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     Ti, Tj = _shear_of(gi), _shear_of(gj)
@@ -163,7 +168,11 @@ def pair_stiffness(F, gi, gj, stress, stiffness):
 
 @ti.func
 def _shear_of(g):
-    """Matrix from a displacement to engineering shear yz, xz, xy, as columns, for a vertex with row `g`."""
+    """Matrix that maps a displacement of a vertex to engineering shear yz, xz, xy, as columns.
+
+    Args:
+        g: row of A^-1 that belongs to the vertex, see `pair_stiffness`.
+    """
     zero = g.x * 0.0
     return ti.Vector([zero, g.z, g.y]), ti.Vector([g.z, zero, g.x]), ti.Vector([g.y, g.x, zero])
 

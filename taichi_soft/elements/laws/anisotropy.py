@@ -1,7 +1,7 @@
 """Hooke's law for anisotropic materials (thesis eq. 2.25, chapter 7).
 
-The stiffness is given in the axes of the rest shape, so the law needs the strain in these axes too, and thus
-the rotation R of F = U R as well as the stretch U. Isotropic laws do not need R.
+The stiffness is defined in the axes of the rest shape, so the law needs the strain in the same axes. For this
+strain, the law needs the rotation R of F = U R in addition to the stretch U. Isotropic laws do not need R.
 """
 
 from taichi_soft.core.math.polar import orthogonal_factor
@@ -23,8 +23,9 @@ def anisotropic_stress(strain, stiffness):
 
     Args:
         strain: symmetric, as columns.
-        stiffness: C in Voigt's order with engineering shear, as three matrices of columns: normal stress
-            from normal strain, normal stress from shear strain, shear stress from shear strain.
+        stiffness: C in Voigt's order with engineering shear [Pa], as three 3x3 matrices of columns. The first
+            matrix maps normal strain to normal stress, the second maps shear strain to normal stress, and the
+            third maps shear strain to shear stress.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     e = ti.Vector([strain[0].x, strain[1].y, strain[2].z])
@@ -42,7 +43,7 @@ def green_stress(F, stiffness):
 
 @ti.func
 def turned_stress(model: ti.template(), F, stiffness):
-    """Stress R (C : R^T eps R) R^T of the model's strain [Pa], as columns.
+    """Stress R (C : R^T eps R) R^T in world axes [Pa], as columns, for the model's strain eps.
 
     In a mirrored tetrahedron, R includes the reflection, so the stress equals the stress of the mirror image.
     """
@@ -56,7 +57,7 @@ def turned_stress(model: ti.template(), F, stiffness):
 
 @ti.func
 def between(M, columns):
-    """M N M^T as columns, for N given as `columns`."""
+    """Return M N M^T, as columns. N is the matrix `columns`."""
     return product(product(M, columns), transposed(M))
 
 

@@ -1,10 +1,10 @@
 """CMPM with the plane that best fits the particles around an edge (thesis section 4.4.2).
 
-For more than three particles, the plane is a least-squares fit; for three, the same formula gives the plane
-through them. If there are two, the centre of the edge is the third point. Such planes are rarely
-perpendicular to their edge. As in CMPM2, the normal is therefore compared with its rest direction as carried
-by the tetrahedra. Implicit Euler keeps the normal fixed and compares it with the edge itself
-(`bond_stiffness`).
+For more than three particles, the plane is a least-squares fit. For three particles, the same formula gives
+the plane through them. For two particles, the centre of the edge is the third point. Such planes are rarely
+perpendicular to their edge. As in CMPM2, the law therefore compares the normal with the carried direction:
+the normal at rest, transformed by the tetrahedra. Implicit Euler keeps the normal fixed and compares the
+normal with the edge itself (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from taichi_soft.meshing import EdgeRings, TetMesh
 
 @ti.func
 def plane_normal(count, total, squares, r):
-    """Unit normal of the plane that best fits a set of points, pointing to the side of `r`.
+    """Unit normal of the plane that best fits a set of points. Its component along `r` is not negative.
 
     Args:
         count: number of points.
@@ -47,7 +47,7 @@ def plane_normals(rings: EdgeRings) -> Floats:
     ends = mesh.vertices[mesh.edges]
     offset = mesh.vertices[vertex] - ends[edge].mean(axis=1)
     start = np.searchsorted(edge, np.arange(len(mesh.edges)))
-    count = np.maximum(np.bincount(edge), 3)[:, None]  # counts the centre of the edge if there are two
+    count = np.maximum(np.bincount(edge), 3)[:, None]  # if only two, the edge's centre is the third point
     total = np.add.reduceat(offset, start, axis=0)
     squares = np.add.reduceat(offset[:, :, None] * offset[:, None, :], start, axis=0)
     _, axes = np.linalg.eigh(squares - total[:, :, None] * (total / count)[:, None, :])
@@ -56,10 +56,11 @@ def plane_normals(rings: EdgeRings) -> Floats:
 
 
 def carried_by_ring(rings: EdgeRings, normals: Floats) -> tuple[Floats, Floats]:
-    """Weights (s,) of each particle around an edge, and (s,) of the edge's far end, in the carried direction.
+    """Return the weights from which the carried direction of an edge is computed.
 
-    Each row belongs to a row of `rings.neighbours`. The weighted sum over the rows of an edge is the rest
-    direction in `normals` as carried by the tetrahedra (`carried_direction`).
+    The carried direction is the direction at rest in `normals`, transformed by the tetrahedra
+    (`carried_direction`). It is the weighted sum over the rows of an edge in `rings.neighbours`.
+    Returns: weight of the particle of each row, (s,), and weight of the edge's second end, (s,).
     """
     far, one, other = carried_direction(rings, normals).T
     edge, vertex = rings.neighbours
@@ -73,7 +74,7 @@ def carried_by_ring(rings: EdgeRings, normals: Floats) -> tuple[Floats, Floats]:
 
 
 def best_fitting_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Return the bonds of a mesh. A ring row has a particle, and the weights of `carried_by_ring`."""
+    """Return the bonds of a mesh. Each ring row has a particle and two weights from `carried_by_ring`."""
     rings = require_tets(mesh, material, "best_fitting_plane")
     normals = plane_normals(rings)
     weight, far_weight = carried_by_ring(rings, normals)

@@ -1,4 +1,4 @@
-"""Constants of every edge of a body at rest for a pairwise law, computed in NumPy by the law's file."""
+"""Constants of the edges of a body at rest for pairwise laws. The file of each law computes them in NumPy."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Ints = NDArray[np.int64]
 
 
 class Ring(Enum):
-    """Contents of the rows of an edge's ring, and their use while the body deforms."""
+    """Contents of the rows in the ring of an edge. The laws read these rows while the body deforms."""
 
     NONE = "none"  # no rows: a spring depends only on its two ends
     EXPANSION = "expansion"  # tetrahedra, whose change of volume pulls or pushes along the edge
-    VORONOI = "voronoi"  # corners of the Voronoi face, each in barycentric coordinates of four particles
+    VORONOI = "voronoi"  # corners of the Voronoi face, in barycentric coordinates of four particles
     SUBFACES = "subfaces"  # the two particles that span a barycentric subface
-    PLANE = "plane"  # particles, to which a plane is fitted
-    HALVES = "halves"  # particles, whose ring is split into halves twice
-    TILT = "tilt"  # particles, whose rise tilts a plane
+    PLANE = "plane"  # particles around the edge, to which a plane is fitted
+    HALVES = "halves"  # particles around the edge; their ring is split into halves twice
+    TILT = "tilt"  # particles around the edge; their displacement along the edge tilts a plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +31,19 @@ class Bonds:
     """Constants and ring of every edge of a mesh, in the order and direction of `mesh.edges`.
 
     Attributes:
-        constants: (k, 4): length at rest [m], stiffness along and across the edge [N/m], damping across it
-            [N s/m]. Zero if an edge is not a bond. In laws that compare directions, the length is 1 and the
-            stiffness in [N]. In laws with expansion, the third column is the area of the edge [m^2].
-        ring_edge: (r,) edge of each row of the rings, ascending.
+        constants: (k, 4): length at rest [m], stiffness along and across the edge [N/m], damping across the
+            edge [N s/m]. All are zero if an edge is not a bond. In laws that compare directions, the length
+            is 1 and the unit of stiffness is [N]. In laws with expansion, the third column is the area of the
+            edge [m^2].
+        ring_edge: (r,) edge to which each ring row belongs, in ascending order.
         ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 in unused columns.
         ring_weights: (r, 4), with a meaning that depends on the law.
-        normals: (k, 3) unit normal at rest of the plane that separates tension from shear; NaN without one.
-        masses: (n,) [kg], if the law distributes mass differently from the mesh; else None.
-        expansion_modulus: (m,) [Pa], pressure of each tetrahedron on its edges per dV / V0, or None.
+        normals: (k, 3) unit normal at rest of the plane that separates tension from shear; NaN for an edge
+            without a plane; None for laws without planes.
+        masses: (n,) mass of each particle [kg], if the law distributes mass differently from the mesh; else
+            None.
+        expansion_modulus: (m,) pressure of each tetrahedron on its edges per dV / V0 [Pa]; None for laws
+            without expansion.
     """
 
     constants: Floats
@@ -60,7 +64,7 @@ class Bonds:
 
 
 def columns(*values: Floats | float, count: int) -> Floats:
-    """Stack the given columns, padded with zeros on the right, (count, 4)."""
+    """Return an array, (count, 4), whose first columns are `values`. The other columns are zero."""
     rows = np.zeros((count, 4))
     for i, value in enumerate(values):
         rows[:, i] = value
@@ -68,7 +72,7 @@ def columns(*values: Floats | float, count: int) -> Floats:
 
 
 def member_columns(*values: Ints, count: int) -> Ints:
-    """Stack the given columns, padded with -1 on the right, (count, 4)."""
+    """Return an array, (count, 4), whose first columns are `values`. The other columns are -1."""
     rows = np.full((count, 4), -1, dtype=np.int64)
     for i, value in enumerate(values):
         rows[:, i] = value

@@ -1,8 +1,8 @@
-"""Continuum mechanics particle model: a spring along and one across each edge (thesis chapter 4).
+"""Continuum mechanics particle model (CMPM): springs along and across each edge (thesis chapter 4).
 
-A face of the Voronoi graph separates two particles. Its corners move with the tetrahedra that contain them.
-The normal of the deformed face splits the deformation of the edge into tension and shear. Implicit Euler
-keeps the normal fixed (`bond_stiffness`), as in thesis 4.2.
+A face of the Voronoi graph separates two particles. The corners of the face move with the tetrahedra that
+contain them. The normal of the deformed face splits the deformation of the edge into tension and
+shear. Implicit Euler keeps the normal fixed (`bond_stiffness`), as in thesis 4.2.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def direction_of(v):
 def bond_force(r, n, constants):
     """Force f_p = a/l (E (n.r - l) n + G m) on the first end of a bond [N], eq. 4.1 to 4.4; f_q = -f_p.
 
-    m = r - (n.r) n is the component of r across n, not normalised: at rest its length is zero.
+    m = r - (n.r) n is the component of r across n. It is not normalised, because its length at rest is zero.
     Args:
-        r: second end minus first [m].
+        r: second end minus first end [m].
         n: unit normal of the face between the ends, towards the second end; zero gives no force.
         constants: l [m], a E / l and a G / l [N/m] in x, y and z.
     """
@@ -38,11 +38,12 @@ def bond_force(r, n, constants):
 
 @ti.func
 def bond_damping(r, n, relative_velocity, tensile, shear):
-    """Damping force on the first end of a bond [N], eq. 4.5, along n, and along m if the bond is sheared.
+    """Damping force on the first end of a bond [N], eq. 4.5.
 
-    The force along m also damps the rotation of sheared bodies.
+    The force acts along n and, if the bond is sheared, along the shear direction m. The part along m also
+    damps the rotation of sheared bodies.
     Args:
-        r, n: as for `bond_force`; r can also be the direction that the law compares with n.
+        r, n: see `bond_force`. r can also be the direction that the law compares with n.
         relative_velocity: velocity of the second end relative to the first [m/s].
         tensile, shear: b_n and b_m [N s/m].
     """
@@ -52,13 +53,13 @@ def bond_damping(r, n, relative_velocity, tensile, shear):
 
 @ti.func
 def shear_direction(r, n):
-    """Unit vector along the component of r across n; zero if that is round-off, below 1e-6 of r."""
+    """Unit vector along the component of r across n; zero if the component is round-off, below 1e-6 of r."""
     m = r - n * n.dot(r)
     return ti.select(m.dot(m) > 1e-12 * r.dot(r), direction_of(m), m * 0.0)
 
 
 def moduli(rings: EdgeRings, material: Material) -> tuple[Floats, Floats, Floats]:
-    """Mean E and G [Pa] and shear damping b_m [N s/m] of every edge, (k,) each."""
+    """Return the mean E [Pa], G [Pa] and shear damping b_m [N s/m] around every edge, (k,) each."""
     count = len(rings.mesh.tets)
     shear = "lame_mu" if material.shear_modulus is None else "shear_modulus"
     damping = "damping" if material.shear_damping is None else "shear_damping"
@@ -74,8 +75,8 @@ def moduli(rings: EdgeRings, material: Material) -> tuple[Floats, Floats, Floats
 def cmpm_bonds(mesh: TetMesh, material: Material) -> Bonds:
     """Return the bonds of a mesh, across the clipped faces of its Voronoi graph.
 
-    A ring row is a corner of a face in barycentric coordinates; the first corner is repeated at the end. A
-    particle has the mass of its Voronoi cell (section 4.1).
+    Each ring row is a corner of a face in barycentric coordinates. The last row of a face repeats its first
+    corner. Each particle has the mass of its Voronoi cell (section 4.1).
     Raises: MeshError if the mesh is not Delaunay.
     """
     graph = voronoi_graph(mesh)

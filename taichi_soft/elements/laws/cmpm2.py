@@ -1,9 +1,9 @@
 """CMPM2: barycentric subfaces instead of the Voronoi graph (thesis section 4.4.1).
 
-The normal n of an edge's subfaces is compared with r, the rest direction of n as carried by the tetrahedra:
-eq. 4.9 (with r - n^, of unit length) and 4.10. If several tetrahedra share an edge, r is the mean of their
-directions, weighted by the areas of their subfaces. Implicit Euler keeps n fixed, and uses the edge itself as
-r (`bond_stiffness`).
+The law compares the unit normal n of an edge's subfaces with the carried direction r (eq. 4.9 and 4.10). r is
+the normal at rest, transformed by the tetrahedra. If several tetrahedra share an edge, r is the mean of their
+directions, weighted by the areas of their subfaces. Eq. 4.9 prints r - n without normalising n. Implicit
+Euler keeps n fixed, and uses the edge itself as r (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -24,17 +24,19 @@ def subface(center, a, b):
 
     Args:
         center: centre of the edge [m].
-        a, b: the other two vertices of the tetrahedron, counterclockwise against the edge's direction [m].
+        a, b: the other two vertices of the tetrahedron, counterclockwise if seen from the second end [m].
     """
     return (a - center).cross(b - center) / 12.0
 
 
 def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
-    """Weights (r, 3) of an edge's far end and of the two sides of a subface in the carried direction.
+    """Return the weights from which the carried direction of an edge is computed, (r, 3).
 
-    In each tetrahedron, a direction d at rest becomes F d = sum (A^-1 d)_i (x_i - x_0) (eq. 6.3), here with
-    the edge's first end as x_0. Summed over the rows of an edge, the weights give the weighted
-    mean over its tetrahedra.
+    The weights are those of the edge's second end and of the two sides of each subface.
+
+    A tetrahedron transforms a direction d at rest to F d = sum (A^-1 d)_i (x_i - x_0) (eq. 6.3). Here, x_0 is
+    the edge's first end. The sum over the rows of an edge is the carried direction: the mean of F d over the
+    tetrahedra, weighted by the areas of their subfaces.
     """
     mesh = rings.mesh
     x = mesh.vertices
@@ -45,14 +47,20 @@ def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
 
 
 def require_tets(mesh: TetMesh, material: Material, law: str) -> EdgeRings:
-    """Return the edge rings of a mesh. Raises: MeshError if it is not a TetMesh with a Material."""
+    """Return the edge rings of a mesh.
+
+    Raises: MeshError if `mesh` is not a TetMesh, or `material` is not a Material.
+    """
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError(f"law {law!r} needs tetrahedra and a Material")
     return EdgeRings.of(mesh)
 
 
 def cmpm2_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Return the bonds of a mesh. A ring row has the sides of a subface and `carried_direction` weights."""
+    """Return the bonds of a mesh.
+
+    Each ring row has the two sides of a subface, and the weights from `carried_direction`.
+    """
     rings = require_tets(mesh, material, "cmpm2")
     normals = rings.sum(rings.area_vectors)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -5,16 +5,16 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def edge_damping_force(r, relative_velocity, damping):
-    """Damping force on the first end of an edge [N]; the opposite acts on the second end (thesis eq. 3.9).
+    """Damping force on the first end of an edge [N] (thesis eq. 3.9).
 
-    It damps only motion along the edge, so a body that rotates or translates rigidly keeps its motion. An
-    edge of zero length has no direction and no damping.
+    The opposite force acts on the second end. The force damps only motion along the edge, so a body that
+    rotates or translates rigidly keeps its motion. An edge of zero length has no direction and no damping.
     Args:
         r: second end minus first end [m].
         relative_velocity: velocity of the second end relative to the first [m/s].
         damping: b [N s/m].
     """
-    # (n.dv) n with n = r / |r| is r (r.dv) / |r|^2, which needs no root.
+    # (n.dv) n with n = r / |r| is r (r.dv) / |r|^2, which needs no square root.
     return r * (damping * r.dot(relative_velocity) / (r.dot(r) + 1e-30))
 
 

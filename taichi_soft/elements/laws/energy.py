@@ -1,8 +1,8 @@
 """Vertex forces from the derivative of an energy with respect to the deformation.
 
-The energy of a tetrahedron is its volume at rest V0 times a density psi(F), and F = B A^-1 (thesis eq. 6.3)
-is linear in the vertices: f_i = -V0 P r_i, with P = d psi / d F (the first Piola-Kirchhoff stress) and r_i
-the i-th row of A^-1.
+The energy of a tetrahedron is its volume at rest V0 times a density psi(F). F = B A^-1 (thesis eq. 6.3) is
+linear in the vertices. The force on vertex i is therefore f_i = -V0 P r_i. P = d psi / d F is the first
+Piola-Kirchhoff stress, and r_i is the i-th row of A^-1.
 """
 
 from taichi_soft.core.math.tensors import determinant, times

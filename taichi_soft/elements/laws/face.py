@@ -1,7 +1,7 @@
-"""Vertex forces from stress by the faces of a tetrahedron (thesis section 6.2).
+"""Vertex forces from the stress on the faces of a tetrahedron (thesis section 6.2).
 
-The force sigma n a of eq. 6.8 on each face is divided equally among its three vertices. The material responds
-with the opposite force.
+The force sigma n a of eq. 6.8 on a face is divided equally among the three vertices of the face. The material
+responds with the opposite force.
 """
 
 from taichi_soft.core.math.tensors import times

@@ -1,11 +1,11 @@
 """Derivatives of a tetrahedron's forces by its vertices, for implicit integration.
 
-The derivative of an isotropic law decouples in the axes of the singular value decomposition F = U diag(s)
-V^T: it has a 3x3 block for the stretches, and for each pair of axes a number for their shear, (p_a -
-p_b)/(s_a - s_b), and a number for their rotation, (p_a + p_b)/(s_a + s_b). Smith, de Goes and Kim 2019,
-Analytic eigensystems for isotropic distortion energies, show this for laws with an energy. It also holds for
-other laws, but their block is not symmetric. Projection makes the block symmetric and removes all negative
-values: the system is then positive definite for every pose, which conjugate gradients need.
+The derivative of an isotropic law decouples in the axes of the singular value decomposition
+F = U diag(s) V^T. It consists of a 3x3 block for the stretches, and of two numbers for each pair of axes:
+(p_a - p_b)/(s_a - s_b) for shear, and (p_a + p_b)/(s_a + s_b) for rotation. Smith, de Goes and Kim 2019,
+Analytic eigensystems for isotropic distortion energies, show this for laws with an energy. The derivatives of
+other laws decouple too, but their block is not symmetric. Projection makes the block symmetric and removes
+all negative values. The system is then positive definite for every pose, as conjugate gradients require.
 """
 
 from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
@@ -36,13 +36,14 @@ def positive_part(columns):
 
 @ti.func
 def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template()):
-    """Half sum alpha and half difference beta of a pair's shear and rotation stiffness [Pa].
+    """Return alpha and beta of a pair of axes [Pa]: half the sum, and half the difference, of the stiffness
+    against shear and the stiffness against rotation.
 
     Args:
-        sa, sb: stretches, sa >= |sb| as `signed_svd` orders them.
-        pa, pb: principal stress along them [Pa].
-        along: limit of the shear stiffness for equal stretches [Pa].
-        largest: upper limit of the rotation stiffness [Pa], which near sa = -sb is a quotient of round-off.
+        sa, sb: stretches along the two axes, with sa >= |sb| as `signed_svd` orders them.
+        pa, pb: principal stresses along the two axes [Pa].
+        along: shear stiffness in the limit of equal stretches [Pa].
+        largest: upper limit of the rotation stiffness [Pa], which is a quotient of round-off near sa = -sb.
     """
     gap, total = sa - sb, sa + sb
     shear = along
@@ -57,9 +58,9 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
 @ti.func
 def weighted_rows(rest_inverse):
-    """Row of A^-1 of each vertex (four vec3), times the root of the rest volume.
+    """Return the row of A^-1 for each vertex, times the square root of the rest volume, as four vec3.
 
-    The rows map vertex displacements to F. They are zero for padding lanes.
+    The rows of A^-1 map displacements of the vertices to changes of F. For padding lanes, all rows are zero.
     """
     root = 1.0 / ti.sqrt(6.0 * ti.max(determinant(rest_inverse), 1e-37))
     rows = transposed(rest_inverse)
@@ -69,9 +70,11 @@ def weighted_rows(rest_inverse):
 
 @ti.func
 def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.template()):
-    """Compute the arguments of `stiffness_block`: `weighted_rows` in the axes of V; and U, M, alpha and beta.
+    """Compute the arguments of `stiffness_block`: rows in the axes of V, and the tuple (U, M, alpha, beta).
 
     Args:
+        rows: result of `weighted_rows`.
+        elasticity: lambda and mu [Pa].
         projected: True makes the stiffness symmetric and positive semi-definite.
     """
     lame_lambda, lame_mu = elasticity[0], elasticity[1]
@@ -98,7 +101,7 @@ def _in_axes(V, g):
 
 @ti.func
 def stiffness_block(U, gi, gj, M, alpha, beta):
-    """- d f_i / d x_j of two vertices of a tetrahedron [N/m], as columns.
+    """Negative derivative of the force on vertex i by the position of vertex j [N/m], as columns.
 
     Args:
         gi, gj: rows of the two vertices from `element_stiffness`.

@@ -64,7 +64,7 @@ class ElementModel:
 
 @ti.func
 def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
-    """Hooke's stress of the model's strain, or of linear strain if the model has none [Pa], as columns."""
+    """Hooke's stress for the model's strain, or for linear strain if the model has none [Pa], as columns."""
     strain = strains.exact_strain(F) if ti.static(model.strain == Strain.EXACT) else strains.linear_strain(F)
     return hooke_stress(strain, lame_lambda, lame_mu)
 
@@ -82,11 +82,12 @@ def piola_of(model: ti.template(), F, elasticity):
 def cauchy_stress(model: ti.template(), F, elasticity):
     """Cauchy stress of a deformation by the model's law, force per deformed area [Pa], as columns.
 
-    The stress is in world axes. For laws along edges, which have no stress, it is Hooke's stress of linear
-    strain. An inverted tetrahedron has the stress of its mirror image. But if an energy restores it, the
-    forces are divided by its negative volume, because compression would otherwise count as tension.
+    The stress is in world axes. Laws along edges compute no stress; the result for them is Hooke's stress of
+    linear strain. An inverted tetrahedron has the stress of its mirror image. But if an energy restores the
+    tetrahedron, the forces are divided by its negative volume, because compression would otherwise count as
+    tension.
     Args:
-        elasticity: as for `elastic_forces`.
+        elasticity: see `elastic_forces`.
     """
     if ti.static(model.has_energy):
         J = determinant(F)
@@ -106,7 +107,7 @@ def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
     """Elastic forces on the four vertices of a tetrahedron [N] by the model's law.
 
     Args:
-        elasticity: lambda and mu [Pa], or a stiffness as for `anisotropic_stress`.
+        elasticity: lambda and mu [Pa], or the stiffness for `anisotropic_stress`.
     """
     if ti.static(model.has_energy):
         return energy_forces(piola_of(model, F, elasticity), rest_inverse)
@@ -124,14 +125,14 @@ def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticit
     Args:
         x0, x1, x2, x3: deformed vertices, vec3 [m].
         rest_inverse: A^-1 of thesis eq. 6.1, as columns [1/m].
-        elasticity: as for `elastic_forces`.
+        elasticity: see `elastic_forces`.
     """
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
     f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, elasticity)
     volume6 = determinant(B)
     if ti.static(model.mirrors_forces):
-        # For the mirrored shape to be at rest too, use the area vectors of a right-handed tetrahedron.
+        # The area vectors of a right-handed tetrahedron make the mirrored shape a rest shape too.
         mirror = ti.select(volume6 < 0.0, -1.0, 1.0)
         f0, f1, f2, f3 = f0 * mirror, f1 * mirror, f2 * mirror, f3 * mirror
     return f0, f1, f2, f3, volume6

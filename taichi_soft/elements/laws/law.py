@@ -13,31 +13,31 @@ ANISOTROPIC = ("stiffness", "frame", "density", "damping")
 
 @dataclass(frozen=True)
 class StressLaw:
-    """Hooke's stress of a tetrahedron, turned into forces on its vertices (thesis chapter 6)."""
+    """Law that converts Hooke's stress in a tetrahedron to forces on its vertices (thesis chapter 6)."""
 
     name: LawName
     source: str
     summary: str
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
-    strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # supported, the default first
+    strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # supported strains, the default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
-    parameters: tuple[str, ...] = SOLID  # constants of the material that it uses
+    parameters: tuple[str, ...] = SOLID  # constants of the material that the law uses
     keeps_energy: bool = False
-    takes_anisotropy: bool = True  # True if it also supports the parameters `ANISOTROPIC`
+    takes_anisotropy: bool = True  # True if the law also supports the parameters `ANISOTROPIC`
 
 
 @dataclass(frozen=True)
 class EnergyLaw:
-    """An elastic energy and its derivative, so that elastic deformation conserves energy."""
+    """Law whose forces are the derivative of an energy, so that elastic deformation conserves energy."""
 
     name: LawName
     source: str
     summary: str
     piola: Any  # ti.func (F columns, lambda, mu) -> d energy / d F, columns [Pa]
-    principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in principal axes, and derivatives
+    principal: Any  # ti.func (stretches vec3, lambda, mu) -> principal stress [Pa], derivatives as columns
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
-    flips: tuple[Flips, ...]  # exactly one, which follows from the energy
+    flips: tuple[Flips, ...]  # exactly one treatment, which follows from the energy
     parameters: tuple[str, ...] = SOLID
     keeps_energy: bool = True
     takes_anisotropy: bool = False
@@ -45,7 +45,7 @@ class EnergyLaw:
 
 @dataclass(frozen=True)
 class BondLaw:
-    """Forces between the two ends of each edge: the pairwise models of thesis chapters 3 to 5."""
+    """Law for forces between the two ends of each edge: the pairwise models of thesis chapters 3 to 5."""
 
     name: LawName
     source: str
@@ -60,7 +60,7 @@ class BondLaw:
 
     @property
     def takes_shear(self) -> bool:
-        """True if it uses the shear modulus and shear damping of a material."""
+        """True if the law uses the shear modulus and the shear damping of a material."""
         return "shear_modulus" in self.parameters
 
 

@@ -14,14 +14,15 @@ from taichi_soft.meshing import TetMesh
 def plane_angles(mesh: TetMesh, law: str) -> NDArray[np.float64]:
     """Return the angle at rest between each edge and the normal of its plane, (k,) [degrees].
 
-    It is NaN for edges without a bond.
+    The angle is NaN for edges without a bond.
 
-    The normal splits the strain of an edge into tension and shear: the larger the angle, the larger the part
-    of a tension that counts as shear. Voronoi faces and tilted planes are perpendicular by construction.
+    The normal splits the strain of an edge into tension and shear. If the angle is larger, a larger part of a
+    tension counts as shear. Voronoi faces and tilted planes are perpendicular to their edges by construction.
     Args:
         mesh: rest shape.
         law: name of a law of chapter 4, such as "cmpm2" or "best_fitting_plane".
-    Raises: OptionError for another law; MeshError if `mesh` is not a TetMesh, or not Delaunay for "cmpm".
+    Raises: OptionError for a law without planes; MeshError if `mesh` is not a TetMesh, or is not Delaunay for
+        "cmpm".
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")

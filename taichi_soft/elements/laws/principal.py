@@ -1,4 +1,4 @@
-"""Stress of isotropic laws in principal axes, and its derivatives, for the derivatives of forces.
+"""Stress of isotropic laws in principal axes, and derivatives of this stress, for the derivatives of forces.
 
 With F = U diag(s) V^T, every isotropic law has P = U diag(p(s)) V^T (Stomakhin et al. 2012, Energetically
 consistent invertible elasticity). In the laws of thesis chapter 6, p_a is sigma_a times the product of the
@@ -12,7 +12,10 @@ from taichi_soft.elements.laws.recovery import recovering_principal
 
 @ti.func
 def cofactors(s):
-    """Product of the other two stretches for each axis, and its derivatives by each stretch, as columns."""
+    """Return the product of the other two stretches for each axis, vec3.
+
+    Also return the derivatives of these products by the stretches, as columns.
+    """
     others = ti.Vector([s.y * s.z, s.x * s.z, s.x * s.y])
     zero = s.x * 0.0
     return others, (ti.Vector([zero, s.z, s.y]), ti.Vector([s.z, zero, s.x]), ti.Vector([s.y, s.x, zero]))
@@ -28,7 +31,12 @@ def axis_of(s, c: ti.template()):
 
 @ti.func
 def hooke_principal(model: ti.template(), s, lame_lambda, lame_mu):
-    """Principal stress p(s) [Pa], and dp/ds as columns, for laws of chapter 6 with the model's options."""
+    """Return the principal stress p(s) [Pa], and dp/ds as columns, for a law of chapter 6.
+
+    Args:
+        model: model with the options for strain and flips.
+        s: stretches, as `signed_svd` orders them.
+    """
     t = s
     mirror = s.x * 0.0 + 1.0
     if ti.static(model.flips == Flips.TOLERANT):

@@ -1,14 +1,14 @@
 """CMPM with a normal from two splits of the ring of particles around an edge (thesis section 4.4.2).
 
-The thesis considers this normal because it needs no eigenvectors. The ring is split into two halves, and
-again at positions a quarter of a turn further. Each split gives the vector between the mean positions of its
+The thesis considers this normal because it needs no eigenvectors. The ring is split into two halves, and then
+split again a quarter of the ring further. Each split gives the vector between the mean positions of its two
 halves. The normal is the cross product of the two vectors. If the ring has only two particles, the centre of
 the edge is the third point.
 
-The normal is compared with its rest direction as carried by the tetrahedra, as in CMPM2 and with the best
-fitting plane. The order of the particles determines its sign, so that it stays continuous if an edge is
-turned inside out. Implicit Euler keeps the normal fixed and compares it with the edge itself
-(`bond_stiffness`).
+As in CMPM2, the law compares the normal with the carried direction: the normal at rest, transformed by the
+tetrahedra. The order of the particles determines the sign of the normal, so that the normal stays continuous
+if an edge is turned inside out. Implicit Euler keeps the normal fixed and compares the normal with the edge
+itself (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -24,15 +24,18 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 FLAT = 1e-6
-"""Sine of the angle between the two vectors below which the normal would be round-off."""
+"""Lower limit of the sine of the angle between the two vectors. Below the limit, the normal is round-off."""
 
 
 def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """Weights of each row of `rings.neighbours` in the vectors of the two splits, (s,) each."""
+    """Return the weights of the particles in the vectors of the first and of the second split, (s,) each.
+
+    Each weight belongs to a row of `rings.neighbours`.
+    """
     edge, _ = rings.neighbours
     start = np.searchsorted(edge, np.arange(len(rings.mesh.edges)))
     index = np.arange(len(edge)) - start[edge]
-    count = np.maximum(np.bincount(edge), 3)[edge]  # counts the edge's centre if there are two
+    count = np.maximum(np.bincount(edge), 3)[edge]  # with two particles, the edge's centre is the third point
     half = count // 2
     quarter = np.maximum(1, np.rint(count / 4).astype(np.int64))
 
@@ -43,7 +46,8 @@ def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:
 
 
 def split_ring_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Return the bonds of a mesh. A ring row has a particle, `carried_by_ring` weights and `split_weights`.
+    """Return the bonds of a mesh. Each ring row has a particle, and its weights for the carried direction
+    (`carried_by_ring`) and for the two splits (`split_weights`).
 
     Raises: MeshError if the two vectors of an edge are parallel, so that they span no plane.
     """
@@ -64,7 +68,7 @@ def split_ring_plane_bonds(mesh: TetMesh, material: Material) -> Bonds:
             "its ring lie in one line. Use law='best_fitting_plane'."
         )
     normals /= length[:, None]
-    # A wide ring can be ordered against the edge: one split's weights include the sign at rest.
+    # In a wide ring, the normal can point against the edge. The weights of one split correct its sign.
     sign = np.where(np.einsum("ka,ka->k", normals, ends[:, 1] - ends[:, 0]) < 0, -1.0, 1.0)
     normals *= sign[:, None]
     weight, far_weight = carried_by_ring(rings, normals)

@@ -9,7 +9,8 @@ from taichi_soft.elements.materials import Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
 
 TINY = 1e-30
-"""Offset of squared lengths [m^2], far below any squared length: faster than a maximum."""
+"""Number that is added to squared lengths [m^2] to avoid a division by zero. It is far below any squared
+length, and adding it is faster than a maximum."""
 
 
 @ti.func
@@ -25,25 +26,27 @@ def spring_tension(r, constants):
 
 @ti.func
 def along(r, tension):
-    """Force on the first end of an edge [N] whose ends pull at each other with `tension` [N].
+    """Force on the first end of an edge [N] if the ends pull each other with `tension` [N].
 
-    It is zero if both ends coincide, because the edge then has no direction.
+    The force is zero if both ends coincide, because the edge then has no direction.
     """
     return r * (tension / ti.max(ti.sqrt(r.dot(r)), 1e-15))
 
 
 @ti.func
 def damped_pull(r, relative_velocity, tension, damping):
-    """Sum of `along` and `edge_damping_force` [N], with a single division that is independent of the root."""
+    """Sum of `along` and `edge_damping_force` [N]. The only division need not wait for the square root."""
     square = r.dot(r) + TINY
     inverse = 1.0 / square
     return r * (inverse * (tension * ti.sqrt(square) + damping * r.dot(relative_velocity)))
 
 
 def spring_bonds(mesh: BodyMesh, material: Material | SpringMaterial) -> Bonds:
-    """Return springs between given particles, or on the edges of a solid with k = E a / l (eq. 5.1).
+    """Return the springs on the edges of a mesh.
 
-    In a solid, a is the area of an edge's barycentric subfaces (4.4.1), and E their mean modulus.
+    A `SpringMaterial` contains the constants of the springs. For a `Material`, the stiffness is k = E a / l
+    (eq. 5.1). a is the total area of an edge's barycentric subfaces (4.4.1), and E is the mean of Young's
+    modulus over these subfaces.
     """
     count = len(mesh.edges)
     if isinstance(material, SpringMaterial):

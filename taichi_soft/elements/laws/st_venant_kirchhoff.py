@@ -1,10 +1,10 @@
 """Law of St. Venant-Kirchhoff: Hooke's law in the axes of the rest shape, with an energy.
 
 The energy is psi = lambda/2 (tr E)^2 + mu E : E with Green's strain E = 1/2 (F^T F - I). The principal
-strains are the same as in thesis eq. 6.7. But the thesis's stress acts in the deformed directions and per
-deformed area, and therefore has no energy: section 6.4 observes that it drifts. F^T F is the same for a
-mirror image, so a mirrored tetrahedron is at rest. Under strong compression (to a third of one length) the
-law collapses.
+strains are the same as in thesis eq. 6.7. But the stress in the thesis acts in the deformed directions and
+per deformed area. This stress therefore has no energy, and section 6.4 observes a drift. F^T F is the same
+for a mirror image, so a mirrored tetrahedron is at rest. Under strong compression, to a third of the length
+along one axis, the law collapses.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from taichi_soft.elements.laws.principal import axis_of
 
 @ti.func
 def st_venant_kirchhoff_piola(F, lame_lambda, lame_mu):
-    """P = F (lambda tr(E) I + 2 mu E) [Pa], as columns."""
+    """First Piola-Kirchhoff stress P = F (lambda tr(E) I + 2 mu E) [Pa], as columns."""
     green = scaled_plus_identity(inner_square(F), 0.5, -0.5)
     return product(F, hooke_stress(green, lame_lambda, lame_mu))
 
@@ -34,7 +34,7 @@ def st_venant_kirchhoff_principal(s, lame_lambda, lame_mu):
 
 
 def st_venant_kirchhoff_energy(F, lame_lambda, lame_mu):
-    """psi [J/m^3] of deformations (m, 3, 3), in NumPy."""
+    """Energy density psi [J/m^3], (m,), of deformations F (m, 3, 3), in NumPy."""
     green = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
     trace = np.einsum("maa->m", green)
     return 0.5 * lame_lambda * trace**2 + lame_mu * np.einsum("mab,mab->m", green, green)

@@ -1,10 +1,11 @@
 """CMPM with a plane tilted by the particles around an edge (thesis section 4.4.3, not implemented there).
 
-At rest, the plane is perpendicular to its edge. A particle around the edge that rises by an angle tilts the
-plane by c times that angle, about the axis through the edge that is perpendicular to the particle's arm. Eq.
-4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt the plane by only an eighth of a uniform
-shear. With c = beta / pi and evenly spaced particles, the tilt equals the shear. beta is the angle that a
-particle represents. Implicit Euler keeps the plane's normal fixed (`bond_stiffness`).
+At rest, the plane is perpendicular to its edge. If a particle around the edge rises by an angle, it tilts the
+plane by c times that angle. The axis of this tilt is perpendicular to the edge and to the particle's arm. c
+depends on beta, the part of the full angle around the edge that the particle represents. Eq. 4.11 and 4.12
+print b = 1/4 and c = b beta / (2 pi), which tilt the plane by only an eighth of a uniform shear. With c =
+beta / pi and evenly spaced particles, the tilt equals the shear. Implicit Euler keeps the plane's normal
+fixed (`bond_stiffness`).
 """
 
 from __future__ import annotations
@@ -30,28 +31,32 @@ def tilt(axis, arm, height, rest_angle, weight):
     Args:
         axis: unit vector along the edge.
         arm: vector from the edge's first end to the particle [m].
-        height: height of the plane above that end [m].
+        height: height of the plane above the edge's first end [m].
         rest_angle: angle of the particle above the plane at rest.
-        weight: c.
+        weight: c, tilt of the plane per angle of the particle.
     """
     rise = axis.dot(arm)
     across = arm - axis * rise
     distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
-    # A variable, because inside a vector expression Taichi would call atan2 once for each component.
+    # The variable is needed: inside a vector expression, Taichi would call atan2 once for each component.
     angle = atan2(rise - height, distance)
     return across * (weight * (angle - rest_angle) / distance)
 
 
 @ti.func
 def tilted_normal(axis, rotation):
-    """Return the unit vector `axis`, rotated away from the vector `rotation` by an angle of its length."""
+    """Return the unit vector `axis`, rotated away from `rotation` by the length of `rotation` [rad]."""
     angle = ti.sqrt(rotation.dot(rotation))
     cosine, sine = cos_sin(angle)
     return axis * cosine - rotation * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
 
 
 def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """beta / pi and the angle above the plane at rest, for each row of `rings.neighbours`, (s,) each."""
+    """Return beta / pi and the angle above the plane at rest [rad] of each particle, (s,) each.
+
+    The particles are the rows of `rings.neighbours`. beta is the part of the full angle around the edge that
+    the particle represents.
+    """
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges[edge]]
@@ -77,7 +82,7 @@ def _angle_about(axis: Floats, one: Floats, other: Floats) -> Floats:
 
 
 def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -> Bonds:
-    """Return the bonds of a mesh. A ring row has a particle, its c times `factor`, and its angle at rest."""
+    """Return the bonds of a mesh. Each ring row has a particle, c times `factor`, and the angle at rest."""
     rings = require_tets(mesh, material, "tilted_plane")
     edge, vertex = rings.neighbours
     fraction, rest_angle = tilt_rows(rings)

@@ -1,9 +1,10 @@
 """Vertex forces from stress by the virial theorem (thesis section 6.3).
 
-The equation sigma = 1/V sum x f^T (eq. 6.16 without its factor 2, which cancels against the kinetic energy)
-is solved for the forces that cause the deformation: [f1 f2 f3] = V sigma B^-T. V B^-T is the cofactor matrix
-of B divided by 6, so the law needs no division and a flat tetrahedron is no special case. The material
-responds with -f. With the printed factor 2, forces are twice as large: double Young's modulus to get these.
+The law solves sigma = 1/V sum x f^T for the forces that cause the deformation: [f1 f2 f3] = V sigma B^-T. The
+equation is eq. 6.16 without its factor 2, which cancels against the kinetic energy. V B^-T is the cofactor
+matrix of B divided by 6, so the law does not divide by the volume, and a flat tetrahedron is no special case.
+The material responds with -f. With the printed factor 2, the forces would be twice as large. To get the
+printed forces, double Young's modulus.
 """
 
 from taichi_soft.core.math.tensors import cofactor, times

@@ -1,9 +1,9 @@
 """Springs with additional forces that preserve the volume of tetrahedra (thesis chapter 5).
 
 In addition to the springs, a tetrahedron that has expanded by dV pulls the ends of each of its six edges
-together, with the pressure E nu dV / V0 times the total area a of the edge. This is eq. 5.5 with its sign
-reversed: as printed, an expanded tetrahedron pushes the ends apart, and its volume diverges. For the printed
-forces, use Poisson's ratio -nu, which does not affect the springs.
+together, with the pressure E nu dV / V0 times the total area a of the edge. This is eq. 5.5 with the opposite
+sign. With the printed sign, an expanded tetrahedron pushes the ends apart, and its volume diverges. To get
+the printed forces, use Poisson's ratio -nu, which does not affect the springs.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
 
 
 def volume_spring_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Return the springs of eq. 5.2, with the area a of each edge. A ring row is a tetrahedron."""
+    """Return the springs of eq. 5.2, with the area a of each edge. Each ring row is a tetrahedron."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError("law 'volume_springs' needs tetrahedra and a Material")
     rings = EdgeRings.of(mesh)

@@ -34,13 +34,15 @@ class AnisotropicMaterial:
     """A linearly elastic, damped material whose stiffness depends on direction.
 
     Args:
-        stiffness: stiffness in the material's axes: a `Stiffness`, or a sequence with one per tetrahedron.
-        density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
-        damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
-        frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
-            (x, y, z, w) for the body, or one per tetrahedron, (m, 3, 3) or (m, 4), for example from
-            `frames_along`. None: the axes of the mesh.
-        damping_ratio: as for `Material`.
+        stiffness: a `Stiffness` in the axes of the material, or a sequence with one `Stiffness` per
+            tetrahedron.
+        density: mass per volume [kg/m^3], above 0: a number, or an array with one number per tetrahedron.
+        damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or an array with one number per
+            tetrahedron.
+        frame: rotation whose columns are the material's axes in the mesh: a matrix (3, 3) or a quaternion
+            (x, y, z, w). For one rotation per tetrahedron, pass matrices (m, 3, 3) or quaternions (m, 4), for
+            example from `frames_along`. None for the axes of the mesh.
+        damping_ratio: see `Material`.
     Raises: MaterialError or OptionError with the first value out of range.
     """
 
@@ -117,11 +119,11 @@ class AnisotropicMaterial:
         return replace(self, **lists_of_rows)
 
     def stiffness_matrices(self, tet_count: int) -> Array:
-        """Return the stiffness of each tetrahedron in the mesh's axes, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+        """Return the stiffness of each tetrahedron in the mesh's axes, (m, 6, 6) [Pa], see `Stiffness`.
 
         Args:
             tet_count: number of tetrahedra m.
-        Raises: MaterialError for values or frames of another number of tetrahedra.
+        Raises: MaterialError if a constant or the frame has another number of values.
         """
         self.require_count(tet_count)
         each = [self.stiffness] if isinstance(self.stiffness, Stiffness) else self.stiffness
@@ -131,12 +133,13 @@ class AnisotropicMaterial:
 
 
 def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
-    """Return a frame for each direction whose first axis points along it, for fibres.
+    """Return a frame for each direction, such as the direction of fibres. The first axis of the frame points
+    along the direction.
 
     Args:
         directions: directions of the fibres, (m, 3), of any length except zero.
-    Returns: rotation matrices, (m, 3, 3), with the smallest possible angles. Use them for the `frame` of an
-        `AnisotropicMaterial` with `Stiffness.one_axis`.
+    Returns: rotation matrices, (m, 3, 3), with the smallest possible angles. Use the matrices as the `frame`
+        of an `AnisotropicMaterial` with `Stiffness.one_axis`.
     Raises: MaterialError for a direction that is zero.
     """
     rows = as_array(directions, "directions", (None, 3))
@@ -170,7 +173,7 @@ def _one_per_tet(values: Any) -> tuple[Stiffness, ...]:
 
 
 def _frame(value: Any) -> Array:
-    """Check a frame. Return one rotation (3, 3), or one per tetrahedron (m, 3, 3), read-only."""
+    """Check a frame, and return a read-only rotation (3, 3), or one rotation per tetrahedron, (m, 3, 3)."""
     if value is None or to_array(value, "frame").shape in ((4,), (3, 3)):
         frame: Array = as_rotation(value).copy()
     else:

@@ -1,4 +1,4 @@
-"""Constants of materials: one number for a body, or one per element."""
+"""Constants of materials: one number for a body, or one number per element."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from taichi_soft.core.errors import MaterialError
 Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 1e-9, 1e20
-"""Range of valid constants: outside it, forces or accelerations overflow float32."""
+"""Range of valid constants. Outside this range, forces or accelerations overflow float32."""
 
 MAX_DAMPING_RATIO = 1000.0
-"""Largest damping ratio, far above the damping that a substep can apply: more has no further effect."""
+"""Largest valid damping ratio. It is far above the damping that a substep can apply, so a larger ratio would
+have no further effect."""
 
 POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
 
@@ -78,7 +79,7 @@ def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
 
 
 def described(material: Any) -> str:
-    """Return the `repr` of a material, with the length and range of arrays."""
+    """Return the `repr` of a material. For an array, the `repr` contains its length and its range."""
     given = {each.name: getattr(material, each.name) for each in fields(material)}
     texts = [f"{name}={_text(value)}" for name, value in given.items() if value is not None]
     return f"{type(material).__name__}({', '.join(texts)})"

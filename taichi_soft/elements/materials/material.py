@@ -31,7 +31,7 @@ CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_d
 
 
 def isotropic_stiffness(lame_lambda: Array, lame_mu: Array) -> Array:
-    """Return stiffness matrices, (m, 6, 6) [Pa], as `Stiffness.matrix`, from Lame's constants, (m,) [Pa]."""
+    """Return stiffness matrices like `Stiffness.matrix`, (m, 6, 6) [Pa], from Lame's constants, (m,) [Pa]."""
     matrices = np.zeros((len(lame_mu), 6, 6))
     matrices[:, :3, :3] = lame_lambda[:, None, None]
     matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
@@ -48,16 +48,17 @@ class Material:
         young: Young's modulus E [Pa], above 0.
         poisson: Poisson's ratio nu, above -1 and below 0.5.
         density: mass per volume [kg/m^3], above 0.
-        damping: damping constant b of each edge, thesis eq. 3.9 [N s/m], 0 or more. An edge has the mean of
-            the values of its tetrahedra.
-        shear_modulus: shear modulus G [Pa] for the laws of chapter 4, which allow any value; None:
-            E / (2 (1 + nu)).
-        damping_ratio: damping ratio of the slowest vibration of a free body: 0 is undamped, 0.05 leaves a
-            tenth of the amplitude after seven oscillations, 1 returns without oscillating. All vibrations
-            decay at the same rate; rigid motion is not damped. It never needs more substeps. `damping` acts
-            in addition.
-        shear_damping: damping b_m across the edges, eq. 4.5 [N s/m], for the laws of chapter 4; None:
-            `damping`.
+        damping: damping constant b of each edge, thesis eq. 3.9 [N s/m], 0 or more. An edge uses the mean
+            over its tetrahedra.
+        shear_modulus: shear modulus G [Pa], only for the laws of thesis chapter 4, which allow any value;
+            None for E / (2 (1 + nu)).
+        damping_ratio: damping ratio of the slowest vibration of a free body. With 0, the body is
+            undamped. With 0.05, a tenth of the amplitude remains after seven oscillations. With 1, the body
+            returns without oscillating. All vibrations
+            decay at the same rate; rigid motion is not damped. The damping ratio never increases the
+            number of substeps. `damping` acts in addition.
+        shear_damping: damping b_m across the edges, eq. 4.5 [N s/m], only for the laws of chapter 4; None for
+            the value of `damping`.
     Raises: MaterialError with the first value out of range.
     Example:
         rubber = Material(young=1e6, poisson=0.45, density=1100, damping_ratio=0.1)
@@ -126,7 +127,7 @@ class Material:
         return replace(self, **{name: value[rows] for name, value in given.items() if np.ndim(value) == 1})
 
     def stiffness_matrices(self, tet_count: int) -> Array:
-        """Return the stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+        """Return the stiffness of each tetrahedron, (m, 6, 6) [Pa], like `Stiffness.matrix`.
 
         Args:
             tet_count: number of tetrahedra m.

@@ -1,9 +1,9 @@
 """Named materials with rounded textbook values, as a starting point.
 
 Moduli and densities are from M. F. Ashby, Materials Selection in Mechanical Design (property tables). The
-modulus of gelatine is at the stiff end of the usual range of 1 to 100 kPa; with the thesis's law and tolerant
-flips, a fall from several metres still dents it permanently. Damping ratios are half the usual loss factors
-at a few hertz, rounded. `thesis_sphere` is from thesis section 6.6 and has only its damping of edges.
+modulus of gelatine is at the stiff end of the usual range of 1 to 100 kPa. With the thesis's law and tolerant
+flips, a fall from several metres still dents gelatine permanently. Damping ratios are half the usual loss
+factors at a few hertz, rounded. `thesis_sphere` is from thesis section 6.6 and has only damping along edges.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ PRESETS: dict[PresetName, Material] = {
 
 
 def preset(name: PresetName) -> Material:
-    """Return the material with a given name.
+    """Return the material with a name.
 
     Args:
-        name: one of `PRESETS`, such as "gelatine".
+        name: a key of `PRESETS`, such as "gelatine".
     Raises: OptionError, with the available names, for an unknown name.
     """
     if not isinstance(name, str) or name not in PRESETS:

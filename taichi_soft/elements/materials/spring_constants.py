@@ -31,13 +31,13 @@ def _is_stiffness(x: Array) -> NDArray[np.bool_]:
 @serialised("stiffness", "damping", "rest_length")
 @dataclass(frozen=True, eq=False)
 class SpringMaterial:
-    """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per edge of the mesh.
+    """Springs of a `ParticleMesh`. Each constant is a number, or an array with one number per edge.
 
     Args:
-        stiffness: stiffness k, thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. With 0, an
-            edge has only damping.
+        stiffness: stiffness k, thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge
+            with stiffness 0 has only damping.
         damping: damping constant b, eq. 3.9 [N s/m], 0 or more.
-        rest_length: length at rest l, eq. 3.8 [m], above 0; None: the lengths in the mesh.
+        rest_length: length at rest l, eq. 3.8 [m], above 0; None for the lengths in the mesh.
     Raises: MaterialError with the first value out of range, or if no edge has any stiffness.
     """
 
@@ -69,8 +69,8 @@ class SpringMaterial:
 
         Args:
             young: Young's modulus E [Pa].
-            area: cross-section a [m^2]: one number, or one per bar.
-            lengths: lengths at rest [m], such as `mesh.edge_lengths`.
+            area: cross-section a [m^2]: one number for all bars, or one number per bar.
+            lengths: lengths l of the bars at rest [m], such as `mesh.edge_lengths`.
             damping: b [N s/m].
         Raises: MaterialError for a number that is not positive or for arrays of different lengths.
         """

@@ -2,7 +2,7 @@
 
 A 6x6 matrix maps strain to stress in Voigt's order xx, yy, zz, yz, xz, xy. With engineering shear,
 gamma_xy = 2 eps_xy, the matrix is symmetric. The thesis uses the order xx, yy, zz, xy, xz, yz and tensor
-shear; `Stiffness.from_thesis` converts from it.
+shear. `Stiffness.from_thesis` converts a matrix of the thesis.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 """Axes of each of Voigt's six components."""
 
 ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
-"""Entries that can be non-zero with one plane of symmetry, xy: yz and xz couple only with each other."""
+"""Row and column of each entry that can be non-zero if xy is a plane of symmetry. yz and xz then couple only
+with each other."""
 
 THESIS_ORDER = (0, 1, 2, 5, 4, 3)
-"""Position of each of Voigt's components in the thesis's order, whose fourth is xy and sixth yz."""
+"""Position of each of Voigt's components in the thesis's order, in which xy is fourth and yz is sixth."""
 
 
 def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
@@ -36,20 +37,28 @@ def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
 
 
 def rotate_stiffness(matrix: Floats, rotations: Floats) -> Floats:
-    """Return the stiffness (6, 6) of a material after each of `rotations` (m, 3, 3), (m, 6, 6).
+    """Rotate a material, and return its stiffness after each rotation, (m, 6, 6) [Pa].
 
-    The result is K C K^T with the matrix K that rotates stress in Voigt's order (Bond 1943).
+    The result is K C K^T. The matrix K rotates stress in Voigt's order (Bond 1943).
+    Args:
+        matrix: stiffness C, (6, 6), or one per rotation, (m, 6, 6) [Pa].
+        rotations: (m, 3, 3).
     """
     first, second = np.array(PAIRS).T
     R = rotations
-    # Stress rotates as R s R^T, in which components off the diagonal occur twice.
+    # Stress s rotates as R s R^T. This product contains each component off the diagonal twice.
     K = R[:, first[:, None], first] * R[:, second[:, None], second]
     K[:, :, 3:] += (R[:, first[:, None], second] * R[:, second[:, None], first])[:, :, 3:]
     return np.asarray(K @ matrix @ np.swapaxes(K, 1, 2))
 
 
 def voigt_stress(matrices: Floats, strain: Floats) -> Floats:
-    """Return the stress (m, 3, 3) [Pa] for strain (m, 3, 3) and stiffness (m, 6, 6) [Pa] in Voigt's order."""
+    """Return the stress, (m, 3, 3) [Pa].
+
+    Args:
+        matrices: stiffness in Voigt's order, (m, 6, 6) [Pa].
+        strain: (m, 3, 3).
+    """
     first, second = np.array(PAIRS).T
     rows = strain[:, first, second] * np.array([1, 1, 1, 2, 2, 2])
     stress = np.empty_like(strain)
@@ -99,7 +108,7 @@ class Stiffness:
 
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
-        """Return an isotropic stiffness: 2 constants (thesis eq. 2.35).
+        """Return an isotropic stiffness from its 2 constants (thesis eq. 2.35).
 
         Args:
             young: Young's modulus [Pa], above 0.
@@ -118,14 +127,16 @@ class Stiffness:
         poisson_across: float,
         shear_along: float,
     ) -> Stiffness:
-        """Return a stiffness with rotational symmetry about x, such as wood's: 5 constants (thesis 2.4.2).
+        """Return a stiffness with rotational symmetry about x from its 5 constants (thesis 2.4.2).
+
+        Wood is an example.
 
         Args:
             young_along, young_across: Young's moduli along and across x [Pa].
             poisson_along: Poisson's ratio for tension along x and contraction across x.
             poisson_across: Poisson's ratio for tension and contraction both across x.
             shear_along: shear modulus of planes through x [Pa]. The shear modulus of the plane across x is
-                E / (2 (1 + nu)) with the constants across x.
+                E / (2 (1 + nu)), with E = `young_across` and nu = `poisson_across`.
         """
         shear_across = as_positive(young_across, "young_across", "Pa") / (
             2 * (1 + _as_ratio(poisson_across, "poisson_across", 1.0))
@@ -140,11 +151,12 @@ class Stiffness:
     def orthotropic(
         cls, young: Sequence[float], poisson: Sequence[float], shear: Sequence[float]
     ) -> Stiffness:
-        """Return a stiffness with three orthogonal planes of symmetry: 9 constants (thesis 2.4.1).
+        """Return a stiffness with three orthogonal planes of symmetry from its 9 constants (thesis 2.4.1).
 
         Args:
             young: Young's moduli along x, y, z [Pa].
-            poisson: nu_yz, nu_xz, nu_xy: tension along the first axis, contraction along the second.
+            poisson: Poisson's ratios nu_yz, nu_xz, nu_xy, for tension along the first axis and contraction
+                along the second axis.
             shear: shear moduli G_yz, G_xz, G_xy [Pa].
         """
         moduli = as_array(young, "young", (3,), "Pa")
@@ -163,7 +175,7 @@ class Stiffness:
 
     @classmethod
     def one_plane(cls, constants: Sequence[float]) -> Stiffness:
-        """Return a stiffness with one plane of symmetry, the xy plane: 13 constants (thesis 2.4.1).
+        """Return a stiffness with one plane of symmetry, xy, from its 13 constants (thesis 2.4.1).
 
         Args:
             constants: independent entries of the matrix [Pa], row by row from the diagonal: c11, c12, c13,
@@ -177,7 +189,7 @@ class Stiffness:
 
     @classmethod
     def from_thesis(cls, matrix: ArrayLike) -> Stiffness:
-        """Convert the matrix of thesis eq. 2.25: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
+        """Convert the matrix of thesis eq. 2.25, with order xx, yy, zz, xy, xz, yz and tensor shear strain.
 
         Args:
             matrix: (6, 6) [Pa].
@@ -187,7 +199,10 @@ class Stiffness:
         return cls(rows)
 
     def to_thesis(self) -> Floats:
-        """Return the matrix of thesis eq. 2.25, (6, 6) [Pa]: for tensor shear, so in general asymmetric."""
+        """Return the matrix of thesis eq. 2.25, (6, 6) [Pa].
+
+        With tensor shear strain, this matrix is in general not symmetric.
+        """
         rows = self.matrix.copy()
         rows[:, 3:] *= 2
         return np.asarray(rows[np.ix_(THESIS_ORDER, THESIS_ORDER)])
@@ -204,8 +219,8 @@ class Stiffness:
     def compliance(self) -> Floats:
         """Compliance, the inverse of `matrix` (thesis eq. 2.23), (6, 6) [1/Pa].
 
-        It maps stress to strain, in Voigt's order with engineering shear. In an orthotropic material its
-        diagonal contains 1 / E and 1 / G.
+        The compliance maps stress to strain, in Voigt's order with engineering shear. For an orthotropic
+        material, the diagonal contains 1 / E and 1 / G.
         """
         return np.asarray(np.linalg.inv(self.matrix))
 
@@ -233,7 +248,8 @@ class Stiffness:
         return float(1 / (pull @ strain))
 
     def symmetry(self, tolerance: float = 1e-6) -> str:
-        """Return the symmetry in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
+        """Return the name of the symmetry in these axes: "isotropic", "one axis" (x), "orthotropic",
+        "one plane" (xy) or "none".
 
         Args:
             tolerance: largest difference that counts as zero, relative to the largest entry.
