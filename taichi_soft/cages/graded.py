@@ -237,7 +237,7 @@ def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
 
 
 def doubled(cubes: NDArray[Kind], octaves: int = 1) -> NDArray[Kind]:
-    """Return the values of cubes after `octaves` halvings. A small cube gets the value of its original cube."""
+    """Return the values of cubes after `octaves` halvings. Small cubes get the value of the original cube."""
     for axis in range(3):
         cubes = cubes.repeat(2**octaves, axis=axis)
     return cubes
