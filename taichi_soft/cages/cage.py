@@ -1,4 +1,4 @@
-"""Build the cage of a solid: tetrahedra around it that carry its volume and mass."""
+"""Build the cage of a solid. A cage is a set of tetrahedra that carry the solid's volume and mass."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def parts_of(fill: NDArray[np.float64]) -> Ints:
     row = np.cumsum(begins.ravel()).reshape(fill.shape) - 1
     pairs = []
     steps = np.argwhere(np.ones((3, 3, 3))) - 1
-    for step in steps[15:]:  # half of the neighbours suffice; steps[14] stays in the same run
+    for step in steps[15:]:  # half of the neighbours suffice, by symmetry; steps[14] is in the same run
         here = tuple(slice(max(0, -s), fill.shape[k] - max(0, s)) for k, s in enumerate(step))
         there = tuple(slice(max(0, s), fill.shape[k] - max(0, -s)) for k, s in enumerate(step))
         both = is_full[here] & is_full[there]

@@ -28,11 +28,11 @@ FLAT = 0.25
 surface."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
-"""Radii of successive searches around a vertex's voxel, in voxels. The first search that finds a point no
-farther than the radius minus the diagonal of a voxel is the last."""
+"""Radii of successive searches around a vertex's voxel, in voxels. The search stops at the first radius at
+which it finds a point no farther than the radius minus the diagonal of a voxel."""
 
 CHUNK = 1 << 20
-"""Pairs of vertices and voxels that are processed at once."""
+"""Number of pairs of a vertex and a voxel that are processed at once."""
 
 SEARCH_RANGE = 0.75
 """Distance from a vertex within which surface points are searched, relative to the edge of a cube."""
@@ -131,7 +131,7 @@ def _gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class _NeighbourMean:
-    """Function from the positions of vertices to the mean position of each vertex's neighbours, (n, 3)."""
+    """Function that maps positions of vertices to the mean position of each vertex's neighbours, (n, 3)."""
 
     def __init__(self, edges: NDArray[np.integer], count: int) -> None:
         pairs = np.unique(np.sort(edges, axis=1), axis=0)

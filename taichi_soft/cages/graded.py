@@ -2,8 +2,8 @@
 
 If two cubes share a face or an edge, they are equal, or one cube is twice as long as the other. Vertices are
 the corners and centres of cubes. Between two equal cubes, a tetrahedron consists of both centres and an edge
-of the shared face, as in the lattice of equal cubes. If this edge has a vertex in its middle, two tetrahedra
-replace the tetrahedron. A face between a large cube and four small cubes is divided into eight triangles.
+of the shared face, as in the lattice of equal cubes. If this edge has a vertex in its middle, there are two
+tetrahedra instead of one. A face between a large cube and four small cubes is divided into eight triangles.
 Each triangle forms one tetrahedron with the centre of the large cube and one with the centre of a small cube.
 (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45 and 120
 degrees.
@@ -151,7 +151,7 @@ class GradedLattice:
         others = ((axis + 1) % 3, (axis + 2) % 3)
         for sector, (which, forwards) in enumerate(SECTORS):
             across, along = others[which], others[1 - which]
-            start = there.copy()  # lower end of the edge, in cubes
+            start = there.copy()  # lower end of the edge, counted in cubes
             start[:, across] += forwards
             step = np.eye(3, dtype=np.int64)[along] * size
             has_middle = self._has_middle(level, start, along)
@@ -192,7 +192,8 @@ class GradedLattice:
     def _fill_between_unequals(self, level: int, axis: int, side: int) -> None:
         """Add the tetrahedra on both sides of faces between a large cube and four cubes of half its length.
 
-        If `side` is 1, the small cubes lie in the positive direction of the axis, otherwise in the negative.
+        The small cubes lie in the positive direction of the axis if `side` is 1, otherwise in the negative
+        direction.
         """
         size = 2 ** (self.octaves - level)
         pairs = _pairs(self._leaves[level], self._splits[level], axis)
@@ -224,7 +225,7 @@ class GradedLattice:
 
 
 def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
-    """Return the pairs of neighbours along an axis with the first cube in `low` and the second in `high`.
+    """Find neighbours along an axis, with the first cube in `low` and the second cube in `high`.
 
     Returns: the first cubes and the second cubes, (k, 3) each.
     """

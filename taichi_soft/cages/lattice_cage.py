@@ -21,7 +21,7 @@ from taichi_soft.meshing.surface import Surface, joined
 Ints = NDArray[np.int64]
 
 ROUNDS = 3
-"""Largest number of refinements, each followed by a search for limbs that are still missed."""
+"""Largest number of refinements. Each refinement is followed by a search for limbs that are still missed."""
 
 
 def build_cage(

@@ -22,7 +22,8 @@ TRACE = 0.02
 and would otherwise be missed."""
 
 LAYER = 2
-"""Largest number of steps across faces that lead from any tetrahedron of a flat layer out of the layer."""
+"""A layer of tetrahedra is thin if at most this many steps across faces lead from each of its tetrahedra out
+of the layer."""
 
 MAX_FRAGMENT = 2
 """Largest number of tetrahedra in a fragment that can be dropped."""
@@ -43,7 +44,7 @@ def mark(
     Args:
         points: points that represent one connected solid, (k, 3) [m].
         volumes: volume that each point represents, (k,) [m^3].
-        kept: True for points that must be covered, however thin the solid is there, (k,).
+        kept: True for points that must be covered even if the solid is very thin, (k,).
     """
     at = lattice.tet_at(points)
     numbers, place = np.unique(at, return_inverse=True)

@@ -36,7 +36,7 @@ TIME_LIMIT = 120.0
 """Default time limit [s]."""
 
 GRACE = 3.0
-"""Time after the time limit at which a mesher's process ends itself if it was not killed [s]."""
+"""A mesher's process that was not killed at the time limit ends itself after this additional time [s]."""
 
 INSIDE = 0.5
 """Winding number above which a region is solid."""

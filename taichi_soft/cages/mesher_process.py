@@ -2,6 +2,7 @@
 
 The interpreter receives this module as text. The module imports nothing from this package, because such an
 import would start Taichi.
+
 Arguments: the method, the time after which the process ends in any case [s], and `sys.path`.
 """
 

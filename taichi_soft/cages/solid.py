@@ -6,8 +6,8 @@ voxel keeps its volume. If the surface is closed, the winding number is an integ
 of the ray.
 
 If the winding number does not return to 0, the ray crossed a hole, a flipped face or an inner wall. In the
-voxels of such a ray, the rays along the other axes decide. If no winding number of a voxel's three rays
-returns to 0, the mean of the winding numbers in both directions of the three rays decides. This mean is the
+voxels of such a ray, the rays along the other axes decide. If all three rays through a voxel are of this
+kind, the mean of their six winding numbers decides, counted from both ends of each ray. This mean is the
 generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
 """
 
@@ -23,19 +23,19 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 OFFSET = np.array([0.4142, 0.3183, 0.3679])
-"""Offset of the voxel grid relative to the bounding box of the surface, in voxels. The uneven numbers prevent
-rays along faces at round coordinates."""
+"""Offset of the voxel grid relative to the bounding box of the surface, in voxels. The uneven values
+prevent rays along faces at round coordinates."""
 
 OVERLAP = 1.0 + 1e-6
 """Winding number above which parts of the surface overlap. The small excess over 1 allows for rounding."""
 
 CHUNK = 1 << 20
-"""Pairs of triangles and rays that are processed at once."""
+"""Number of pairs of a triangle and a ray that are processed at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Fraction of each voxel that is inside, and the surface within the voxel."""
+    """Solid in voxels: the fraction of each voxel that is inside, and the surface within the voxel."""
 
     origin: FloatArray  # (3,), corner of the first voxel [m]
     spacing: float  # edge of a voxel [m]
@@ -153,7 +153,8 @@ def _fill(rows: list[_Rays]) -> tuple[FloatArray, FloatArray]:
     Among closed rays, the ray most perpendicular to the surface decides. This ray has the most crossings in
     the voxel and its neighbours. (The crossings in the voxel alone would favour rays that happen to be
     inside.)
-    Returns: fraction of the voxel, (nx, ny, nz), and centroid of the part, (nx, ny, nz, 3), in voxels.
+    Returns: fraction of the voxel, (nx, ny, nz), and centroid of the part, (nx, ny, nz, 3), in voxels from
+        the voxel's corner.
     """
     is_closed = np.stack([row.is_closed for row in rows])
     crossings = np.stack([row.crossings for row in rows])

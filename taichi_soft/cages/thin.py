@@ -46,8 +46,8 @@ INSIDE = 0.5
 """Winding number above which a point is inside the solid."""
 
 OWN_DISTANCE = 1e-6
-"""Distance from a point to a triangle, relative to the size of the surface, below which the point lies on the
-triangle."""
+"""Distance from a point to a triangle, relative to the size of the surface, below which the point counts as
+lying on the triangle."""
 
 ROOT_DISTANCE = 0.2
 """Distance from the cage, in cells, beyond which a point of a limb is outside the cage."""
@@ -60,13 +60,13 @@ QUANTILE = 0.1
 the body next to the limb is thicker."""
 
 CHUNK = 1 << 20
-"""Pairs of rays and triangles that are processed at once."""
+"""Number of pairs of a ray and a triangle that are processed at once."""
 
 
 def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
     """Sample points on triangles (m, 3, 3), at least one in each and at most about `pitch` [m] apart.
 
-    Returns: points (k, 3) [m], and the triangle of each, (k,).
+    Returns: points (k, 3) [m], and the triangle of each point, (k,).
     """
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)

@@ -24,7 +24,7 @@ MAX_OPEN_FRACTION = 0.5
 again."""
 
 FLATTEST = 1e-6
-"""Enclosed volume, relative to the volume of the bounding box, that can be a mere rounding error."""
+"""Largest enclosed volume, relative to the volume of the bounding box, that counts as a rounding error."""
 
 
 def volume_within(corners: FloatArray) -> float:
@@ -50,7 +50,7 @@ def voxel_edge(corners: FloatArray, cell_size: float) -> float:
 
 
 def fine_voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Return the edge of the finer voxels for the search for missed limbs [m]."""
+    """Return the edge of the finer voxels that are used in the search for missed limbs [m]."""
     edge = _affordable(cell_size / MAX_VOXELS_PER_CUBE, corners, cell_size, MAX_FINE_VOXELS)
     return min(edge, voxel_edge(corners, cell_size))
 

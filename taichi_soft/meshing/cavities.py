@@ -85,9 +85,9 @@ class ClosedMesh:
         self._simplex_keys = np.unique(np.concatenate([tet_keys, self._face_keys.ravel(), edge_keys.ravel()]))
 
     def star(self, vertices: Ints) -> tuple[Ints, Ints]:
-        """Return the rows of the tetrahedra around vertices, (r,), sorted by vertex.
+        """Find the tetrahedra around vertices, sorted by vertex.
 
-        The second result is the index in `vertices` of each row's vertex, (r,).
+        Returns: row of each tetrahedron, (r,), and index in `vertices` of the tetrahedron's vertex, (r,).
         """
         counts = self._counts[vertices]
         of = np.repeat(np.arange(len(vertices)), counts)
@@ -156,7 +156,7 @@ def volumes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def is_flat(x: FloatArray, tets: Ints) -> Bools:
-    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat or that are almost flat enough for this."""
+    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat or almost rejects."""
     ends = x[tets[:, LOCAL_EDGES]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
     flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
@@ -210,7 +210,7 @@ def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
 
 
 def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities]:
-    """Return the flips that replace the tetrahedra around each edge (k, 2) by others without this edge.
+    """Return the flips that replace the tetrahedra around each edge (k, 2) by tetrahedra without this edge.
 
     The new tetrahedra belong to the best triangulation of the ring around the edge.
     Returns: cavities, one item for each number of tetrahedra around an edge, up to `LARGEST_RING`.

@@ -1,4 +1,4 @@
-"""Sharp edges of a surface, across which its shading is not smooth."""
+"""Sharp edges of a surface. Across these edges, the shading of the surface is not smooth."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ DEFAULT_CREASE = 60.0
 between faces of an icosahedron (42) and smaller than the angle between faces of a box (90)."""
 
 _COSINE_TOLERANCE = 1e-9
-"""Tolerance of the cosine. Without it, rounding could split triangles that bend by exactly the crease
-angle."""
+"""Tolerance of the cosine. Rounding must not split triangles that bend by exactly the crease angle."""
 
 
 def split_at_creases(

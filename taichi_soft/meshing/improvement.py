@@ -24,11 +24,11 @@ SMALL = 0.3
 as many substeps as a tetrahedron of median size."""
 
 _ROUNDS = 100
-_GENTLE_ROUNDS = 3  # number of rounds at the start that keep all vertices, by flips and moves only
+_GENTLE_ROUNDS = 3  # number of rounds at the start without collapses, so that all vertices stay
 _MAX_IDLE_ROUNDS = 6  # number of rounds without a change after which the search stops
 _MIN_GAIN = 1.02  # factor by which the smallest size of a cavity must grow, so that the rounds end
 _VOLUME_TOLERANCE = 0.01  # total change of volume at the surface, relative to the body's volume
-_MIN_NORMAL_COSINE = 0.77  # between a new surface triangle and the old triangle with the most similar normal
+_MIN_NORMAL_COSINE = 0.77  # between a new surface normal and the most similar old surface normal
 _DRIFT_PENALTY = 0.9  # relative reduction of a gain that uses the full surface tolerance
 _FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex can slide
 _GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, relative to the step to the target size
@@ -127,9 +127,9 @@ class _Work:
         return np.asarray(is_touched[self.tets].any(axis=1))
 
     def _gain(self, cavities: Cavities) -> FloatArray:
-        """Return the increase of the smallest size in each cavity, (k,) [m], or 0 if it is too small.
+        """Return the increase of the smallest size in each cavity, (k,) [m].
 
-        Sizes count only up to the target size.
+        Sizes count only up to the target size. An increase that is too small counts as 0.
         """
         before, after = np.full(cavities.total, np.inf), np.full(cavities.total, self.target_size)
         np.minimum.at(before, cavities.removed_of, self.sizes[cavities.removed])
@@ -186,9 +186,10 @@ class _Work:
         return np.asarray(free @ np.swapaxes(free, 1, 2))
 
     def _fits(self, cavities: Cavities) -> tuple[FloatArray, Bools]:
-        """Return an upper bound of the surface's displacement at each cavity, (k,) [m].
+        """Check which changes the surface allows.
 
-        The second result is True for changes that are allowed, (k,).
+        Returns: upper bound of the surface's displacement at each cavity, (k,) [m]; and True for cavities
+            that are allowed, (k,).
         """
         count = cavities.total
         old, old_of = patches.outer_faces(self.tets[cavities.removed], cavities.removed_of)

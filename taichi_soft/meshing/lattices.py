@@ -24,7 +24,7 @@ def rope(length: float, segments: int, mass: float) -> ParticleMesh:
     Args:
         length: total length [m].
         segments: number of springs.
-        mass: total mass [kg]; the particles at the ends have half the mass of the others.
+        mass: total mass [kg]. The particles at the ends have half the mass of the other particles.
     Example:
         arena = World(floor=0.0)
         line = rope(length=2.0, segments=20, mass=0.5)
@@ -77,8 +77,7 @@ def cloth(
 
 
 def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float) -> FloatArray:
-    """Return a value for each spring of a cloth, such as its stiffness, (k,). Springs of one kind get one
-    value.
+    """Return a value for each spring of a cloth, such as the stiffness, (k,), by the kind of the spring.
 
     Args:
         mesh: result of `cloth`.

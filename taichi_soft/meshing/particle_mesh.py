@@ -1,4 +1,4 @@
-"""Particles joined by edges, without volume: cloth, ropes, spring lattices."""
+"""Meshes of particles and edges, without volume, for cloth, ropes and spring lattices."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class ParticleMesh(BodyMesh):
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        edges: (k, 2) integer vertex indices, in any order and direction. They are stored in this order, with
-            i < j. Values per edge in a `SpringMaterial` have the same order.
+        edges: (k, 2) integer vertex indices, in any order and direction. The rows are stored in this order,
+            with i < j. Values per edge in a `SpringMaterial` have the same order.
         masses: (n,) mass of each particle [kg], above 0; or one number for all particles.
         surface: (f, 3) triangles to draw, none by default. Triangles are one-sided, so a sheet needs each
             triangle twice, once for each side.

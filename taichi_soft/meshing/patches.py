@@ -1,5 +1,4 @@
-"""Compare patches of a surface with their replacements, by their distance and by the rotation of the
-normals."""
+"""Compare patches of a surface with their replacements, by distance and by rotation of the normals."""
 
 from __future__ import annotations
 
@@ -20,10 +19,10 @@ _TINY = 1e-300  # [m^2], avoids division by zero for degenerate triangles
 
 
 def outer_faces(tets: Ints, of: Ints) -> tuple[Ints, Ints]:
-    """Return the surface triangles of tetrahedra, wound outwards, (f, 3), and the group of each triangle,
-    (f,).
+    """Find the surface triangles of tetrahedra.
 
     Args: of: group of each tetrahedron.
+    Returns: triangles, wound outwards, (f, 3), and the group of each triangle, (f,).
     """
     row, corner = np.nonzero(tets == OUTSIDE)
     return tets[row[:, None], LOCAL_FACES[corner][:, ::-1]], of[row]

@@ -70,7 +70,7 @@ class Polygons:
         following = np.take_along_axis(part.corners, after[..., None], axis=1)
         crossed = part.corners + t[..., None] * (following - part.corners)
 
-        # A corner that is inside stays. Then comes the point at which the corner's side crosses the plane.
+        # Each corner adds itself if it is inside, then the point at which its side crosses the plane.
         kept = np.stack([is_corner & inside, crossing], axis=2).reshape(len(part.count), -1)
         corners = np.stack([part.corners, crossed], axis=2).reshape(len(part.count), -1, 3)
         new = np.broadcast_to(np.asarray(label), (len(rows),))[is_cut][:, None]

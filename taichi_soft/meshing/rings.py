@@ -1,4 +1,4 @@
-"""Rings of edges in a tetrahedral mesh: the tetrahedra that share an edge, and their other vertices."""
+"""Rings of edges in a mesh. A ring has the tetrahedra that share an edge, and their other vertices."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class EdgeRings:
     def of(cls, mesh: TetMesh) -> EdgeRings:
         """Find the rings of a mesh."""
         ends, sides = mesh.tets[:, LOCAL_EDGES], mesh.tets[:, OPPOSITE]
-        turned = ends[..., 0] > ends[..., 1]  # opposite to the direction in which the mesh stores the edge
+        turned = ends[..., 0] > ends[..., 1]  # True if the mesh stores the edge in the other direction
         sides[turned] = sides[turned][:, ::-1]
         order = np.argsort(mesh.tet_edges.ravel(), kind="stable")
         return cls(
@@ -52,7 +52,7 @@ class EdgeRings:
 
     @cached_property
     def area_vectors(self) -> FloatArray:
-        """Area vector of the barycentric subface of the edge in the tetrahedron of each row, (r, 3) [m^2].
+        """For each row, the area vector of the edge's barycentric subface in the tetrahedron, (r, 3) [m^2].
 
         The subface (thesis 4.4.1) is the quadrilateral between the centres of the edge, its two faces and the
         tetrahedron. The area vector is (a - m) x (b - m) / 12, where m is the edge's centre and a, b are the

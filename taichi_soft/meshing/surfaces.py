@@ -218,7 +218,7 @@ def _with_z_up(surface: Surface, up: Up) -> Surface:
 def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[Surface, ...]:
     """Scale surfaces, and move them to the origin if `center` is True.
 
-    If `center` is False and float32 is too coarse at the distance from the origin, a note is added.
+    If `center` is False and float32 is too coarse at their distance from the origin, add a note.
     """
     if not surfaces:
         return surfaces

@@ -24,7 +24,7 @@ class TetMesh(BodyMesh):
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        tets: (m, 4) integer vertex indices. A tetrahedron has positive volume when
+        tets: (m, 4) integer vertex indices. A tetrahedron has positive volume if
             det[x1-x0, x2-x0, x3-x0] > 0.
         fix_orientation: reverse tetrahedra of negative volume by swapping their last two vertices.
 
@@ -128,8 +128,8 @@ class TetMesh(BodyMesh):
         change.
         Args:
             min_size: size below which a tetrahedron is improved [m]; None for 0.3 of the median size.
-            tolerance: largest displacement of the surface [m]; None for a quarter of the mean edge, at most 1
-                % of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
+            tolerance: largest displacement of the surface [m]; None for a quarter of the mean edge, but at
+                most 1 % of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
             return_source: True to return also `source`, int32 (m,), the tetrahedron of this mesh that each
                 new tetrahedron replaces. `values[source]` transfers values per tetrahedron to the new mesh. A
                 border between materials can shift by a few tetrahedra.

@@ -45,8 +45,8 @@ def numbers(
 
     Args:
         element: name of a row in error messages.
-        allow_missing: True to return NaN for a row that has too few numbers or an invalid one.
-    Raises: MeshError for such a row, unless `allow_missing`.
+        allow_missing: True to return NaN for a row that has too few numbers or an invalid number.
+    Raises: MeshError for such a row, unless `allow_missing` is True.
     """
     try:
         return np.fromiter(

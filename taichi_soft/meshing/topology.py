@@ -17,7 +17,7 @@ LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 
 
 
 def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the edges (k, 2), i < j, in ascending order, and the row of each tetrahedron's edges, (m, 6)."""
+    """Return the edges (k, 2), i < j, ascending, and the rows of each tetrahedron's edges, (m, 6)."""
     pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
     stride = int(tets.max()) + 1
     keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
@@ -26,10 +26,9 @@ def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def surface_of(tets: IntArray) -> IntArray:
-    """Return the triangles that belong to only one tetrahedron, (f, 3), wound outwards, in the order of
-    `tets`.
+    """Return the triangles that belong to only one tetrahedron, (f, 3), in the order of `tets`.
 
-    The tetrahedra must have positive volume.
+    The triangles are wound outwards. The tetrahedra must have positive volume.
     Raises: MeshError if more than two tetrahedra share a face, or if two tetrahedra lie on the same side of
         their common face.
     """

@@ -31,7 +31,7 @@ class VoronoiGraph:
     """Voronoi faces of the edges and Voronoi cells of the particles, clipped by the surface of the body.
 
     Attributes:
-        areas: (k,) area of each edge's face [m^2]; 0 if it is clipped away or does not exist.
+        areas: (k,) area of each edge's face [m^2]; 0 if the face is clipped away or does not exist.
         corner_edge: (c,) edge of each corner, ascending. The corners of an edge's face run right-handed
             around the direction i -> j of the edge, and the first corner is repeated at the end.
         corner_tet: (c,) a tetrahedron that contains the corner at rest.
@@ -118,7 +118,7 @@ class _Neighbours:
         self.pairs = both[both[:, 0] < both[:, 1]]
         ends = mesh.vertices[self.pairs]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        # Weights of a power diagram: cells still fill space once, and faces stay perpendicular to their edges.
+        # Weights of a power diagram: cells still fill space, and faces stay perpendicular to their edges.
         scale = PERTURBATION * float(self.length.min()) ** 2
         self.weight = np.random.default_rng(0).uniform(-scale, scale, len(mesh.vertices))
 
@@ -144,7 +144,7 @@ class _Neighbours:
         Args:
             polygons: N polygons, changed in place.
             vertex: vertex whose cell clips each polygon, (N,).
-            other: neighbour of this vertex whose side of the cell does not clip, (N,), or -1.
+            other: neighbour of this vertex towards which the polygon is not clipped, (N,), or -1.
         """
         x = self.mesh.vertices
         for column in self.of.T:

@@ -1,4 +1,4 @@
-"""Read Wavefront .obj files. Each corner of a polygon has a vertex, a texture coordinate and a normal.
+"""Read Wavefront .obj files. A polygon corner has separate indices for vertex, texture coordinate and normal.
 
 There is one surface for each material, in the order in which faces first use the materials. Objects and
 groups are merged.

@@ -59,7 +59,7 @@ def _texture_image(
 
 
 def _materials(data: bytes) -> dict[str, tuple[tuple[float, float, float, float] | None, bytes]]:
-    """Return the colour, or None, and the name of the texture file, or b"", of each material, by name."""
+    """Return for each material, by name, the colour or None, and the name of the texture file or b""."""
     found: dict[str, dict[bytes, list[bytes]]] = {}
     current: dict[bytes, list[bytes]] = {}
     for line in as_ascii(data).split(b"\n"):

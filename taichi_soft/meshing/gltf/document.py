@@ -66,7 +66,7 @@ class Document:
             raise MeshError(f"is glTF of version {version[:10]}: {upgrade_command(path)}")
 
     def entry(self, name: str, parent: Entry | None = None) -> Entry:
-        """Return the object `name` of `parent`, or of the root if `parent` is None, or an empty object."""
+        """Return the object `name` of `parent`, or an empty object if it is missing. None means the root."""
         found = (self.json if parent is None else parent).get(name, {})
         return found if isinstance(found, dict) else {}
 
@@ -117,7 +117,7 @@ class Document:
         return decoded(rows, self.named("accessors", number))
 
     def view(self, number: Any) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view, and its stride [bytes], or 0 if it defines no stride."""
+        """Return the bytes of a buffer view, and its stride [bytes], or 0 if the view defines no stride."""
         entry, name = self.named("bufferViews", number), f"buffer view {number}"
         start, length = read_count(entry, "byteOffset", name, 0), read_count(entry, "byteLength", name)
         data = self._buffer(entry.get("buffer"))
@@ -220,7 +220,7 @@ def component_type(entry: Entry, name: str) -> np.dtype[Any]:
 
 
 def read_count(entry: Entry, key: str, name: str, default: int | None = None) -> int:
-    """Return the count or offset `key` of an entry. Raises: MeshError for other values than 0, 1, 2, ..."""
+    """Return the count or offset `key` of an entry. Raises: MeshError unless it is an integer from 0."""
     value = entry.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise MeshError(f"cannot be read: {key} of {name} is {value!r}, not a whole number of at least 0")

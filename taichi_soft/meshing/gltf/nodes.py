@@ -45,7 +45,7 @@ def world_matrices(document: Document) -> FloatArray:
 def shown_nodes(document: Document) -> list[int]:
     """Return the numbers of the visible nodes of the default scene, parents before their children.
 
-    If the file has no default scene, the first scene is used. If it has no scene, all nodes are used.
+    If the file has no default scene, the first scene is used. If the file has no scene, all nodes are used.
     """
     nodes = document.entries("nodes")
     if document.entries("scenes"):
@@ -66,7 +66,7 @@ def shown_nodes(document: Document) -> list[int]:
 
 
 def instance_matrices(document: Document, node: Entry) -> FloatArray | None:
-    """Return the matrices from a mesh's instances to the node's axes, (k, 4, 4), or None without instances."""
+    """Return the matrices from mesh instances to the node's axes, (k, 4, 4), or None without instances."""
     attributes = extension(node, INSTANCING).get("attributes")
     if not attributes:
         return None

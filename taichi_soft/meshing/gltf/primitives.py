@@ -165,7 +165,7 @@ class Primitive:
 
 
 def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles of a strip, (m, 3), without the triangles that repeat a corner to connect strips."""
+    """Return the triangles of a strip, (m, 3). Triangles that repeat a corner are dropped."""
     found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     found[1::2] = found[1::2, [1, 0, 2]]
     a, b, c = found.T
