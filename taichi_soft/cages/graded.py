@@ -4,8 +4,8 @@ If two cubes share a face or an edge, they are equal, or one cube is twice as lo
 the corners and centres of cubes. Between two equal cubes, a tetrahedron consists of both centres and an edge
 of the shared face, as in the lattice of equal cubes. If this edge has a vertex in its middle, there are two
 tetrahedra instead of one. A face between a large cube and four small cubes is divided into eight triangles.
-Each triangle forms one tetrahedron with the centre of the large cube and one with the centre of a small cube.
-(Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45 and 120
+Each triangle forms a tetrahedron with the centre of the large cube, and another with the centre of a small
+cube. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45 and 120
 degrees.
 """
 

@@ -155,7 +155,7 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
     """Return the vertices that become hull points, (h,), and the patch of each vertex, (n,).
 
-    The first hull points represent the patches of size `cell` [m], in order. The others are tips.
+    The first hull points represent the patches of size `cell` [m], in order. The other hull points are tips.
     """
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)

@@ -120,7 +120,7 @@ class Thin:
     octaves: int  # largest number of halvings of a cell
 
     def notes(self, cell_size: float) -> tuple[str, ...]:
-        """Return a sentence on the limbs and sheets that are kept, and a sentence on those that are left out.
+        """Return a sentence on the limbs and sheets that are kept, and a sentence on parts that are left out.
 
         If there are no such parts, the sentence is omitted.
         Args: cell_size: requested edge of a cell [m].

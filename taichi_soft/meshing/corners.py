@@ -76,7 +76,7 @@ def split(vertex_count: int, triangles: Ints, attributes: tuple[Attribute, ...],
 
 
 def require_vertices(corners: Ints, counts: Ints, vertex_count: int) -> None:
-    """Check that faces name only existing vertices. Raises: MeshError if they name others."""
+    """Check that faces name only existing vertices. Raises: MeshError if a vertex does not exist."""
     outside = (corners < 0) | (corners >= vertex_count)
     if outside.any():
         at = int(np.argmax(outside))

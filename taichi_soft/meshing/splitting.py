@@ -82,7 +82,7 @@ def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
 def connected(count: int, first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.int64]:
     """Return the lowest number that is connected to each of the numbers 0 to `count` - 1, (count,).
 
-    Each entry of `first` is linked to the same entry of `second`.
+    Each number in `first` is connected to the number in the same row of `second`.
     """
     label = np.arange(count)
     while True:

@@ -30,7 +30,8 @@ Up = Literal["y", "z"]
 
 UP: dict[str, Up] = {".glb": "y", ".gltf": "y", ".obj": "y", ".ply": "z", ".stl": "z", ".off": "z"}
 """Axis that points up in files of each format. glTF defines this axis. For the other formats, it is the
-default of common exporters: OpenSCAD and FreeCAD for .off files, Blender for the others."""
+default of common exporters: OpenSCAD and FreeCAD for .off files, and Blender for .obj, .ply and .stl
+files."""
 
 DEFINED = (".glb", ".gltf")
 """Formats that define which axis points up."""
