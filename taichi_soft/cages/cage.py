@@ -1,4 +1,4 @@
-"""Build the cage of a solid: tetrahedra around it that carry its volume and mass."""
+"""Build the cage of a solid. A cage is a set of tetrahedra that carry the solid's volume and mass."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ SMALLEST_PART = 1e-3
 """Fraction of the solid's volume below which a component is discarded."""
 
 MIN_FILL = 0.05
-"""Smallest fill of a tetrahedron: its neighbours would accelerate a much lighter one too strongly."""
+"""Smallest fill of a tetrahedron. Neighbours would accelerate a much lighter tetrahedron too strongly."""
 
 MAX_FILL = 1.5
-"""Largest fill of a tetrahedron. It limits the stiffness that parts of the solid outside the cage add."""
+"""Largest fill of a tetrahedron. This limits the stiffness that parts of the solid outside the cage add."""
 
 MIN_LUMPED_FRACTION = 0.9
-"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around it. Stiffness
-grows with the fill, so a lighter vertex would vibrate fast and shorten the stable step."""
+"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around the vertex.
+Stiffness grows with the fill, so a lighter vertex would vibrate fast and shorten the stable step."""
 
 MAX_PEELS = 4
 """Largest number of layers of flat tetrahedra that are removed."""
@@ -42,13 +42,13 @@ MAX_PEELS = 4
 
 @dataclass(frozen=True, eq=False)
 class Cage:
-    """Tetrahedra and the part of the solid that each of them and each vertex carries."""
+    """Tetrahedra around a solid. Each tetrahedron and each vertex carries a part of the solid."""
 
     mesh: CageMesh
     solid: Solid
     part: Ints  # (m,), component of the solid that each tetrahedron belongs to
     octave: Ints  # (m,), number of halvings of the cells at each tetrahedron
-    thin: Thin | None = None  # limbs and sheets that are too thin for cells of the requested size
+    thin: Thin | None = None  # limbs and sheets that are too thin for the requested cells, if there are any
 
 
 def cage_in(
@@ -57,11 +57,11 @@ def cage_in(
     enclosed_volume: float,
     kept: NDArray[np.bool_] | None = None,
 ) -> Cage:
-    """Build the cage of a solid in a lattice.
+    """Build the cage of a solid from tetrahedra of a lattice.
 
     Args:
         enclosed_volume: volume of the solid by the divergence theorem [m^3].
-        kept: True for voxels that must be covered, in the shape of `solid.fill`.
+        kept: True for voxels that the cage must cover, with the shape of `solid.fill`.
     Raises: OptionError if the cage would fall into pieces.
     """
     points, volumes = solid.quadrature()
@@ -103,7 +103,10 @@ def cage_in(
 
 
 def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> Ints:
-    """Remove tetrahedra that would lie flat in the surface, if the others stay connected."""
+    """Remove tetrahedra that the surface would flatten, but keep the rest connected.
+
+    Returns: numbers of the remaining tetrahedra, ascending.
+    """
     for _ in range(MAX_PEELS):
         corners = lattice.corners_of(numbers)
         used, tets = np.unique(corners, return_inverse=True)
@@ -127,7 +130,7 @@ def _with_volumes(
     )
     quarters = lumped(mesh.tets, fill * mesh.volumes, len(mesh.vertices))
     lumped_volumes = np.maximum(lumped_volumes, MIN_LUMPED_FRACTION * quarters)
-    cell = solid.spacing**2 / 12.0  # second moment of a full voxel over its volume
+    cell = solid.spacing**2 / 12.0  # second moment of a full voxel, divided by the voxel's volume
     second_moment = np.einsum("k,ki,kj->ij", volumes, points, points) + volumes.sum() * cell * np.eye(3)
     vertex_volumes = fitted(
         mesh.vertices,

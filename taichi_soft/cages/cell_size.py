@@ -9,7 +9,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
 DEFAULT_CELLS = 10
-"""Default number of cells along the longest side. It gives a few thousand tetrahedra, which suits games."""
+"""Default number of cells along the longest side. It leads to a few thousand tetrahedra, enough for games."""
 
 MAX_CELLS = 150_000
 """Largest number of cells in the bounding box of the surface."""
@@ -23,7 +23,7 @@ def cell_size_of(size: FloatArray, cells: int | None, cell_size: float | None) -
 
     Args:
         size: lengths of the bounding box of the surface, (3,) [m].
-        cells, cell_size: as for `SoftBodyAsset.from_surface`.
+        cells, cell_size: arguments of `SoftBodyAsset.from_surface`.
     Raises: OptionError for an invalid size or too many cells; MeshError for a surface without extent.
     """
     longest = float(size.max())

@@ -9,9 +9,10 @@ Ints = NDArray[np.int64]
 
 
 def components(count: int, pairs: Ints) -> Ints:
-    """Component of each of `count` elements, numbered from 0; `pairs` (k, 2) connect elements.
+    """Return the number of the component that contains each of `count` elements, (count,).
 
-    Components are numbered in the order of their first elements.
+    Components are numbered from 0, in the order of their first elements.
+    Args: pairs: connected elements, (k, 2).
     """
     root = np.arange(count)
     while True:
@@ -26,7 +27,10 @@ def components(count: int, pairs: Ints) -> Ints:
 
 
 def parts_of(fill: NDArray[np.float64]) -> Ints:
-    """Component of each voxel, -1 if it is empty. Voxels that touch at a corner are connected."""
+    """Return the component number of each voxel, -1 for empty voxels.
+
+    Voxels that touch at a face, an edge or a corner are connected.
+    """
     is_full = fill > 0.0
     # Runs of voxels along the last axis are connected, and there are far fewer runs than voxels.
     begins = is_full.copy()
@@ -34,7 +38,7 @@ def parts_of(fill: NDArray[np.float64]) -> Ints:
     row = np.cumsum(begins.ravel()).reshape(fill.shape) - 1
     pairs = []
     steps = np.argwhere(np.ones((3, 3, 3))) - 1
-    for step in steps[15:]:  # half of the neighbours, by symmetry, without the one in the same run
+    for step in steps[15:]:  # half of the neighbours suffice, by symmetry; steps[14] is in the same run
         here = tuple(slice(max(0, -s), fill.shape[k] - max(0, s)) for k, s in enumerate(step))
         there = tuple(slice(max(0, s), fill.shape[k] - max(0, -s)) for k, s in enumerate(step))
         both = is_full[here] & is_full[there]

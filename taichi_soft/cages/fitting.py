@@ -13,36 +13,37 @@ Ints = NDArray[np.int64]
 
 PASSES = 8
 HALVINGS = 5
-"""Largest number of halvings of a move that makes a tetrahedron invalid, before the pass drops the move."""
+"""Largest number of halvings of a move that makes a tetrahedron invalid. After these, the move is dropped."""
 
 SHARPEST, FLATTEST = 20.0, 145.0
 """Smallest and largest dihedral angle allowed [degrees]."""
 
 MAX_STIFFNESS = 3.0
-"""Largest sum of squared gradients of a tetrahedron's shape functions, relative to the lattice's. With vertex
-masses as in the lattice, the stable step would stay above 0.58 of the lattice's."""
+"""Largest sum of squared gradients of a tetrahedron's shape functions, relative to this sum in the lattice.
+If the vertices kept their masses in the lattice, the stable step would stay above 0.58 of the lattice's
+step."""
 
 FLAT = 0.25
-"""A tetrahedron is removed if less than this fraction of its volume is left once its vertices lie on the
+"""A tetrahedron is removed if less than this fraction of its volume is left when its vertices lie on the
 surface."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
-"""Search radii around a vertex's voxel, in voxels, in the order of the search. The nearest point found is
-final if its distance is at most the radius minus the diagonal of a voxel."""
+"""Radii of successive searches around a vertex's voxel, in voxels. The search stops at the first radius at
+which it finds a point no farther than the radius minus the diagonal of a voxel."""
 
 CHUNK = 1 << 20
-"""Pairs of vertices and voxels that are processed at once."""
+"""Number of pairs of a vertex and a voxel that are processed at once."""
 
 SEARCH_RANGE = 0.75
-"""Distance from a vertex within which the surface is searched, in edges of a cube."""
+"""Distance from a vertex within which surface points are searched, relative to the edge of a cube."""
 
 
 def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: float) -> FloatArray:
-    """Return new positions of the vertices, (n, 3) [m].
+    """Move vertices onto the surface of a solid. Returns: new positions, (n, 3) [m].
 
     Args:
         vertices: vertices of the lattice, (n, 3) [m].
-        tets: (m, 4).
+        tets: vertex indices of the tetrahedra, (m, 4).
         octaves: number of halvings of the lattice's cubes at each tetrahedron, (m,).
         solid: solid whose surface is fitted.
         edge: edge of the lattice's largest cubes [m].
@@ -69,8 +70,8 @@ def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: flo
 def caps(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> NDArray[np.bool_]:
     """True for tetrahedra that the surface would flatten, (m,).
 
-    All vertices of such a tetrahedron are outer ones. Once they lie on the surface, little volume is left.
-    Arguments as for `fit`.
+    All vertices of such a tetrahedron are outer vertices. When they lie on the surface, little of the
+    tetrahedron's volume is left. The arguments are those of `fit`.
     """
     surface = surface_of(tets.astype(np.int32))
     outer = np.unique(surface)
@@ -82,7 +83,12 @@ def caps(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> NDArray
 
 
 def _moved(positions: FloatArray, targets: FloatArray, tets: Ints, limit: FloatArray) -> FloatArray:
-    """Move vertices towards `targets` as far as all tetrahedra stay valid, by halving moves."""
+    """Move vertices towards `targets` as far as all tetrahedra stay valid.
+
+    A move that makes a tetrahedron invalid is halved several times, then dropped.
+    Args: limit: largest sum of squared gradients allowed in each tetrahedron, (m,) [1/m^2].
+    Returns: new positions, (n, 3) [m].
+    """
     fraction = np.ones(len(positions))
     for halving in range(HALVINGS + 1):
         tried = positions + fraction[:, None] * (targets - positions)
@@ -90,7 +96,7 @@ def _moved(positions: FloatArray, targets: FloatArray, tets: Ints, limit: FloatA
         if not spoilt.any():
             return tried
         fraction[tets[spoilt]] *= 0.5 if halving < HALVINGS - 1 else 0.0
-    while spoilt.any():  # until all vertices around are back at valid positions
+    while spoilt.any():
         fraction[tets[spoilt]] = 0.0
         tried = positions + fraction[:, None] * (targets - positions)
         spoilt = _is_spoilt(tried[tets], limit)
@@ -115,7 +121,7 @@ def _stiffness(corners: FloatArray) -> FloatArray:
 
 
 def _gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gradients of the shape functions, (m, 4, 3) [1/m], and volumes, (m,) [m^3]."""
+    """Return the gradients of the shape functions, (m, 4, 3) [1/m], and the volumes, (m,) [m^3]."""
     faces = corners[:, LOCAL_FACES]
     areas = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
     edges = corners[:, 1:] - corners[:, :1]
@@ -125,7 +131,7 @@ def _gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class _NeighbourMean:
-    """Mean position of the neighbours of each vertex."""
+    """Function that maps positions of vertices to the mean position of each vertex's neighbours, (n, 3)."""
 
     def __init__(self, edges: NDArray[np.integer], count: int) -> None:
         pairs = np.unique(np.sort(edges, axis=1), axis=0)
@@ -139,7 +145,7 @@ class _NeighbourMean:
 
 
 class _Nearest:
-    """Finds the nearest point on the surface that separates inside and outside."""
+    """Search for the nearest point on the surface that separates inside and outside."""
 
     def __init__(self, solid: Solid, search_range: float) -> None:
         self._solid = solid
@@ -156,7 +162,10 @@ class _Nearest:
         self._points, self._pad = points, cells
 
     def __call__(self, positions: FloatArray) -> FloatArray:
-        """Nearest point for each of `positions` (k, 3) [m]; the position itself if none is within range."""
+        """Return the surface point nearest to each of `positions` (k, 3) [m].
+
+        If no surface point is within range, the result is the position itself.
+        """
         found = positions.copy()
         distance = np.full(len(positions), np.inf)
         rest = np.arange(len(positions))
@@ -170,7 +179,10 @@ class _Nearest:
         return np.asarray(found)
 
     def _among(self, positions: FloatArray, offsets: Ints) -> tuple[FloatArray, FloatArray]:
-        """Nearest point in the voxels at `offsets`, and its distance; if none, the position and infinity."""
+        """Return the nearest point in the voxels at `offsets`, (k, 3) [m], and its distance, (k,) [m].
+
+        If these voxels contain no point, the result is the position itself and an infinite distance.
+        """
         last = np.array(self._solid.fill.shape) - 1
         voxels = ((positions - self._solid.origin) / self._solid.spacing).astype(np.int64)
         candidates = np.clip(voxels, 0, last)[:, None] + offsets + self._pad
@@ -183,7 +195,7 @@ class _Nearest:
 
 
 def _is_border(fill: FloatArray) -> NDArray[np.bool_]:
-    """True for voxels that are not full, or have a neighbour that is not."""
+    """True for voxels that are not full or have a neighbour that is not full."""
     least = np.pad(fill, 1)
     for axis in range(3):
         ahead = [slice(None)] * 3

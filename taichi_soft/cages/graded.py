@@ -1,11 +1,12 @@
 """A body-centred lattice whose cubes are halved at thin parts of the solid.
 
-Cubes that share a face or an edge are equal, or one is twice as long as the other. As in the lattice of equal
-cubes, the vertices are corners and centres of cubes, and a tetrahedron has the centres of two equal
-neighbours and an edge of the face between them. If the edge has a vertex in its middle, there are two
-tetrahedra instead. A face between a cube and four small ones consists of eight triangles, each joined to the
-centres on both sides. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are
-between 45 and 120 degrees.
+If two cubes share a face or an edge, they are equal, or one cube is twice as long as the other. Vertices are
+the corners and centres of cubes. Between two equal cubes, a tetrahedron consists of both centres and an edge
+of the shared face, as in the lattice of equal cubes. If this edge has a vertex in its middle, there are two
+tetrahedra instead of one. A face between a large cube and four small cubes is divided into eight triangles.
+Each triangle forms a tetrahedron with the centre of the large cube, and another with the centre of a small
+cube. (Labelle and Shewchuk, "Isosurface stuffing", 2007, section 3.) Dihedral angles are between 45 and 120
+degrees.
 """
 
 from __future__ import annotations
@@ -23,20 +24,24 @@ Bools = NDArray[np.bool_]
 Kind = TypeVar("Kind", bound=np.generic)
 
 SECTORS = ((0, 1), (0, 0), (1, 1), (1, 0))
-"""Sectors of a face, each between its centre and one of its edges: which of the two other axes points to the
-edge, and 1 for its positive direction. The order is the one in `Lattice.tet_at`."""
+"""Sectors of a face, in the order of `Lattice.tet_at`. A sector is the triangle between the face's centre and
+one edge. The first number tells which of the face's two axes points to the edge. The second number is 1 if
+the edge lies in the positive direction of this axis, otherwise 0."""
 
 
 class GradedLattice:
-    """A lattice with the interface of `Lattice`. A tetrahedron's number does not encode its position."""
+    """Lattice with cubes of several sizes and the interface of `Lattice`.
+
+    The number of a tetrahedron does not encode its position.
+    """
 
     def __init__(self, coarse: Lattice, splits: list[Bools]) -> None:
         """Halve cubes of a lattice.
 
         Args:
             coarse: lattice of equal cubes.
-            splits: result of `balanced`. For each octave, True for the cubes of the previous octave that are
-                halved, first (nx, ny, nz), then (2 nx, 2 ny, 2 nz), and so on.
+            splits: result of `balanced`, one array for each octave. An array is True for the cubes of the
+                previous octave that are halved. The shapes are (nx, ny, nz), (2 nx, 2 ny, 2 nz), and so on.
         """
         self.origin, self.edge = coarse.origin, coarse.edge
         self.octaves = len(splits)
@@ -54,7 +59,7 @@ class GradedLattice:
             if split is not None:
                 exists = doubled(split)
         self._splits = [*splits, np.zeros(self._leaves[-1].shape, dtype=np.bool_)]
-        # Integer coordinates: a cube of the last octave is two units long.
+        # Vertices have integer coordinates. A cube of the last octave is two units long.
         self._shape = tuple(2 * n + 1 for n in self._leaves[-1].shape)
         self._unit = coarse.edge / 2 ** (self.octaves + 1)
         self._table = np.full((starts[-1], 3, 2, 4, 2), -1)
@@ -81,7 +86,10 @@ class GradedLattice:
         return np.arange(self._count)
 
     def tet_at(self, points: FloatArray) -> Ints:
-        """Number of the tetrahedron that contains each point within the inner cubes, (k,)."""
+        """Return the number of the tetrahedron that contains each point, (k,).
+
+        The points must lie within the inner cubes.
+        """
         found = np.full(len(points), -1)
         for level in range(self.octaves + 1):
             coordinates = (points - self.origin) / (self.edge / 2**level)
@@ -100,27 +108,35 @@ class GradedLattice:
         return found
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), ordered so that volumes are positive."""
+        """Return the lattice vertices of tetrahedra, (k, 4), in an order that makes volumes positive."""
         return np.asarray(self._all[numbers])
 
     def points_of(self, vertices: Ints) -> FloatArray:
-        """Positions of lattice vertices, (k, 3) [m]."""
+        """Return the positions of lattice vertices, (k, 3) [m]."""
         coordinates = np.stack(np.unravel_index(vertices, self._shape), axis=1)
         return np.asarray(self.origin + self._unit * coordinates)
 
     def volumes_of(self, numbers: Ints) -> FloatArray:
-        """Volumes of tetrahedra, (k,) [m^3]."""
+        """Return the volumes of tetrahedra, (k,) [m^3]."""
         return np.asarray(self._volumes[numbers])
 
     def octaves_of(self, numbers: Ints) -> Ints:
-        """Number of halvings of the cubes whose edges are as long as those of the tetrahedra, (k,)."""
+        """Return the octave of each tetrahedron, (k,).
+
+        A tetrahedron of octave n has edges as long as the edges of cubes that were halved n times.
+        """
         return np.asarray(self._level[numbers])
 
     def _vertex(self, coordinates: Ints) -> Ints:
         return np.asarray(np.ravel_multi_index(tuple(coordinates.T), self._shape))
 
     def _add(self, corners: list[Ints], level: int) -> Ints:
-        """Add tetrahedra whose corners are given by four lists of coordinates. Returns their numbers."""
+        """Add tetrahedra and return their numbers, (k,).
+
+        Args:
+            corners: integer coordinates of the first, second, third and fourth corners, (k, 3) each.
+            level: octave of the tetrahedra.
+        """
         numbers = np.arange(len(corners[0])) + self._count
         self._corners.append(np.stack([self._vertex(each) for each in corners], axis=1))
         self._levels.append(np.full(len(numbers), level))
@@ -128,14 +144,14 @@ class GradedLattice:
         return numbers
 
     def _fill_between_equals(self, level: int, axis: int) -> None:
-        """Add the tetrahedra around faces between two cubes of one octave."""
+        """Add the tetrahedra around faces between two cubes of the same octave."""
         leaf, size = self._leaves[level], 2 ** (self.octaves - level)
         here, there = _pairs(leaf, leaf, axis)
         low, high = self._numbers[level][tuple(here.T)], self._numbers[level][tuple(there.T)]
         others = ((axis + 1) % 3, (axis + 2) % 3)
         for sector, (which, forwards) in enumerate(SECTORS):
             across, along = others[which], others[1 - which]
-            start = there.copy()  # start of the edge, in cubes
+            start = there.copy()  # lower end of the edge, counted in cubes
             start[:, across] += forwards
             step = np.eye(3, dtype=np.int64)[along] * size
             has_middle = self._has_middle(level, start, along)
@@ -153,7 +169,14 @@ class GradedLattice:
                     self._table[high[rows], axis, 0, sector, half] = added
 
     def _has_middle(self, level: int, start: Ints, along: int) -> Bools:
-        """True for each edge, given by its lowest corner, if one of the four cubes around it is halved."""
+        """True for edges with a vertex in the middle, (k,).
+
+        An edge has a vertex in the middle if one of the four cubes around it is halved.
+        Args:
+            level: octave of the edges.
+            start: lower end of each edge, in cubes of this octave, (k, 3).
+            along: axis of the edges.
+        """
         split = self._splits[level]
         others = [k for k in range(3) if k != along]
         found = np.zeros(len(start), dtype=np.bool_)
@@ -167,9 +190,10 @@ class GradedLattice:
         return found
 
     def _fill_between_unequals(self, level: int, axis: int, side: int) -> None:
-        """Add the tetrahedra on both sides of faces between a cube and four of half its length.
+        """Add the tetrahedra on both sides of faces between a large cube and four cubes of half its length.
 
-        The small cubes lie ahead if `side` is 1.
+        The small cubes lie in the positive direction of the axis if `side` is 1, otherwise in the negative
+        direction.
         """
         size = 2 ** (self.octaves - level)
         pairs = _pairs(self._leaves[level], self._splits[level], axis)
@@ -178,7 +202,7 @@ class GradedLattice:
         large_number = self._numbers[level][tuple(large.T)]
         middle = size * (2 * large + 1)
         middle[:, axis] += size if side else -size  # centre of the face
-        for directions in ((0, 0), (0, 1), (1, 0), (1, 1)):  # each small cube, from the centre of the face
+        for directions in ((0, 0), (0, 1), (1, 0), (1, 1)):  # from the face's centre to each small cube
             small = 2 * parent
             small[:, axis] += 1 - side
             opposite = middle.copy()
@@ -186,7 +210,7 @@ class GradedLattice:
                 small[:, other] += direction
                 opposite[:, other] += size if direction else -size
             number = self._numbers[level + 1][tuple(small.T)]
-            for which in (0, 1):  # axis from the centre to the triangle's corner
+            for which in (0, 1):  # axis from the face's centre to the triangle's corner
                 corner = middle.copy()
                 corner[:, others[which]] = opposite[:, others[which]]
                 triangle = [middle, corner, opposite]
@@ -201,7 +225,10 @@ class GradedLattice:
 
 
 def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
-    """Neighbours along an axis, the lower one in `low` and the upper one in `high`, (k, 3) each."""
+    """Find neighbours along an axis, with the first cube in `low` and the second cube in `high`.
+
+    Returns: the first cubes and the second cubes, (k, 3) each.
+    """
     ahead = np.moveaxis(high, axis, 0)[1:]
     both = np.moveaxis(np.moveaxis(low, axis, 0)[:-1] & ahead, 0, axis)
     here = np.argwhere(both)
@@ -211,14 +238,14 @@ def _pairs(low: Bools, high: Bools, axis: int) -> tuple[Ints, Ints]:
 
 
 def doubled(cubes: NDArray[Kind], octaves: int = 1) -> NDArray[Kind]:
-    """Return the values for cubes halved `octaves` times: each part gets the value of its cube."""
+    """Return the values of cubes after `octaves` halvings. Small cubes get the value of the original cube."""
     for axis in range(3):
         cubes = cubes.repeat(2**octaves, axis=axis)
     return cubes
 
 
 def halved(cubes: Bools) -> Bools:
-    """True for cubes of twice the length that contain one of `cubes`."""
+    """True for cubes of twice the length that contain at least one True entry of `cubes`."""
     nx, ny, nz = (n // 2 for n in cubes.shape)
     return np.asarray(cubes.reshape(nx, 2, ny, 2, nz, 2).any(axis=(1, 3, 5)))
 
@@ -235,7 +262,7 @@ def around(cubes: Bools) -> Bools:
 
 
 def balanced(splits: list[Bools]) -> list[Bools]:
-    """Return splits with more halved cubes, so that cubes that touch differ by at most one octave."""
+    """Return `splits` with additional halved cubes, so that touching cubes differ by at most one octave."""
     found = list(splits)
     for octave in range(len(found) - 1, 0, -1):
         found[octave - 1] = found[octave - 1] | halved(around(found[octave]))

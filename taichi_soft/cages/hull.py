@@ -1,9 +1,9 @@
-"""The hull of an artist's mesh: points on its surface, and triangles between them, used for contact.
+"""The hull of an artist's mesh, used for contact: points on the mesh, and triangles between these points.
 
-The surface is divided into patches. A patch consists of the vertices in one cell of a grid that face the same
-direction, and has one hull point, its most prominent vertex. Tips and the two sides of a sheet are therefore
-kept, and all points lie on the surface. Objects that pass between the points penetrate by a small fraction of
-the points' distance.
+The surface is divided into patches. A patch consists of the vertices that lie in the same cell of a grid and
+face the same direction. The most prominent vertex of each patch becomes a hull point. The hull therefore
+keeps tips and both sides of a sheet, and all hull points lie on the surface. Objects that pass between hull
+points penetrate by a small fraction of the distance between the points.
 """
 
 from __future__ import annotations
@@ -28,31 +28,32 @@ MIN_POINTS, MAX_POINTS = 12, 20_000
 """Range of the number of points of a hull."""
 
 POINTS_PER_VERTEX = 2.0
-"""Default number of points per outer vertex of the tetrahedra. Round shapes then penetrate by 2 % of their
-size."""
+"""Default number of hull points per outer vertex of the tetrahedra. With this number, round shapes penetrate
+by 2 % of their size."""
 
 VOXELS = 64
 """Voxels along the longest side of the grid that separates inside and outside."""
 
 STEPS = 1.0, 2.0, 3.0
-"""Distances in front of and behind a triangle, in voxels, at which the fill is averaged. Single voxels can be
-wrong near triangles of wrong orientation."""
+"""Distances in front of and behind a triangle, in voxels. The fills at these distances are averaged, because
+single voxels can be wrong near triangles of wrong orientation."""
 
 INNER, FLIP_MARGIN = 0.95, 0.25
 """A triangle is dropped if the mean fill is at least INNER on both sides. It is flipped if the fill in front
 exceeds the fill behind by more than FLIP_MARGIN."""
 
 DIRECTIONS = 0.5
-"""Number of directions whose farthest vertices become points, relative to the number of points."""
+"""Number of directions, relative to the number of hull points. The farthest vertex in each direction becomes
+a hull point."""
 
 HALVINGS = 14
-"""Bisection steps of the search for the cell size."""
+"""Number of bisection steps in the search for the cell size."""
 
 
 @serialised("points", "triangles")
 @dataclass(frozen=True, eq=False)
 class Hull:
-    """Points on a surface, and triangles between them, facing outward.
+    """Points on a surface, and outward-facing triangles between the points.
 
     Args:
         points: (h, 3) [m].
@@ -73,14 +74,15 @@ class Hull:
 
 
 def as_hull(request: Any, surfaces: tuple[Surface, ...], outer: int) -> Hull | None:
-    """Return the hull for the argument `hull` of `SoftBodyAsset`.
+    """Make a hull from the argument `hull` of `SoftBodyAsset`. For None, return None.
 
     Args:
         request: None, True, a number of points, a surface as for `read_surfaces`, or a hull.
         surfaces: skin of the asset.
-        outer: number of vertices on the surface of the tetrahedra, from which True derives the number of
-            points.
-    Raises: OptionError for a number out of range, or without surfaces; MeshError for a bad surface.
+        outer: number of vertices on the surface of the tetrahedra. If `request` is True, the number of points
+            is derived from it.
+    Raises: OptionError if a number is out of range or there are no surfaces; MeshError for an invalid
+        surface.
     """
     if request is None or isinstance(request, Hull):
         return request
@@ -102,7 +104,7 @@ def as_hull(request: Any, surfaces: tuple[Surface, ...], outer: int) -> Hull | N
 def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
     """Make a hull of at most `count` points.
 
-    Raises: OptionError for a number out of range; MeshError for a surface without extent.
+    Raises: OptionError if `count` is out of range; MeshError for a surface without extent.
     """
     max_points = as_count(count, "hull", MIN_POINTS, MAX_POINTS)
     vertices, triangles = _outward(*joined(surfaces))
@@ -126,10 +128,11 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
-    """Index in `chosen` of the vertex nearest along edges, (n,); without a path, of the patch's vertex.
+    """Return for each vertex the index in `chosen` of the chosen vertex that is nearest along edges, (n,).
 
-    Triangles between these nearest vertices surround their corners. Triangles between patches would fold over
-    if the point of a patch lies at its rim.
+    If no path leads to a chosen vertex, the result is the number in `patch`. Triangles between nearest chosen
+    vertices are well oriented. Triangles between patches would fold over if the chosen vertex of a patch lies
+    at the patch's rim.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
@@ -150,7 +153,10 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
-    """Return points (representatives of patches of size `cell` [m], then tips), and each vertex's patch."""
+    """Return the vertices that become hull points, (h,), and the patch of each vertex, (n,).
+
+    The first hull points represent the patches of size `cell` [m], in order. The other hull points are tips.
+    """
     patches, patch = np.unique(_patches(vertices, normals, cell), return_inverse=True)
     patch = patch.reshape(-1)
     representatives = _representatives(vertices, normals, tips, patch, len(patches))
@@ -159,7 +165,10 @@ def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) 
 
 
 def _outward(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
-    """Merge coincident vertices, turn triangles outwards, and drop triangles with solid on both sides."""
+    """Merge coincident vertices, turn triangles outwards, and drop triangles with solid on both sides.
+
+    Returns: vertices (k, 3) [m], triangles (j, 3).
+    """
     positions, numbers = np.unique(vertices, axis=0, return_inverse=True)
     corners = numbers.reshape(-1)[triangles]
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
@@ -192,7 +201,7 @@ def _outward(vertices: FloatArray, triangles: Ints) -> tuple[FloatArray, Ints]:
 
 def _subdivided(vertices: FloatArray, triangles: Ints, longest: float) -> tuple[FloatArray, Ints]:
     """Subdivide the surface until no edge is longer than `longest` [m]."""
-    from trimesh.remesh import subdivide_to_size  # slow to import, and games do not need it
+    from trimesh.remesh import subdivide_to_size  # imported here because games do not need this slow import
 
     x = vertices[triangles]
     most = float(np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max())
@@ -205,7 +214,7 @@ def _subdivided(vertices: FloatArray, triangles: Ints, longest: float) -> tuple[
 
 
 def _normals(vertices: FloatArray, triangles: Ints) -> FloatArray:
-    """Area-weighted vertex normals, (n, 3); 0 for vertices without triangles."""
+    """Return the area-weighted unit normals of vertices, (n, 3). Vertices without triangles have normal 0."""
     x = vertices[triangles]
     areas = np.repeat(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), 3, axis=0)
     sums = [np.bincount(triangles.ravel(), areas[:, k], len(vertices)) for k in range(3)]
@@ -215,7 +224,10 @@ def _normals(vertices: FloatArray, triangles: Ints) -> FloatArray:
 
 
 def _patches(vertices: FloatArray, normals: FloatArray, cell: float) -> Ints:
-    """Number of each vertex's patch, (n,), from its grid cell and the one of six directions that it faces."""
+    """Return a patch number for each vertex, (n,). It encodes the grid cell and the direction of the normal.
+
+    The direction is the positive or negative axis nearest to the normal.
+    """
     cells = np.floor((vertices - vertices.min(axis=0)) / cell).astype(np.int64)
     axis = np.abs(normals).argmax(axis=1)
     direction = 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
@@ -224,7 +236,7 @@ def _patches(vertices: FloatArray, normals: FloatArray, cell: float) -> Ints:
 
 
 def _tips(vertices: FloatArray, count: int) -> Ints:
-    """Number of directions, out of `count` evenly spread ones, in which each vertex is the farthest, (n,)."""
+    """Count in how many of `count` evenly spread directions each vertex is the farthest, (n,)."""
     number = np.arange(count) + 0.5
     height, angle = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
     radius = np.sqrt(1.0 - height**2)
@@ -234,7 +246,10 @@ def _tips(vertices: FloatArray, count: int) -> Ints:
 
 
 def _representatives(vertices: FloatArray, normals: FloatArray, tips: Ints, patch: Ints, count: int) -> Ints:
-    """Vertex of each patch that is farthest in the most directions; in a tie, along the mean normal."""
+    """Return for each patch the vertex that is the farthest in the most directions, (count,).
+
+    A tie is decided by the position along the patch's mean normal.
+    """
     means = np.stack([np.bincount(patch, normals[:, k], count) for k in range(3)], axis=1)
     height = np.einsum("nk,nk->n", vertices, means[patch])
     order = np.lexsort((np.arange(len(patch)), -height, -tips, patch))
@@ -243,7 +258,7 @@ def _representatives(vertices: FloatArray, normals: FloatArray, tips: Ints, patc
 
 
 def _distinct_triangles(corners: Ints) -> Ints:
-    """Return the triangles without degenerate ones and duplicates."""
+    """Remove degenerate and duplicate triangles."""
     is_flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     corners = corners[~is_flat]
     lead = corners.argmin(axis=1)
@@ -252,7 +267,10 @@ def _distinct_triangles(corners: Ints) -> Ints:
 
 
 def _without_fins(triangles: Ints) -> Ints:
-    """Remove pairs of triangles with the same corners that face opposite directions: they enclose nothing."""
+    """Remove triangles that share all corners with another triangle: such pairs enclose nothing.
+
+    If no triangle would be left, return all.
+    """
     corners = np.sort(triangles, axis=1)
     _, number, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
     is_single = count[number.reshape(-1)] == 1

@@ -1,9 +1,9 @@
 """The body-centred cubic lattice: equal tetrahedra without a preferred direction.
 
-Its vertices are corners and centres of cubes. Each tetrahedron has the centres of two neighbouring cubes and
-an edge of the face between them. Dihedral angles are 60 and 90 degrees, and there are twelve tetrahedra per
-cube. (Labelle and Shewchuk, "Isosurface stuffing", 2007. They cut the lattice at the surface; here its
-vertices are moved.)
+The vertices of the lattice are corners and centres of cubes. Each tetrahedron consists of the centres of two
+neighbouring cubes and an edge of the face between them. Dihedral angles are 60 and 90 degrees, and there are
+twelve tetrahedra per cube. (Labelle and Shewchuk, "Isosurface stuffing", 2007. That method cuts the lattice
+at the surface; `fitting` moves the vertices instead.)
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Cubes around a solid, with one more layer on each side. A tetrahedron's number encodes its position."""
+    """Cubes around a solid, with one more layer on each side.
+
+    The number of a tetrahedron encodes the tetrahedron's position.
+    """
 
     origin: FloatArray  # (3,), corner of the first cube [m]
     edge: float  # edge of a cube [m]
@@ -28,18 +31,18 @@ class Lattice:
 
     @classmethod
     def around_box(cls, low: FloatArray, high: FloatArray, edge: float) -> Lattice:
-        """Make a lattice that is centred on a box."""
+        """Make a lattice that is centred on the box between `low` and `high` [m]."""
         inner = np.maximum(np.ceil((high - low) / edge - 1e-9).astype(np.int64), 1)
         origin = 0.5 * (low + high) - 0.5 * edge * inner - edge
         nx, ny, nz = (int(n) + 2 for n in inner)
         return cls(origin, edge, (nx, ny, nz))
 
     def volumes_of(self, numbers: Ints) -> FloatArray:
-        """Volumes of tetrahedra, all equal, (k,) [m^3]."""
+        """Return the volumes of tetrahedra, (k,) [m^3]. All volumes are equal."""
         return np.full(len(numbers), self.edge**3 / 12.0)
 
     def octaves_of(self, numbers: Ints) -> Ints:
-        """Number of halvings of the cubes for each tetrahedron, (k,): 0."""
+        """Return the octave of each tetrahedron, (k,). All octaves are 0, because no cube is halved."""
         return np.zeros(len(numbers), dtype=np.int64)
 
     @property
@@ -51,7 +54,10 @@ class Lattice:
         return np.concatenate([numbers[axis][has_next[axis]].ravel() for axis in range(3)])
 
     def tet_at(self, points: FloatArray) -> Ints:
-        """Number of the tetrahedron that contains each point within the inner cubes, (k,)."""
+        """Return the number of the tetrahedron that contains each point, (k,).
+
+        The points must lie within the inner cubes.
+        """
         coordinates = (points - self.origin) / self.edge
         cube = coordinates.astype(np.int64)
         offset = coordinates - cube - 0.5
@@ -64,7 +70,7 @@ class Lattice:
         return np.asarray(face * 4 + side)
 
     def corners_of(self, numbers: Ints) -> Ints:
-        """Lattice vertices of tetrahedra, (k, 4), ordered so that volumes are positive."""
+        """Return the lattice vertices of tetrahedra, (k, 4), in an order that makes volumes positive."""
         total = int(np.prod(self.cubes))
         side, rest = numbers % 4, numbers // 4
         axis, flat = rest // total, rest % total
@@ -79,7 +85,7 @@ class Lattice:
         low[rows, along] += (side % 2) == 0
         high = low.copy()
         high[rows, other] += 1
-        # The edge is reversed on the other side of the face, and on its other pair of sides.
+        # Positive volumes need a reversed edge on sides 1 and 2 of the face.
         is_reversed = ((side % 2) == 1) ^ (side >= 2)
         a, b = self._corner(low), self._corner(high)
         corners = [
@@ -91,7 +97,7 @@ class Lattice:
         return np.stack(corners, axis=1)
 
     def points_of(self, vertices: Ints) -> FloatArray:
-        """Positions of lattice vertices, (k, 3) [m]."""
+        """Return the positions of lattice vertices, (k, 3) [m]."""
         shape = tuple(n + 1 for n in self.cubes)
         is_center = vertices >= np.prod(shape)
         corner = np.stack(np.unravel_index(np.where(is_center, 0, vertices), shape), axis=1)

@@ -1,4 +1,4 @@
-"""Build the cage of a surface in a lattice, with smaller cells for limbs and sheets that it would miss."""
+"""Build the cage of a surface from a lattice. Limbs and sheets that the cage would miss get smaller cells."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from taichi_soft.meshing.surface import Surface, joined
 Ints = NDArray[np.int64]
 
 ROUNDS = 3
-"""Largest number of refinements, each followed by a search for limbs that are still missed."""
+"""Largest number of refinements. Each refinement is followed by a search for limbs that are still missed."""
 
 
 def build_cage(
@@ -31,14 +31,17 @@ def build_cage(
     cell_size: float | None = None,
     refine: int = REFINE,
 ) -> Cage:
-    """Build the cage of the solid that surfaces enclose. Arguments as for `SoftBodyAsset.from_surface`."""
+    """Build the cage of the solid that surfaces enclose.
+
+    The arguments are those of `SoftBodyAsset.from_surface`.
+    """
     vertices, triangles = joined(surfaces)
     size = np.ptp(vertices[np.unique(triangles)], axis=0)
     return lattice_cage(vertices, triangles, cell_size_of(size, cells, cell_size), refine)
 
 
 def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float, refine: int = REFINE) -> Cage:
-    """Build a cage of a lattice's tetrahedra.
+    """Build the cage of the solid inside a surface from a lattice's tetrahedra.
 
     Args:
         vertices: vertices of the surface, (n, 3) [m].
@@ -64,7 +67,7 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float, refine
 
 
 class Refinement:
-    """Finds the parts that a first cage misses, and refines the lattice there."""
+    """Refinement of a lattice at the parts of a surface that the first cage misses."""
 
     def __init__(
         self, lattice: Lattice, vertices: FloatArray, triangles: Ints, enclosed_volume: float
@@ -73,7 +76,10 @@ class Refinement:
         self._corners, self._enclosed_volume = vertices[triangles], enclosed_volume
 
     def refined(self, cage: Cage, refine: int) -> Cage:
-        """Return a cage with smaller cells at missed limbs, unless these are too thin for smaller cells."""
+        """Return a cage with smaller cells at the limbs that `cage` misses.
+
+        Limbs that are still too thin after `refine` halvings of the cells stay missed.
+        """
         far, triangle = far_points(self._lattice, self._corners, cage.mesh)
         if len(far) == 0:
             return cage
@@ -84,7 +90,7 @@ class Refinement:
             return cage
         chosen = missed.among(self._lattice, np.zeros_like(missed.cubes))
         torn = torn_points(fine, self._vertices, self._triangles)
-        for _ in range(ROUNDS if refine else 0):  # finer voxels can miss other limbs that are as thin
+        for _ in range(ROUNDS if refine else 0):  # a cage from finer voxels can miss other thin limbs
             worth = missed.among(self._lattice, octaves_for(self._lattice, fine, missed, refine) > 0)
             if not (worth.cubes & ~chosen.cubes).any():
                 break
@@ -94,7 +100,7 @@ class Refinement:
             graded = refined(self._lattice, octaves, candidate.points)
             try:
                 cage = cage_in(graded, solid, self._enclosed_volume, voxels)
-            except OptionError:  # the cage is in pieces: leave these limbs out and report them
+            except OptionError:  # the cage would fall into pieces: leave out these limbs and report them
                 break
             chosen = candidate
             missed = self._missed_parts(cage, fine, *far_points(self._lattice, self._corners, cage.mesh))

@@ -14,20 +14,23 @@ from taichi_soft.meshing.topology import shared_faces
 Ints = NDArray[np.int64]
 
 MIN_FILL = 0.4
-"""Fraction of a tetrahedron inside the solid above which it is selected. It is below one half because
-vertices move inwards more easily."""
+"""A tetrahedron is selected if at least this fraction of it is solid. The value is below one half because
+vertices move inwards more easily than outwards."""
 
 TRACE = 0.02
-"""The same fraction at limbs and sheets that are thinner than a cube and would otherwise be missed."""
+"""Solid fraction at which a tetrahedron is selected if it lies at a limb or sheet that is thinner than a cube
+and would otherwise be missed."""
 
 LAYER = 2
-"""Largest thickness of a flat layer, in tetrahedra from face to face."""
+"""A layer of tetrahedra is thin if at most this many steps across faces lead from each of its tetrahedra out
+of the layer."""
 
 MAX_FRAGMENT = 2
 """Largest number of tetrahedra in a fragment that can be dropped."""
 
 ROUNDS = 3
-"""Number of rounds that add tetrahedra next to those connected only by an edge or a vertex."""
+"""Largest number of rounds that add tetrahedra at hinges, and of rounds that restore flat tetrahedra. Hinges
+are vertices at which tetrahedra are connected only by an edge or by the vertex."""
 
 
 def mark(
@@ -36,12 +39,12 @@ def mark(
     volumes: FloatArray,
     kept: NDArray[np.bool_] | None = None,
 ) -> Ints:
-    """Return the numbers of the selected tetrahedra, ascending.
+    """Select the tetrahedra that cover a solid. Returns: numbers of these tetrahedra, ascending.
 
     Args:
         points: points that represent one connected solid, (k, 3) [m].
-        volumes: volume of each, (k,) [m^3].
-        kept: True for points that must be covered, however thin the solid is there, (k,).
+        volumes: volume that each point represents, (k,) [m^3].
+        kept: True for points that must be covered even if the solid is very thin, (k,).
     """
     at = lattice.tet_at(points)
     numbers, place = np.unique(at, return_inverse=True)
@@ -55,7 +58,7 @@ def mark(
         missed = ~selected & (fill >= trace) & ~np.isin(corners, corners[selected]).any(axis=1)
         if not missed.any():
             break
-        # Select the fullest of adjacent ones first: the tetrahedra next to it are then no longer missed.
+        # Select the fullest of adjacent tetrahedra first. Its neighbours are then no longer missed.
         selected |= missed & (fill >= 0.5 * _max_around(corners, np.where(missed, fill, 0.0)))
     if part_count(corners[selected]) > 1:
         selected |= fill >= trace
@@ -73,7 +76,7 @@ def mark(
 def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
     """Add empty tetrahedra between parts that touch only at edges or vertices.
 
-    All parts are then connected, unless they do not touch at all.
+    Returns: numbers of all tetrahedra, ascending. Faces then connect all parts that touch.
     """
     others, every = np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
     while True:
@@ -86,7 +89,7 @@ def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
         if len(every) == 0:
             others = np.setdiff1d(lattice.tets, numbers)
             every = lattice.corners_of(others)
-        # The tetrahedra that touch the most vertices between parts close the most gaps.
+        # The tetrahedra that touch the most vertices shared by several parts close the most gaps.
         meets = np.isin(every, vertices[counts > 1]).sum(axis=1)
         meets[np.isin(others, numbers)] = 0
         if not meets.any():
@@ -95,12 +98,12 @@ def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
 
 
 def part_count(tets: Ints) -> int:
-    """Number of parts that are connected by faces."""
+    """Return the number of parts. Tetrahedra that share a face belong to the same part."""
     return int(components(len(tets), face_pairs(tets)).max(initial=-1)) + 1
 
 
 def _max_around(corners: Ints, fill: FloatArray) -> FloatArray:
-    """Largest fill of the tetrahedra that share a vertex with each, (m,)."""
+    """Return for each tetrahedron the largest fill of all tetrahedra that share a vertex with it, (m,)."""
     used, local = np.unique(corners, return_inverse=True)
     largest = np.zeros(len(used))
     local = local.reshape(-1, 4)
@@ -109,14 +112,14 @@ def _max_around(corners: Ints, fill: FloatArray) -> FloatArray:
 
 
 def face_pairs(tets: Ints) -> Ints:
-    """Pairs of tetrahedra that share a face, (k, 2)."""
+    """Return the pairs of tetrahedra that share a face, (k, 2)."""
     return shared_faces(tets) // 4
 
 
 def _fans(tets: Ints) -> Ints:
-    """Number of each corner's fan, (m, 4).
+    """Return the number of the fan to which each corner of each tetrahedron belongs, (m, 4).
 
-    Corners at one vertex belong to the same fan if faces at that vertex connect their tetrahedra.
+    Two corners at the same vertex belong to the same fan if faces at this vertex connect their tetrahedra.
     """
     one, other = (shared_faces(tets) // 4).T
     pairs = []
@@ -128,24 +131,28 @@ def _fans(tets: Ints) -> Ints:
 
 
 def _hinges(tets: Ints) -> Ints:
-    """Vertices at which tetrahedra are connected only by an edge or by the vertex."""
+    """Return the vertices at which tetrahedra are connected only by an edge or by the vertex itself, (k,)."""
     fans = np.unique(np.stack([tets.ravel(), _fans(tets).ravel()], axis=1), axis=0)
     vertices, counts = np.unique(fans[:, 0], return_counts=True)
     return vertices[counts > 1]
 
 
 def split_hinges(tets: Ints) -> tuple[Ints, Ints]:
-    """Give each fan its own vertex. Returns tetrahedra (m, 4) and the old number of each vertex, (n,)."""
+    """Split hinges: give each fan of tetrahedra around a vertex its own vertex.
+
+    Returns: new tetrahedra, (m, 4), and the old number of each new vertex, (n,).
+    """
     fans = _fans(tets)
     numbers, first = np.unique(fans, return_index=True)
     return np.searchsorted(numbers, fans), tets.ravel()[first]
 
 
 def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Remove flat tetrahedra in thin layers, keeping the rest connected. Returns True for those kept, (m,).
+    """Remove flat tetrahedra in thin layers, but keep the rest connected.
 
-    Small fragments that would fall off are removed too. If a larger one would fall off, the tetrahedra around
-    it stay.
+    Returns: True for tetrahedra that stay, (m,).
+    Small fragments that would fall off are removed too. If a larger fragment would fall off, the tetrahedra
+    around it stay.
     """
     removed = _in_a_layer(tets, flat)
     pairs = face_pairs(tets)
@@ -166,7 +173,7 @@ def _in_a_layer(tets: Ints, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """True for the chosen tetrahedra that lie in a thin layer, (m,).
 
     A group of chosen tetrahedra that faces connect is a thin layer if each of them is at most `LAYER` steps
-    from a tetrahedron that is not chosen. A thin limb is not such a group.
+    from a tetrahedron that is not chosen. A thin limb whose tetrahedra are all chosen is not a layer.
     """
     pairs = face_pairs(tets)
     groups = components(len(tets), pairs[chosen[pairs].all(axis=1)])

@@ -8,7 +8,8 @@ from taichi_soft.core.residue import kept
 from taichi_soft.meshing.arrays import FloatArray
 
 MIN_FRACTION = 0.5
-"""Smallest mass of a vertex over its lumped mass: light vertices vibrate fast and shorten the stable step."""
+"""Smallest mass of a vertex, relative to its lumped mass. Lighter vertices would vibrate fast and shorten the
+stable step."""
 
 ROUNDS = 50
 
@@ -22,13 +23,15 @@ TOLERANCE = 1e-9
 def fitted(
     points: FloatArray, lumped: FloatArray, mass: float, first_moment: FloatArray, second_moment: FloatArray
 ) -> FloatArray:
-    """Positive masses (n,) closest to `lumped` (n,) with the given sum and moments, if they exist.
+    """Return the positive masses closest to `lumped` that have the required sum and moments, (n,).
 
     Masses lumped at vertices have too much inertia, because a vertex lies farther out than the volume that it
-    represents. The solution minimises the sum of squared changes, each divided by the lumped mass.
+    represents. The solution minimises the sum of squared changes, each divided by the lumped mass. If there
+    is no solution, the result meets the requirements approximately.
 
     Args:
         points: positions of the vertices, (n, 3) [m].
+        lumped: lumped masses, (n,).
         mass: required sum.
         first_moment: required sum of mass times position, (3,).
         second_moment: required sum of mass times position times position, (3, 3).
@@ -55,6 +58,6 @@ def fitted(
             if np.linalg.norm(new_residual) < np.linalg.norm(residual):
                 break
         else:
-            break  # no masses meet the equations: keep the current ones, which are close
+            break  # no masses meet the equations: keep the current masses, which are close
         multipliers, masses, residual = multipliers + factor * step, tried, new_residual
     return kept(masses * (mass / masses.sum()))

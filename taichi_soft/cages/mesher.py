@@ -1,6 +1,6 @@
 """Run external meshers, each in its own process.
 
-If a mesher crashes or exceeds the time limit, an error is raised and its files are removed.
+If a mesher crashes or exceeds the time limit, an error is raised and the mesher's files are removed.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ TIME_LIMIT = 120.0
 """Default time limit [s]."""
 
 GRACE = 3.0
-"""Time after the limit at which a process ends itself if it was not killed [s]."""
+"""A mesher's process that was not killed at the time limit ends itself after this additional time [s]."""
 
 INSIDE = 0.5
 """Winding number above which a region is solid."""
@@ -54,13 +54,13 @@ def mesher_mesh(
         cell_size: target length of the edges [m].
         time_limit: time after which the process is killed [s].
     Raises: MissingExtraError if the method's package is missing; MeshError, with the method's own message, if
-        it fails, crashes or takes too long.
+        the method fails, crashes or exceeds the time limit.
     """
     require_extra(method, f"method {method!r} needs")
     points, corners = welded(vertices, triangles)
     if len(corners) == 0:
         raise MeshError("the surface has no area: it encloses nothing")
-    # Size 1 near the origin, so that the programs' absolute tolerances do not matter.
+    # Scale the surface to size 1 near the origin, so that the meshers' absolute tolerances do not matter.
     low, longest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     points = (points - low) / longest
     arrays = _run_mesher(method, points, corners, cell_size / longest, time_limit)
@@ -79,7 +79,7 @@ def mesher_mesh(
 def _run_mesher(
     method: str, vertices: FloatArray, triangles: Ints, cell_size: float, time_limit: float
 ) -> Arrays:
-    """Run the process of a method and return the arrays that it writes."""
+    """Run the process of a method and return the arrays that the process writes."""
     if not sys.executable or getattr(sys, "frozen", False):
         raise _failure(
             method,
@@ -132,7 +132,7 @@ def _failure(method: str, reason: str) -> MeshError:
 
 
 def _ending(code: int) -> str:
-    """Describe how a process ended."""
+    """Describe how a process ended, from its exit code. A negative code is a signal."""
     if code > 0:
         return f"its process ended with {code}"
     try:
@@ -142,7 +142,7 @@ def _ending(code: int) -> str:
 
 
 def _line(text: str) -> str:
-    """Last non-empty line of `text`, cut to 200 characters."""
+    """Return the last non-empty line of `text`, cut to 200 characters."""
     lines = [line for line in text.splitlines() if line.strip()]
     return lines[-1].strip()[:200] if lines else ""
 
@@ -153,7 +153,14 @@ def _is_solid(
     regions: NDArray[np.generic],
     corners: FloatArray,
 ) -> NDArray[np.bool_]:
-    """True for tetrahedra (m, 4) in regions (m,) that triangles (k, 3, 3) enclose; cavities are not solid."""
+    """True for tetrahedra in regions that triangles enclose, (m,). Cavities are not solid.
+
+    Args:
+        vertices: (n, 3).
+        tets: (m, 4).
+        regions: region of each tetrahedron, (m,).
+        corners: corners of the triangles, (k, 3, 3).
+    """
     numbers, region = np.unique(regions, return_inverse=True)
     if len(numbers) < 2:
         return np.ones(len(tets), dtype=np.bool_)
@@ -168,7 +175,7 @@ def _is_solid(
 
 
 def winding_number(point: FloatArray, corners: FloatArray) -> float:
-    """Winding number of triangles (m, 3, 3) around a point, from their solid angles.
+    """Return the winding number of triangles (m, 3, 3) around a point, computed from solid angles.
 
     Van Oosterom and Strackee, "The solid angle of a plane triangle" (1983), eq. 8.
     """

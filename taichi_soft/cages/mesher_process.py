@@ -1,7 +1,8 @@
-"""Program of a mesher's process, from surface.npz to tetrahedra.npz in its working folder.
+"""Program of a mesher's process. It reads surface.npz and writes tetrahedra.npz in the working folder.
 
-The interpreter receives this module as text. The module imports nothing from this package, which would start
-Taichi.
+The interpreter receives this module as text. The module imports nothing from this package, because such an
+import would start Taichi.
+
 Arguments: the method, the time after which the process ends in any case [s], and `sys.path`.
 """
 
@@ -14,16 +15,18 @@ from types import ModuleType
 from typing import Any
 
 RADIUS_TO_EDGE, MIN_ANGLE = 1.4, 10
-"""Targets of TetGen: largest circumradius over shortest edge, and smallest dihedral angle [degrees]."""
+"""Targets for TetGen: largest ratio of circumradius to shortest edge, and smallest dihedral angle
+[degrees]."""
 
 ENVELOPE = 0.05
-"""Largest distance of fTetWild's result from the surface, in cells. Finer detail only shortens the steps."""
+"""Largest distance of fTetWild's result from the surface, in cells. A smaller distance would add small
+tetrahedra, which shorten the stable step."""
 
 
 def by_tetgen(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
     """Run TetGen. Returns: vertices (n, 3), tetrahedra (m, 4), and the region of each tetrahedron, (m, 1).
 
-    Tetrahedra are at most as large as the regular one whose edges are `cell_size` long.
+    No tetrahedron is larger than a regular tetrahedron with edges of length `cell_size`.
     """
     import tetgen
 
@@ -34,7 +37,10 @@ def by_tetgen(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any
 
 
 def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, Any, Any]:
-    """Run fTetWild. Returns: as for `by_tetgen`, with one region, because fTetWild finds the inside."""
+    """Run fTetWild. Returns: vertices (n, 3), tetrahedra (m, 4), and the region of each tetrahedron, (m, 1).
+
+    All tetrahedra have region 0, because fTetWild returns only tetrahedra inside the surface.
+    """
     import numpy as np
     import pytetwild
 
@@ -48,9 +54,9 @@ def by_ftetwild(vertices: Any, triangles: Any, cell_size: float) -> tuple[Any, A
 def main() -> None:
     """Read a surface and write its tetrahedra."""
     method, seconds, *sys.path[:] = sys.argv[1:]
-    # This timer is a C thread, which works even if the mesher holds the interpreter or the game has ended.
+    # This timer is a C thread. It works even if the mesher blocks the interpreter or the game has ended.
     faulthandler.dump_traceback_later(float(seconds), exit=True)
-    # Both packages import pyvista, but only to plot. It is optional here and slow to load.
+    # Both packages import pyvista, which is slow to load, only for plots. An empty module replaces it.
     sys.modules["pyvista"] = ModuleType("pyvista")
     import numpy as np
 

@@ -25,7 +25,7 @@ class Tetrahedra(NamedTuple):
 
     mesh: TetMesh
     cell_size: float  # requested edge of a cell [m]
-    notes: tuple[str, ...] = ()  # sentences on limbs and sheets that are too thin for such cells
+    notes: tuple[str, ...] = ()  # sentences on limbs and sheets that are too thin for cells of this size
     is_refined: bool = False  # True if some limbs or sheets have smaller cells
 
 
@@ -40,7 +40,7 @@ def tetrahedra_of(
 ) -> Tetrahedra:
     """Make tetrahedra for the solid that surfaces enclose.
 
-    Arguments and errors: `SoftBodyAsset.from_surface`.
+    The arguments and errors are those of `SoftBodyAsset.from_surface`.
     """
     if method not in METHODS:
         raise OptionError(f"unknown method {method!r}: {choose_one_of(METHODS, method)}")

@@ -21,18 +21,18 @@ REFINE = 1
 """Default of the largest number of halvings. Each halving halves the stable step."""
 
 MIN_SHEET_FILL = 0.003
-"""Smallest solid fraction of the cubes around a limb at which it is kept, even if it is far thinner than a
-cube."""
+"""A limb or sheet is kept, even if it is far thinner than a cube, if at least this fraction of the cubes
+around it is solid."""
 
 TRACE = 1e-3
-"""Fill of a voxel that contains a point of the surface but no solid that rays found."""
+"""Fill of a voxel that contains a point of the surface, if rays found no solid in the voxel."""
 
 
 def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
     """Raise the fill of every voxel that contains a point of the surface to at least `TRACE`.
 
     Args: points: points of the surface, (k, 3) [m].
-    Returns: the solid, and True for these voxels.
+    Returns: the new solid, and True for voxels with a point, with the shape of `solid.fill`.
     """
     shape = solid.fill.shape
     coordinates = (points - solid.origin) / solid.spacing
@@ -53,9 +53,9 @@ def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
 
 
 def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int) -> Ints:
-    """Number of halvings of each cube that keep the missed parts, in the shape of the lattice.
+    """Return the number of halvings of each cube that keep the missed parts, with the shape `lattice.cubes`.
 
-    It is 0 for cubes without missed parts, and for parts that `refine` halvings do not keep.
+    The number is 0 for cubes without missed parts, and for parts that `refine` halvings do not keep.
     """
     parts = parts_of(missed.cubes.astype(np.float64))
     count = int(parts.max(initial=-1)) + 1
@@ -71,14 +71,14 @@ def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int
         cubes = np.bincount(doubled(limbs, octave).reshape(-1)[occupied] + 1, minlength=count + 1)[1:]
         fill = volume / (np.maximum(cubes, 1) * edge**3)
         needed[:-1][(MAX_ROD_RATIO * thickness >= edge) | (fill >= MIN_SHEET_FILL)] = octave
-    return np.asarray(needed[parts])  # index -1 is the last entry, which is 0
+    return np.asarray(needed[parts])  # cubes without missed parts have index -1, the last entry, which is 0
 
 
 def refined(lattice: Lattice, octaves: Ints, points: FloatArray) -> Lattice | GradedLattice:
     """Return the lattice with cubes halved around some points.
 
     Args:
-        octaves: number of halvings of each cube, in the shape of the lattice.
+        octaves: number of halvings of each cube, with the shape `lattice.cubes`.
         points: (k, 3) [m].
     """
     if not octaves.any():
@@ -92,7 +92,7 @@ def refined(lattice: Lattice, octaves: Ints, points: FloatArray) -> Lattice | Gr
 
 
 def _cubes_at(lattice: Lattice, octave: int, points: FloatArray) -> Ints:
-    """Number of the cube of an octave that contains each point, (k,)."""
+    """Return the flat index of the cube that contains each point, (k,). Cubes are halved `octave` times."""
     shape = tuple(2**octave * n for n in lattice.cubes)
     cubes = ((points - lattice.origin) / (lattice.edge / 2**octave)).astype(np.int64)
     return np.asarray(np.ravel_multi_index(tuple(np.clip(cubes, 0, np.array(shape) - 1).T), shape))

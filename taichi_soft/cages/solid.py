@@ -1,12 +1,14 @@
 """Find the part of space that a surface encloses, even if its triangles have defects.
 
 Rays run through the surface along the three axes. The winding number at a point of a ray is the sum of the
-signed crossings before it. It is exact between any two crossings, so a sheet thinner than a voxel keeps its
-volume. If the surface is closed, the winding number is an integer and returns to 0 at the end of the ray.
+signed crossings before the point. This number is exact between any two crossings, so a sheet thinner than a
+voxel keeps its volume. If the surface is closed, the winding number is an integer and returns to 0 at the end
+of the ray.
 
-A ray that does not return to 0 crossed a hole, a flipped face or an inner wall. In its voxels, the rays along
-the other axes decide. If no ray of a voxel returns to 0, the mean over both directions of all three decides:
-the generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
+If the winding number does not return to 0, the ray crossed a hole, a flipped face or an inner wall. In the
+voxels of such a ray, the rays along the other axes decide. If all three rays through a voxel are of this
+kind, the mean of their six winding numbers decides, counted from both ends of each ray. This mean is the
+generalised winding number (Jacobson, Kavan and Sorkine-Hornung, 2013) from six directions.
 """
 
 from __future__ import annotations
@@ -21,42 +23,42 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 OFFSET = np.array([0.4142, 0.3183, 0.3679])
-"""Distance of the first voxel's corner from the surface, in voxels, so that no ray runs along faces at round
-coordinates."""
+"""Offset of the voxel grid relative to the bounding box of the surface, in voxels. The uneven values
+prevent rays along faces at round coordinates."""
 
 OVERLAP = 1.0 + 1e-6
-"""Winding number above which parts of the surface overlap, allowing for rounding."""
+"""Winding number above which parts of the surface overlap. The small excess over 1 allows for rounding."""
 
 CHUNK = 1 << 20
-"""Pairs of triangles and rays that are processed at once."""
+"""Number of pairs of a triangle and a ray that are processed at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Fraction of each voxel that is inside, and the surface within the voxel."""
+    """Solid in voxels: the fraction of each voxel that is inside, and the surface within the voxel."""
 
     origin: FloatArray  # (3,), corner of the first voxel [m]
     spacing: float  # edge of a voxel [m]
-    fill: FloatArray  # (nx, ny, nz), 0 to 1
+    fill: FloatArray  # (nx, ny, nz), fraction of each voxel that is inside, 0 to 1
     center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the voxel's corner
-    surface: FloatArray  # (nx, ny, nz, 3), mean of the crossings in a voxel [m], NaN without crossings
+    surface: FloatArray  # (nx, ny, nz, 3), mean position of a voxel's crossings [m]; NaN without crossings
     open_fraction: float  # fraction of the rays through the surface whose crossing count does not return to 0
-    is_simple: bool  # True if all counts return to 0 and no parts overlap: the triangles give the volume
+    is_simple: bool  # True if all counts return to 0 and no parts overlap, so that triangles give the volume
 
     @property
     def volume(self) -> float:
-        """Volume [m^3]."""
+        """Volume of the solid [m^3]."""
         return float(self.fill.sum()) * self.spacing**3
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
-        """Points that represent the solid, (k, 3) [m], and the volume of each, (k,) [m^3]."""
+        """Return points that represent the solid, (k, 3) [m], and the volume of each point, (k,) [m^3]."""
         is_full = self.fill > 0.0
         points = self.origin + self.spacing * (np.argwhere(is_full) + self.center[is_full])
         return points, self.fill[is_full] * self.spacing**3
 
 
 def solid_of(vertices: FloatArray, triangles: Ints, spacing: float) -> Solid:
-    """Find the solid inside triangles, by voxels.
+    """Compute the solid that triangles enclose, as voxels.
 
     Args:
         vertices: (n, 3) [m].
@@ -107,8 +109,8 @@ class _Rays:
             axis: axis of the rays.
             shape: numbers of voxels along the axes.
             voxel: voxel of each crossing, (k,).
-            sign: 1 into the solid, (k,).
-            behind: fraction of the voxel behind the crossing along the ray, (k,).
+            sign: 1 for a crossing into the solid, -1 for a crossing out of it, (k,).
+            behind: fraction of the voxel's length that the ray passed before the crossing, (k,).
         """
 
         def gathered(values: FloatArray) -> FloatArray:
@@ -128,9 +130,9 @@ class _Rays:
 
 
 def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> FloatArray:
-    """Signs (k,) of the crossings at which a ray enters or leaves the solid; 0 for crossings within it.
+    """Return the sign of each crossing, (k,): 1 into the solid, -1 out of it, 0 within it.
 
-    Overlaps of several parts of the surface thus count once.
+    Overlapping parts of the surface therefore count once.
     """
     across = [(axis + 1) % 3, (axis + 2) % 3]
     order = np.lexsort((points[:, axis], voxel[:, across[0]], voxel[:, across[1]]))
@@ -146,10 +148,13 @@ def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> Flo
 
 
 def _fill(rows: list[_Rays]) -> tuple[FloatArray, FloatArray]:
-    """Fraction of each voxel that is inside, from its three rays, and the centroid of that part.
+    """Compute the part of each voxel that is inside, from the three rays through the voxel.
 
-    Among closed rays, those most perpendicular to the surface decide: they have most crossings in the
-    neighbourhood. (Within a single voxel, the choice would favour rays that happen to be inside.)
+    Among closed rays, the ray most perpendicular to the surface decides. This ray has the most crossings in
+    the voxel and its neighbours. (The crossings in the voxel alone would favour rays that happen to be
+    inside.)
+    Returns: fraction of the voxel, (nx, ny, nz), and centroid of the part, (nx, ny, nz, 3), in voxels from
+        the voxel's corner.
     """
     is_closed = np.stack([row.is_closed for row in rows])
     crossings = np.stack([row.crossings for row in rows])
@@ -167,7 +172,7 @@ def _fill(rows: list[_Rays]) -> tuple[FloatArray, FloatArray]:
 
 
 def _around(counts: FloatArray) -> FloatArray:
-    """Sums over each voxel and its neighbours, separately for each entry of the first axis."""
+    """Sum `counts` over each voxel and its 26 neighbours, separately for each entry of the first axis."""
     for axis in (1, 2, 3):
         sums = np.cumsum(np.pad(counts, [(2, 1) if k == axis else (0, 0) for k in range(4)]), axis=axis)
         size = counts.shape[axis]
@@ -176,10 +181,10 @@ def _around(counts: FloatArray) -> FloatArray:
 
 
 def _crossings(coordinates: FloatArray, triangles: Ints, axis: int) -> tuple[FloatArray, FloatArray]:
-    """Crossings of triangles with rays along an axis through the centres of voxels.
+    """Find the crossings of triangles with the rays that run along an axis through the centres of voxels.
 
-    A ray through an edge crosses exactly one of its two triangles.
-    Returns: points (k, 3) in voxels, and signs (k,), 1 into the solid.
+    A ray through an edge crosses exactly one of the edge's two triangles.
+    Returns: points (k, 3), in voxels, and signs (k,), 1 for a crossing into the solid and -1 out of it.
     """
     u, v = (axis + 1) % 3, (axis + 2) % 3
     corners = coordinates[triangles]
@@ -211,9 +216,10 @@ def _crossings(coordinates: FloatArray, triangles: Ints, axis: int) -> tuple[Flo
 
 
 def _signed_areas(corners: FloatArray, numbers: Ints, line: FloatArray) -> FloatArray:
-    """Twice the signed area between a ray and the edge opposite each corner, (k, 3); 0 if the ray misses.
+    """Return twice the signed area of the triangle between a ray and the edge opposite each corner, (k, 3).
 
-    Each edge starts at its vertex of lower number, so that both its triangles get the same area.
+    The areas are 0 if the ray misses the triangle. Each edge starts at its vertex of lower number, so that
+    both triangles at the edge get exactly the same area.
     """
     areas = np.empty((len(line), 3))
     inside = np.ones((len(line), 2), dtype=np.bool_)
@@ -224,7 +230,7 @@ def _signed_areas(corners: FloatArray, numbers: Ints, line: FloatArray) -> Float
         high = np.where(is_reversed[:, None], corners[:, a], corners[:, b])
         edge, offset = high - low, line - low
         area = edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0]
-        is_left = area >= 0.0  # of the edge, seen from its start; points on it count as left
+        is_left = area >= 0.0  # True if the ray is left of the edge, seen from the edge's start, or on it
         areas[:, k] = np.where(is_reversed, -area, area)
         inside[:, 0] &= is_left != is_reversed
         inside[:, 1] &= is_left == is_reversed

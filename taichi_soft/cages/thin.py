@@ -36,35 +36,37 @@ FINE_PITCH = 1 / 24
 """Distance between sample points at missed parts, in cells."""
 
 MISSED_DISTANCE = 1.25
-"""Distance from the cage, in cells, beyond which a point counts as missed. Rounded corners are nearer."""
+"""Distance from the cage, in cells, beyond which a point counts as missed. Corners that the cage rounds off
+are nearer."""
 
 MAX_CUBES = 64
-"""Largest number of cubes in which the surface is tested for enclosing anything."""
+"""Largest number of cubes in which lines test whether the surface encloses anything."""
 
 INSIDE = 0.5
 """Winding number above which a point is inside the solid."""
 
 OWN_DISTANCE = 1e-6
-"""Distance from a point, relative to the size, below which a triangle is the point's own or a copy of it."""
+"""Distance from a point to a triangle, relative to the size of the surface, below which the point counts as
+lying on the triangle."""
 
 ROOT_DISTANCE = 0.2
-"""Distance from the cage, in cells, beyond which a limb has left it."""
+"""Distance from the cage, in cells, beyond which a point of a limb is outside the cage."""
 
 RAYS = 256
-"""Number of rays that measure a thickness."""
+"""Largest number of rays that measure one thickness."""
 
 QUANTILE = 0.1
-"""Quantile of the lengths measured near a limb that is used as its thickness. It is low, because the body
-next to the limb is thicker."""
+"""The thickness of a limb is this quantile of the lengths measured near the limb. The quantile is low because
+the body next to the limb is thicker."""
 
 CHUNK = 1 << 20
-"""Pairs of rays and triangles that are processed at once."""
+"""Number of pairs of a ray and a triangle that are processed at once."""
 
 
 def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
     """Sample points on triangles (m, 3, 3), at least one in each and at most about `pitch` [m] apart.
 
-    Returns: points (k, 3) [m], and the triangle of each, (k,).
+    Returns: points (k, 3) [m], and the triangle of each point, (k,).
     """
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -84,7 +86,7 @@ def points_on(corners: FloatArray, pitch: float) -> tuple[FloatArray, Ints]:
 
 
 def _distances(locator: Locator, mesh: TetMesh, points: FloatArray) -> FloatArray:
-    """Distances of points from a mesh, (k,) [m]."""
+    """Return the distance of each point from a mesh, (k,) [m]."""
     tet, weights = locator(points)
     nearest = np.einsum("kc,kci->ki", weights, mesh.vertices[mesh.tets[tet]])
     return np.asarray(np.linalg.norm(nearest - points, axis=1))
@@ -110,17 +112,18 @@ def cubes_of(lattice: Lattice, points: FloatArray) -> Bools:
 class Thin:
     """Approximate thickness of the thinnest limbs and sheets that are too thin for the requested cells [m].
 
-    Infinity if there are none.
+    The thickness is infinite if there are no such parts.
     """
 
-    kept: float  # thinnest that smaller cells keep
-    lost: float  # thinnest that the cage leaves out
-    octaves: int  # number of halvings of cells
+    kept: float  # thickness of the thinnest part that smaller cells keep
+    lost: float  # thickness of the thinnest part that the cage leaves out
+    octaves: int  # largest number of halvings of a cell
 
     def notes(self, cell_size: float) -> tuple[str, ...]:
-        """Return a sentence on the limbs and sheets that are kept, and one on those left out.
+        """Return a sentence on the limbs and sheets that are kept, and a sentence on parts that are left out.
 
-        Args: cell_size: requested size [m].
+        If there are no such parts, the sentence is omitted.
+        Args: cell_size: requested edge of a cell [m].
         """
         notes = []
         if np.isfinite(self.kept):
@@ -144,20 +147,18 @@ class Thin:
 class MissedParts:
     """Parts of a surface that a cage should cover but does not."""
 
-    cubes: (
-        Bools  # True for cubes with surface but without cage, and for cubes in which a part leaves the cage
-    )
-    bare: Bools  # True for those cubes that contain no vertex of the cage
-    thickness: FloatArray  # of the limb or sheet in each cube [m]; infinity elsewhere
-    points: FloatArray  # (k, 3), on the surface in or next to these cubes [m]
+    cubes: Bools  # True for cubes with surface but no cage, and for cubes in which a limb leaves the cage
+    bare: Bools  # True for those of `cubes` that contain no vertex of the cage
+    thickness: FloatArray  # thickness of the limb or sheet in each cube [m]; infinity in other cubes
+    points: FloatArray  # (k, 3), points of the surface in or next to `cubes` [m]
 
     @property
     def thinnest(self) -> float:
-        """Smallest thickness [m]."""
+        """Smallest thickness of the missed parts [m]."""
         return float(self.thickness.min())
 
     def among(self, lattice: Lattice, cubes: Bools) -> MissedParts:
-        """Return the missed parts in or next to some of the cubes."""
+        """Return the missed parts in `cubes`, with the points in or next to these cubes."""
         points = self.points[_are_in(lattice, self.points, around(cubes))]
         return MissedParts(cubes, self.bare & cubes, np.where(cubes, self.thickness, np.inf), points)
 
@@ -172,7 +173,7 @@ class MissedParts:
 
 
 def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[FloatArray, Ints]:
-    """Points on the surface that a cage misses, (k, 3) [m], and the triangle of each, (k,).
+    """Return points on the surface that a cage misses, (k, 3) [m], and the triangle of each point, (k,).
 
     Args:
         lattice: lattice of the requested cubes.
@@ -180,7 +181,7 @@ def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[Fl
         mesh: the cage.
     """
     points, triangle = points_on(corners, PITCH * lattice.edge)
-    # Test cubes first: this is enough for most surfaces.
+    # Test cubes first, because most surfaces then need no distances.
     is_missed = _are_in(lattice, points, ~cubes_of(lattice, mesh.vertices))
     if is_missed.any():
         is_missed[is_missed] = (
@@ -190,9 +191,10 @@ def far_points(lattice: Lattice, corners: FloatArray, mesh: TetMesh) -> tuple[Fl
 
 
 def torn_points(solid: Solid, vertices: FloatArray, triangles: Ints) -> FloatArray:
-    """Points on the surface at gaps between components of a solid that triangles connect, (k, 3) [m].
+    """Return points of the surface at gaps in the solid, (k, 3) [m].
 
-    Such gaps appear if a limb is too thin for the voxels.
+    A gap separates components of the solid that the surface connects. Gaps appear if a limb is too thin for
+    the voxels.
     Args:
         vertices: vertices of the surface, (n, 3) [m].
         triangles: (m, 3).
@@ -212,11 +214,12 @@ def torn_points(solid: Solid, vertices: FloatArray, triangles: Ints) -> FloatArr
 def solid_points(
     lattice: Lattice, points: FloatArray, triangle: Ints, corners: FloatArray, solid: Solid
 ) -> FloatArray:
-    """Select the points that share a cube with part of the solid; a wall without thickness is not solid.
+    """Return the points whose cube contains a part of the solid, (j, 3) [m].
 
+    A wall without thickness is not solid.
     Args:
-        points: on the surface, (k, 3) [m].
-        triangle: triangle of each, (k,).
+        points: points of the surface, (k, 3) [m].
+        triangle: triangle of each point, (k,).
         corners: corners of all triangles, (m, 3, 3) [m].
     """
     is_solid = _are_in(lattice, points, cubes_of(lattice, solid.quadrature()[0]))
@@ -240,9 +243,11 @@ def solid_points(
 
 
 def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: FloatArray) -> MissedParts:
-    """Find the missed parts at points far from a cage, and the limbs that connect them to it.
+    """Find the missed parts at points far from a cage, and the limbs that connect these parts to the cage.
 
-    Args: far: result of `far_points`, at least one point; the other arguments as there.
+    Args:
+        lattice, corners, mesh: arguments of `far_points`.
+        far: points that `far_points` returned, at least one.
     """
     region = around(around(cubes_of(lattice, far)))
     points, triangle = points_on(corners, PITCH * lattice.edge)
@@ -266,13 +271,13 @@ def find_missed(lattice: Lattice, corners: FloatArray, mesh: TetMesh, far: Float
 
 
 def thickness(points: FloatArray, normals: FloatArray, corners: FloatArray) -> float:
-    """Thickness of the solid that triangles enclose, measured along the normals at some points [m].
+    """Measure the thickness of the solid that triangles enclose, along the normals at some points [m].
 
     Args:
-        points: on the triangles, (k, 3) [m].
-        normals: (k, 3), of any length.
+        points: points on the triangles, (k, 3) [m].
+        normals: normals at the points, (k, 3), of any length.
         corners: corners of the triangles, (m, 3, 3) [m].
-    Returns: the thickness; infinity if no line meets another triangle.
+    Returns: the thickness; infinity if no normal meets another triangle.
     """
     sample = np.unique(np.linspace(0, len(points) - 1, min(RAYS, len(points))).astype(np.int64))
     lengths = np.linalg.norm(normals[sample], axis=1, keepdims=True)
@@ -284,11 +289,12 @@ def thickness(points: FloatArray, normals: FloatArray, corners: FloatArray) -> f
 
 
 def chords(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
-    """Signed distance along lines through points on triangles to the next triangle, (k,) [m].
+    """Return the signed distance from each point along a line to the nearest other triangle, (k,) [m].
 
-    The distance is negative if the triangle lies behind, and infinite if there is none.
+    The distance is negative if the triangle lies behind the point, and infinite if the line meets no
+    triangle.
     Args:
-        points: (k, 3) [m].
+        points: points on triangles, (k, 3) [m].
         directions: directions of the lines, (k, 3), of length 1.
         corners: corners of the triangles, (m, 3, 3) [m].
     """
@@ -306,7 +312,7 @@ def chords(points: FloatArray, directions: FloatArray, corners: FloatArray) -> F
 
 
 def _intersections(points: FloatArray, directions: FloatArray, corners: FloatArray) -> FloatArray:
-    """Distance along each line to each triangle, (k, m) [m]; NaN if they do not meet.
+    """Return the signed distance along each line to each triangle, (k, m) [m]; NaN if the line misses it.
 
     Möller and Trumbore, "Fast, minimum storage ray/triangle intersection" (1997).
     """

@@ -9,7 +9,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
 VOXELS_PER_CUBE = 8
-"""Voxels along the edge of a cube."""
+"""Default number of voxels along the edge of a cube."""
 
 MIN_VOXELS_PER_CUBE, MAX_VOXELS_PER_CUBE = 3, 16
 
@@ -20,22 +20,24 @@ MAX_FINE_VOXELS = 1 << 21
 """Number of voxels above which coarser voxels are used in the search for missed limbs."""
 
 MAX_OPEN_FRACTION = 0.5
-"""Fraction of the rays into a surface that do not leave it again, above which it counts as an open sheet."""
+"""A surface counts as an open sheet if more than this fraction of the rays that enter it do not leave it
+again."""
 
 FLATTEST = 1e-6
-"""Enclosed volume, relative to the bounding box, below which it is only a rounding error."""
+"""Largest enclosed volume, relative to the volume of the bounding box, that counts as a rounding error."""
 
 
 def volume_within(corners: FloatArray) -> float:
-    """Volume inside a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
+    """Return the volume inside a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
     a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)  # far from the origin, only differences are precise
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Edge of voxels that resolve the solid [m].
+    """Return the edge of voxels that resolve the solid [m].
 
-    The thickness of a sheet is twice its volume over its surface. Two voxels should fit into it.
+    The thickness of a sheet is twice its volume divided by its surface area. Two voxels should fit into this
+    thickness.
     """
     area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * float(np.linalg.norm(area_vectors, axis=1).sum())
@@ -48,13 +50,16 @@ def voxel_edge(corners: FloatArray, cell_size: float) -> float:
 
 
 def fine_voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Edge of the voxels that find limbs between coarser voxels [m]."""
+    """Return the edge of the finer voxels that are used in the search for missed limbs [m]."""
     edge = _affordable(cell_size / MAX_VOXELS_PER_CUBE, corners, cell_size, MAX_FINE_VOXELS)
     return min(edge, voxel_edge(corners, cell_size))
 
 
 def _affordable(edge: float, corners: FloatArray, cell_size: float, max_voxels: int) -> float:
-    """Return `edge` [m], enlarged until there are not too many voxels."""
+    """Return `edge` [m], enlarged until there are at most `max_voxels` voxels.
+
+    The result is never larger than `cell_size / MIN_VOXELS_PER_CUBE`.
+    """
     size = np.ptp(corners.reshape(-1, 3), axis=0)
     while edge < cell_size / MIN_VOXELS_PER_CUBE and np.prod(size / edge + 3.0) > max_voxels:
         edge *= 1.1
@@ -64,8 +69,11 @@ def _affordable(edge: float, corners: FloatArray, cell_size: float, max_voxels: 
 def require_solid(solid: Solid, size: FloatArray, enclosed_volume: float, cell_size: float) -> None:
     """Check that voxels contain a solid.
 
-    Args: enclosed_volume: volume by the divergence theorem [m^3].
-    Raises: MeshError if there is no solid, OptionError if it is lost between the voxels.
+    Args:
+        size: sides of the bounding box of the surface, (3,) [m].
+        enclosed_volume: volume by the divergence theorem [m^3].
+        cell_size: edge of a cell [m].
+    Raises: MeshError if there is no solid; OptionError if the solid is lost between the voxels.
     """
     if solid.open_fraction > MAX_OPEN_FRACTION:
         raise MeshError(

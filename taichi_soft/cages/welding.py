@@ -1,4 +1,4 @@
-"""Merge triangle corners at the same position: files contain copies at seams of textures or normals."""
+"""Merge vertices at the same position. Files contain copies of vertices at seams of textures or normals."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 WELD = 1e-7
-"""Distance, relative to the longest side, below which vertices are merged; float32 files round by as much."""
+"""Distance, relative to the longest side, below which vertices are merged. Files in float32 have rounding
+errors of this size."""
 
 
 def places_of(vertices: FloatArray, size: float) -> Ints:
-    """Number of the position of each vertex, (n,), equal for vertices at the same position.
+    """Number the positions of vertices, (n,). Vertices at the same position get the same number.
 
     Args: size: longest side of the bounding box of the vertices in use [m].
     """

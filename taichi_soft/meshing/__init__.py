@@ -1,4 +1,4 @@
-"""Meshes of bodies at rest: particles, edges and tetrahedra; built-in shapes, files and mesh quality."""
+"""Meshes of bodies at rest, built-in shapes, mesh files and measures of mesh quality."""
 
 from taichi_soft.meshing.body_mesh import BodyMesh
 from taichi_soft.meshing.delaunay import delaunay_mesh

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def with_install_hint(call: str, *packages: str) -> str:
-    """Return `call`, followed by how to install those of `packages` that are missing."""
+    """Return `call`. If some of `packages` are missing, append the command that installs them."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if not missing:
         return call
@@ -25,5 +25,8 @@ def scene_hint(source: Any) -> str:
 
 
 def fill_hint(surface: str) -> str:
-    """Return a hint on how to make a body from a surface; `surface` is the code that evaluates to it."""
+    """Return a hint on how to make a body from a surface.
+
+    Args: surface: Python expression for the surface.
+    """
     return f"SoftBodyAsset.from_surface({surface}, material) makes a body from it"

@@ -1,4 +1,4 @@
-"""Check the arrays that a caller passes, and copy them."""
+"""Check and copy the arrays that callers pass."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from taichi_soft.core.errors import MeshError, OptionError
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int32]
 
-# Products of three lengths must stay finite in float64 (largest 1.8e308), with a margin.
+# Largest coordinate [m]. Products of three lengths stay far below the largest float64 number, 1.8e308.
 LARGEST_COORDINATE = 1e30
 
 MAX_TETS = 10_000_000
-"""Largest number of tetrahedra in a built-in shape: more would take minutes and tens of gigabytes."""
+"""Largest number of tetrahedra in a built-in shape. Larger shapes would take minutes and tens of
+gigabytes."""
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return the array C-contiguous and read-only."""
+    """Make an array C-contiguous and read-only. The array is copied only if it is not C-contiguous."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
@@ -34,10 +35,14 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], element: str) -> FloatArray:
-    """Return `values` as a finite float64 copy of the given shape, in which None allows any length.
+    """Check an array of real numbers and return a float64 copy.
 
-    Raises: MeshError for an empty array, a wrong shape or dtype, or a number that is not finite. The message
-        calls a row `element`.
+    Args:
+        values: array to check.
+        name: name of the array in messages.
+        shape: required shape; None allows any length.
+        element: name of a row in messages.
+    Raises: MeshError for an empty array, a wrong shape or dtype, or a number that is not finite.
     """
     array = _as_array(values, name)
     expected = "(" + ", ".join("n" if length is None else str(length) for length in shape) + ")"
@@ -58,7 +63,7 @@ def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], element
 
 
 def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> FloatArray:
-    """Return points as a float64 copy of shape (n, dimension) [m].
+    """Check points and return a float64 copy of shape (n, dimension) [m].
 
     Raises: MeshError for a wrong shape or dtype, or a coordinate that is not finite or above
         `LARGEST_COORDINATE`.
@@ -76,7 +81,7 @@ def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> 
 def as_indices(
     values: ArrayLike, name: str, width: int, vertex_count: int, element: str, *, may_repeat: bool = False
 ) -> IntArray:
-    """Return vertex indices as an int32 copy of shape (m, width), each from 0 to vertex_count - 1.
+    """Check vertex indices from 0 to vertex_count - 1 and return an int32 copy of shape (m, width).
 
     Raises: MeshError for an empty array, a wrong shape or dtype, an index out of range, or (unless
         `may_repeat`) a row that names a vertex twice. The message calls a row `element`.
@@ -107,11 +112,11 @@ def as_indices(
 
 
 def require_tet_count(tets: int) -> None:
-    """Check the size of a shape. Raises: OptionError above `MAX_TETS` tetrahedra."""
+    """Check the number of tetrahedra of a shape. Raises: OptionError if it is above `MAX_TETS`."""
     if tets > MAX_TETS:
         raise OptionError(f"the shape would have {tets:,} tetrahedra: make it coarser, at most {MAX_TETS:,}")
 
 
 def name_vertices(indices: NDArray[Any]) -> str:
-    """Format the vertex indices of one element for a message: `4, 9, 2, 31`."""
+    """Format the vertex indices of one element for a message, for example `4, 9, 2, 31`."""
     return ", ".join(str(int(index)) for index in indices)

@@ -1,4 +1,4 @@
-"""Base class of all meshes of bodies: particles and the edges between them."""
+"""Base class of all meshes of bodies, which consist of particles and the edges between them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Self = TypeVar("Self", bound="BodyMesh")
 
 
 class BodyMesh(ABC):
-    """Particles and edges of a body at rest; its subclasses are `ParticleMesh` and `TetMesh`.
+    """Particles and edges of a body at rest. The subclasses are `ParticleMesh` and `TetMesh`.
 
-    Immutable: attributes cannot be set, arrays are read-only, and `translated`, `scaled` and `rotated` return
-    new meshes.
+    A mesh is immutable: attributes cannot be set, arrays are read-only, and `translated`, `scaled` and
+    `rotated` return new meshes.
 
     Attributes:
         vertices: float64 (n, 3), positions at rest [m].
-        edges: int32 (k, 2), each row i < j; rows of a `TetMesh` are in ascending order.
+        edges: int32 (k, 2), vertex indices (i, j) with i < j. Rows of a `TetMesh` are in ascending order.
         tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for a `ParticleMesh`.
         surface: int32 (f, 3), triangles of the surface; f = 0 for a rope.
     """
@@ -34,7 +34,7 @@ class BodyMesh(ABC):
     surface: IntArray
 
     def __init__(self, vertices: FloatArray, edges: IntArray, tets: IntArray) -> None:
-        # __dict__ bypasses __setattr__ below, as cached_property does too.
+        # Writing to __dict__ bypasses __setattr__ below. cached_property does the same.
         self.__dict__.update(vertices=read_only(vertices), edges=read_only(edges), tets=read_only(tets))
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
@@ -68,7 +68,7 @@ class BodyMesh(ABC):
         """Return a copy moved by `offset`.
 
         Args:
-            offset: (3,) [m].
+            offset: displacement, (3,) [m].
         Raises: OptionError if `offset` is not three finite numbers.
         """
         return self._with_vertices(self.vertices + as_array(offset, "offset", (3,), "m"))
@@ -77,7 +77,7 @@ class BodyMesh(ABC):
         """Return a copy scaled about the origin.
 
         Args:
-            factor: above 0.
+            factor: scale factor, above 0.
         Raises: OptionError if `factor` is not positive.
         """
         return self._with_vertices(self.vertices * as_positive(factor, "factor", "(one number)"))
@@ -87,6 +87,6 @@ class BodyMesh(ABC):
 
         Args:
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
-        Raises: OptionError if it is not a rotation.
+        Raises: OptionError if `rotation` is not a rotation.
         """
         return self._with_vertices(self.vertices @ as_rotation(rotation).T)

@@ -1,4 +1,4 @@
-"""Cage meshes: tetrahedra around a solid that fills them only in part."""
+"""Cage meshes: tetrahedra around a solid. The solid fills the tetrahedra only partly."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ class CageMesh(TetMesh):
     """A tetrahedral mesh around a solid, such as `SoftBodyAsset.from_surface` makes.
 
     Args:
-        vertices, tets: as for `TetMesh`.
+        vertices, tets: arguments of `TetMesh`.
         fill: volume of the solid that each tetrahedron carries, divided by the tetrahedron's volume, (m,),
-            above 0. Stiffness and damping are multiplied by it.
+            above 0. Stiffness and damping are multiplied by this ratio.
         vertex_volumes: volume of the solid that each vertex carries, (n,), above 0 [m^3].
-    Raises: MeshError as for `TetMesh`, and for arrays of the wrong length or with values of 0 or less.
+    Raises: MeshError for invalid arguments of `TetMesh`, and for arrays of the wrong length or with values of
+        0 or less.
     """
 
     def __init__(
@@ -38,7 +39,7 @@ class CageMesh(TetMesh):
         self.__dict__.update(fill=read_only(fill), vertex_volumes=read_only(vertex_volumes))
 
     def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        # The copies of a vertex divide its volume in proportion to the solid volume around each copy.
+        # The volume of a vertex is divided among its copies, in proportion to the solid around each copy.
         before = lumped(original.tets, original.fill * original.volumes, len(original.vertices))
         after = lumped(self.tets, original.fill[rows] * self.volumes, len(vertices))
         self._set_volumes(original.fill[rows], original.vertex_volumes[vertices] * after / before[vertices])
@@ -56,7 +57,10 @@ class CageMesh(TetMesh):
 
 
 def lumped(tets: NDArray[Any], volumes: FloatArray, count: int) -> FloatArray:
-    """Return the volume of each vertex, (n,) [m^3]: a quarter of each tetrahedron around it."""
+    """Return the volume of each vertex, (n,) [m^3].
+
+    A vertex gets a quarter of the volume of each tetrahedron around it.
+    """
     return np.bincount(tets.ravel(), np.repeat(volumes / 4.0, 4), count).astype(np.float64)
 
 

@@ -1,7 +1,8 @@
 """Cavities (sets of tetrahedra) and the tetrahedra that replace them in flips, collapses and vertex moves.
 
-The mesh is closed by a virtual vertex OUTSIDE: an additional tetrahedron joins it to each surface triangle.
-Surface vertices then have complete stars, so changes of the surface need no special case.
+The mesh is closed by a virtual vertex OUTSIDE: an additional tetrahedron joins this vertex to each surface
+triangle. Tetrahedra then surround each surface vertex completely, so changes of the surface need no special
+case.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 OUTSIDE = 0
-LARGEST_RING = 7  # largest number of tetrahedra around an edge that a flip removes: 42 triangulations
-# The other two corners for corners i and j, ordered so that (i, j, k, l) is an even permutation.
+LARGEST_RING = 7  # largest number of tetrahedra around an edge that a flip removes (42 triangulations)
+# Entry (i, j) has the other two corners k and l, in the order that makes (i, j, k, l) an even permutation.
 _OPPOSITE = np.zeros((4, 4, 2), dtype=np.int64)
 for _face in range(4):
     for _turn in range(3):
@@ -30,9 +31,9 @@ for _face in range(4):
 
 
 class Cavities(NamedTuple):
-    """Sets of tetrahedra and their replacements with the same boundary; rows sorted by cavity."""
+    """Sets of tetrahedra, and replacements with the same boundary. All arrays are sorted by cavity."""
 
-    removed: Ints  # (r,) rows of the mesh
+    removed: Ints  # (r,) rows of the mesh that are removed
     removed_of: Ints  # (r,) cavity of each removed row
     added: Ints  # (a, 4) vertices of the new tetrahedra
     added_of: Ints  # (a,) cavity of each new tetrahedron
@@ -44,13 +45,19 @@ class Cavities(NamedTuple):
         return int(self.removed_of[-1]) + 1 if len(self.removed_of) else 0
 
     def in_rows(self, rows: Ints) -> Cavities:
-        """Return these cavities of a part of a mesh with the rows of the whole mesh: i becomes `rows[i]`."""
+        """Return the cavities with each row i replaced by `rows[i]`.
+
+        Use this to convert rows of a part of a mesh to rows of the whole mesh.
+        """
         return self._replace(
             removed=rows[self.removed], parent=np.where(self.parent < 0, -1, rows[self.parent])
         )
 
     def kept(self, keep: Bools) -> Cavities:
-        """Return the cavities for which `keep`, (number of cavities,), is True, renumbered from 0."""
+        """Return the cavities for which `keep` is True, renumbered from 0.
+
+        Args: keep: one entry for each cavity.
+        """
         new_index = np.cumsum(keep) - 1
         is_removed, is_added = keep[self.removed_of], keep[self.added_of]
         return Cavities(
@@ -78,7 +85,10 @@ class ClosedMesh:
         self._simplex_keys = np.unique(np.concatenate([tet_keys, self._face_keys.ravel(), edge_keys.ravel()]))
 
     def star(self, vertices: Ints) -> tuple[Ints, Ints]:
-        """Return the rows around each vertex, vertex by vertex, and the index in `vertices` of each row."""
+        """Find the tetrahedra around vertices, sorted by vertex.
+
+        Returns: row of each tetrahedron, (r,), and index in `vertices` of the tetrahedron's vertex, (r,).
+        """
         counts = self._counts[vertices]
         of = np.repeat(np.arange(len(vertices)), counts)
         return self._by_vertex[ranges(self._starts[vertices], counts)], of
@@ -90,7 +100,7 @@ class ClosedMesh:
         return np.asarray(self._simplex_keys[place] == key)
 
     def neighbours(self) -> Ints:
-        """Row on the other side of each face, (m, 4)."""
+        """Return the row of the tetrahedron on the other side of each face, (m, 4)."""
         order = np.argsort(self._face_keys.ravel(), kind="stable")
         key = self._face_keys.ravel()[order]
         first = np.flatnonzero(key[1:] == key[:-1])
@@ -105,9 +115,10 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
 
 
 def sizes(x: FloatArray, tets: Ints) -> FloatArray:
-    """Size of each tetrahedron: edge of the regular one with equal sum of squared shape gradients, (k,) [m].
+    """Return the size of each tetrahedron, (k,) [m].
 
-    Negative for an inverted tetrahedron, infinite outside the surface.
+    The size is the edge length of a regular tetrahedron with the same sum of squared shape function
+    gradients. It is negative for an inverted tetrahedron and infinite for a tetrahedron outside the surface.
     """
     p = x.T[:, tets.T]
     a, b, c = (p[:, i] - p[:, 0] for i in (1, 2, 3))
@@ -120,7 +131,11 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
-    """Numerical gradient (k, 3) of each tetrahedron's size with respect to its corner `vertices` (k,)."""
+    """Return the gradient of each tetrahedron's size with respect to the position of one corner, (k, 3).
+
+    The gradient is a central difference.
+    Args: vertices: vertex index of this corner, (k,).
+    """
     rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
     own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
     step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)
@@ -134,14 +149,14 @@ def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
 
 
 def volumes(x: FloatArray, tets: Ints) -> FloatArray:
-    """Signed volumes (k,) [m^3], 0 outside the surface."""
+    """Return the signed volumes of tetrahedra, (k,) [m^3]. The volume outside the surface is 0."""
     p = x[tets]
     six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
     return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
 
 
 def is_flat(x: FloatArray, tets: Ints) -> Bools:
-    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat, or that are almost as flat."""
+    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat or almost rejects."""
     ends = x[tets[:, LOCAL_EDGES]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
     flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
@@ -149,7 +164,10 @@ def is_flat(x: FloatArray, tets: Ints) -> Bools:
 
 
 def collapses(mesh: ClosedMesh, removed: Ints, target: Ints) -> Cavities:
-    """Collapse each vertex of `removed` (k,) into its `target`: a neighbour, or a new vertex (a move)."""
+    """Return the cavities that replace each vertex of `removed` by the vertex of `target`, (k,) each.
+
+    If the target is a neighbour, the edge collapses. If the target is a new vertex, the vertex moves.
+    """
     rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
     stay = ~(tets == target[of, None]).any(axis=1)
@@ -158,7 +176,10 @@ def collapses(mesh: ClosedMesh, removed: Ints, target: Ints) -> Cavities:
 
 
 def meets_link_condition(mesh: ClosedMesh, removed: Ints, target: Ints) -> Bools:
-    """True if a collapse keeps the topology: each simplex linked to both vertices is linked to their edge."""
+    """True for collapses that keep the topology, (k,).
+
+    A collapse keeps the topology if each simplex in the links of both vertices is in the link of their edge.
+    """
     rows, of = mesh.star(removed)
     tets = mesh.tets[rows]
     far = ~(tets == target[of, None]).any(axis=1)
@@ -174,7 +195,7 @@ def meets_link_condition(mesh: ClosedMesh, removed: Ints, target: Ints) -> Bools
 
 
 def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
-    """Return the 2-3 flips at the faces of `rows`: three tetrahedra around a new edge replace two."""
+    """Return the flips that replace two tetrahedra at a face of `rows` by three around a new edge."""
     row, corner = np.repeat(rows, 4), np.tile(np.arange(4), len(rows))
     neighbour = mesh.neighbours()[row, corner]
     apex = mesh.tets[row, corner]
@@ -189,9 +210,10 @@ def face_flips(mesh: ClosedMesh, rows: Ints) -> Cavities:
 
 
 def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities]:
-    """Replace the tetrahedra around each edge (k, 2) by the best triangulation of their ring.
+    """Return the flips that replace the tetrahedra around each edge (k, 2) by tetrahedra without this edge.
 
-    Returns: the cavities for each number of tetrahedra around an edge, up to `LARGEST_RING`.
+    The new tetrahedra belong to the best triangulation of the ring around the edge.
+    Returns: cavities, one item for each number of tetrahedra around an edge, up to `LARGEST_RING`.
     """
     rows, of = mesh.star(edges[:, 0])
     shares_edge = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
@@ -205,7 +227,12 @@ def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities
 
 
 def _ring_fills(x: FloatArray, mesh: ClosedMesh, edges: Ints, rows: Ints) -> Cavities:
-    """Best triangulation of the ring of each edge (k, 2) whose tetrahedra are `rows` (k, n)."""
+    """Return the flips that replace the n tetrahedra around each edge by the best triangulation of the ring.
+
+    Args:
+        edges: (k, 2).
+        rows: tetrahedra around each edge, (k, n).
+    """
     count, n = rows.shape
     tets = mesh.tets[rows]
     ends_at = [(tets == edges[:, None, end, None]).argmax(axis=2) for end in (0, 1)]
@@ -270,5 +297,5 @@ def joined(parts: list[Cavities]) -> Cavities:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of columns, (3, k)."""
+    """Return the cross products of the columns of `a` and `b`, (3, k)."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

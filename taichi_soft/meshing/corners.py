@@ -16,12 +16,12 @@ NONE = -1
 """Value in `Attribute.at` for a corner without the attribute."""
 
 BEFORE_FIRST = 1 << 40
-"""Value for an index that counts back past the first row; it is larger than any table."""
+"""Value for an index that counts back past the first row. The value is larger than any table."""
 
 
 @dataclass(frozen=True, eq=False)
 class Attribute:
-    """One attribute of the corners: a table of values, and the row of each corner."""
+    """One attribute of triangle corners: a table of values, and the row of the table for each corner."""
 
     rows: FloatArray  # (r, d)
     at: Ints  # (m, 3), row of each corner, or NONE
@@ -29,13 +29,13 @@ class Attribute:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Result of `split`: vertices that have one value of each attribute.
+    """Result of `split`. Each vertex has at most one value of each attribute.
 
-    The vertices of the file come first, in their order. Copies follow, ordered by vertex, then by their first
-    corners.
+    The vertices of the file are the first vertices, in the order of the file. Copies follow, ordered by the
+    vertex that they copy, then by their first corners.
     """
 
-    vertex: Ints  # (n,), vertex of the file that each vertex is or copies
+    vertex: Ints  # (n,), vertex of the file from which each vertex is copied
     triangles: Ints  # (m, 3)
     attributes: tuple[FloatArray, ...]  # (n, d) each, NaN for vertices without the attribute
 
@@ -55,7 +55,7 @@ def split(vertex_count: int, triangles: Ints, attributes: tuple[Attribute, ...],
     first = np.unique(key, return_index=True)[1] if labels else np.unique(corners, return_index=True)[1]
     kind = key if labels else np.unique(corners, return_inverse=True)[1].reshape(-1)
     order = np.lexsort((first, corners[first]))
-    first = first[order]  # one corner for each new vertex, by vertex of the file
+    first = first[order]  # one corner for each new vertex, sorted by vertex of the file
     file_vertex = corners[first]
     is_copy = np.r_[False, file_vertex[1:] == file_vertex[:-1]]
     new_index = np.empty(len(first), dtype=np.int64)
@@ -76,7 +76,7 @@ def split(vertex_count: int, triangles: Ints, attributes: tuple[Attribute, ...],
 
 
 def require_vertices(corners: Ints, counts: Ints, vertex_count: int) -> None:
-    """Check that faces name only existing vertices. Raises: MeshError."""
+    """Check that faces name only existing vertices. Raises: MeshError if a vertex does not exist."""
     outside = (corners < 0) | (corners >= vertex_count)
     if outside.any():
         at = int(np.argmax(outside))
@@ -93,7 +93,7 @@ def require_vertices(corners: Ints, counts: Ints, vertex_count: int) -> None:
 
 
 def _labels(attribute: Attribute) -> Ints:
-    """Number the values of an attribute. Returns each corner's number, (3 m,), equal for equal values."""
+    """Number the distinct values of an attribute. Returns: number of the value at each corner, (3 m,)."""
     at = attribute.at.reshape(-1)
     if len(attribute.rows) == 0:
         return np.zeros(len(at), dtype=np.int64)

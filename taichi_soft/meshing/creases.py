@@ -1,4 +1,4 @@
-"""Sharp edges of a surface, across which its shading is not smooth."""
+"""Sharp edges of a surface. Across these edges, the shading of the surface is not smooth."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 DEFAULT_CREASE = 60.0
-"""Default angle up to which neighbouring triangles are shaded smoothly [degrees]: larger than between faces
-of an icosahedron (42), smaller than between faces of a box (90)."""
+"""Default angle up to which neighbouring triangles are shaded smoothly [degrees]. It is larger than the angle
+between faces of an icosahedron (42) and smaller than the angle between faces of a box (90)."""
 
 _COSINE_TOLERANCE = 1e-9
-"""Tolerance of the cosine: rounding must not split triangles that bend by exactly the crease angle."""
+"""Tolerance of the cosine. Rounding must not split triangles that bend by exactly the crease angle."""
 
 
 def split_at_creases(
     positions: NDArray[np.float64], triangles: NDArray[np.integer], crease: float | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Duplicate each vertex on a sharp edge, one copy per side, so that each side has its own normal.
+    """Duplicate each vertex on a sharp edge, so that each side of the edge has its own normal.
 
-    Triangles that share a vertex but no edge get separate copies too, and so do the two sides of a sheet that
-    contains each triangle twice.
+    Triangles that share a vertex but no edge get separate copies of the vertex too. The two sides of a sheet
+    that contains each triangle twice also get separate copies.
     Args:
         positions: (n, 3) [m].
         triangles: (m, 3) vertex indices.
-        crease: angle between neighbouring triangles above which their edge is sharp, 0 to 180 [degrees];
-            None: no edge is sharp.
-    Returns: the original vertex of each of the k copies, ascending, int64 (k,), without unused vertices; and
-        the triangles over the copies, int32 (m, 3).
+        crease: angle between neighbouring triangles above which their edge is sharp, 0 to 180 [degrees]; None
+            if no edge is sharp.
+    Returns: the original vertex of each of the k copies, ascending, int64 (k,); and the triangles with copies
+        as corners, int32 (m, 3). Unused vertices have no copies.
     """
     corner = np.arange(triangles.size).reshape(-1, 3)
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
@@ -37,7 +37,7 @@ def split_at_creases(
     opposite, bend = _neighbours(positions, triangles, vertex[start], vertex[end])
     smooth = bend >= min_cosine - _COSINE_TOLERANCE
 
-    # Corners that meet across a smooth edge are one vertex: propagate the smallest number of each group.
+    # Corners that meet across a smooth edge become one vertex. Propagate the smallest number of each group.
     first, second = start[smooth], end[opposite[smooth]]
     group = np.arange(triangles.size)
     while True:
@@ -58,10 +58,12 @@ def _neighbours(
     start: NDArray[np.int64],
     end: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return, for each side of each triangle, the same side in its neighbour, and the cosine of the bend.
+    """Find the neighbour across each side of each triangle.
 
-    Sides are numbered by the corner at which they begin. If a side has several neighbours, the one that bends
-    least is used. The cosine is -2 if there is no neighbour. A triangle without area counts as coplanar.
+    Sides are numbered by the corner at which they begin. If a side has several neighbours, the neighbour with
+    the smallest bend is used. A triangle without area counts as coplanar with its neighbours.
+    Returns: the same side in the neighbouring triangle, (3 m,), and the cosine of the angle between the two
+        triangles, (3 m,), -2 without a neighbour.
     """
     a, b, c = (positions[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)

@@ -1,4 +1,4 @@
-"""Delaunay meshes: the sphere through each tetrahedron's corners contains no vertex (thesis section 4.1)."""
+"""Delaunay meshes: no vertex lies inside the sphere through a tetrahedron's corners (thesis section 4.1)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 TOLERANCE = 1e-6
-"""Largest depth of a vertex inside a sphere: its power, divided by the squared longest edge. It allows for
-rounding if more than four vertices lie on a sphere, such as the eight corners of a cube."""
+"""Largest depth of a vertex inside a circumsphere, as the power of the vertex divided by the squared longest
+edge of the tetrahedron. The tolerance allows for rounding if more than four vertices lie on a sphere, such as
+the eight corners of a cube."""
 
 
 def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
-    """Return the module scipy.spatial. Raises: MissingExtraError, which names `purpose`, if it is missing."""
+    """Return the module scipy.spatial.
+
+    Raises: MissingExtraError, which names `purpose`, if scipy is missing.
+    """
     require_extra("voronoi", f"{purpose} need")
     from scipy import spatial
 
@@ -27,7 +31,7 @@ def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
 
 
 def circumspheres(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
-    """Centres (m, 3) [m] and radii (m,) [m] of the spheres through each tetrahedron's corners."""
+    """Return the centres (m, 3) [m] and radii (m,) [m] of the spheres through each tetrahedron's corners."""
     x = mesh.vertices[mesh.tets]
     arms = x[:, 1:] - x[:, :1]
     offset = np.linalg.solve(arms, 0.5 * (arms**2).sum(axis=2)[:, :, None])[:, :, 0]
@@ -35,7 +39,7 @@ def circumspheres(mesh: TetMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def require_delaunay(mesh: TetMesh) -> None:
-    """Check that all circumspheres are empty. Raises: MeshError with the worst tetrahedron."""
+    """Check that no circumsphere contains a vertex. Raises: MeshError, which names the worst tetrahedron."""
     centers, radii = circumspheres(mesh)
     distance, nearest = scipy_spatial().cKDTree(mesh.vertices).query(centers)
     ends = mesh.vertices[mesh.tets]
@@ -52,11 +56,11 @@ def require_delaunay(mesh: TetMesh) -> None:
 
 
 def delaunay_mesh(mesh: TetMesh) -> TetMesh:
-    """Reconnect the vertices of a mesh so that all circumspheres are empty; the body keeps its shape.
+    """Reconnect the vertices of a mesh so that all circumspheres are empty. The body keeps its shape.
 
     Args:
-        mesh: tetrahedra. Their surface stays the same.
-    Raises: MeshError if the surface of the body cannot be kept: it then needs more vertices.
+        mesh: mesh of the body.
+    Raises: MeshError if the surface of the body would change. The surface then needs more vertices.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")

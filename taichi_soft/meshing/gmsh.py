@@ -8,13 +8,14 @@ from pathlib import Path
 from taichi_soft.core.errors import MeshError
 
 NEEDED = ("MeshFormat", "Nodes", "Elements")
-"""Sections that are passed to meshio. It fails on others, such as names and data, even in valid files."""
+"""Sections that are passed to meshio. On other sections, such as names and data, meshio fails even if the
+file is valid."""
 
 OPENING = re.compile(rb"\s*\$(\w+)[ \t]*(?:\r\n?|\n)")
 
 
 def mesh_sections(path: Path, content: bytes) -> bytes:
-    """Return a Gmsh file with the format, nodes and elements of the mesh only; version 1 becomes 2.2.
+    """Return a Gmsh file with only the format, nodes and elements of the mesh. Version 1 is converted to 2.2.
 
     Raises: MeshError if the content is not a Gmsh file, or a section is missing or has no end.
     """
@@ -25,7 +26,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
             "Nodes": _section(path, found, "NOD"),
             "Elements": _modern_elements(path, _section(path, found, "ELM")),
         }
-    # Binary files can lack the line break before `$End...`; a second one is harmless.
+    # Binary files can lack the line break before `$End...`. A second line break is harmless.
     return b"".join(
         b"$%b\n%b\n$End%b\n" % (name.encode(), _section(path, found, name), name.encode()) for name in NEEDED
     )
@@ -40,7 +41,10 @@ def _section(path: Path, sections: dict[str, bytes], name: str) -> bytes:
 
 
 def _sections(path: Path, content: bytes) -> dict[str, bytes]:
-    """Return the bytes of each section by name, parsed in order, because binary data can contain anything."""
+    """Return the bytes of each section by name.
+
+    Sections are parsed in order, because binary data can contain words that look like the start of a section.
+    """
     sections: dict[str, bytes] = {}
     position = 0
     while opening := OPENING.match(content, position):
@@ -71,7 +75,8 @@ def _quoted(content: bytes) -> str:
 def _modern_elements(path: Path, old: bytes) -> bytes:
     """Convert elements of version 1 to version 2.2.
 
-    Version 1: `number kind physical geometrical count nodes...`; 2.2: `number kind 2 tag tag nodes...`.
+    A row of version 1 is `number kind physical geometrical count nodes...`. A row of version 2.2 is
+    `number kind 2 tag tag nodes...`.
     """
     rows = [line.split() for line in old.splitlines() if line.strip()]
     declared = int(rows[0][0]) if rows and rows[0][0].isdigit() else -1

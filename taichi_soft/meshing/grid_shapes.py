@@ -1,4 +1,4 @@
-"""Shapes made of box-shaped cells, each of five tetrahedra: one in the middle and four at corners."""
+"""Shapes made of box-shaped cells. A cell has five tetrahedra: one in the middle and four at corners."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from taichi_soft.meshing.tet_mesh import TetMesh
 
 # Corner i of a cell has the bits of i as coordinates: x = bit 0, y = bit 1, z = bit 2.
 CORNERS: NDArray[np.int64] = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)])
-# The two divisions of a cell are mirror images. Neighbouring cells use different ones, so that the diagonals
-# of common faces match.
+# The two divisions of a cell are mirror images. Neighbouring cells use different divisions, so that the
+# diagonals of common faces match.
 EVEN_CELL: NDArray[np.int64] = np.array(
     [(0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5)]
 )
@@ -29,7 +29,7 @@ def box(
 
     Args:
         size: edge lengths along x, y and z [m].
-        cells: number of cells along x, y and z, each of five tetrahedra. The smallest dihedral angle is
+        cells: number of cells along x, y and z. A cell has five tetrahedra. The smallest dihedral angle is
             54.7 degrees with cubic cells.
     Raises: OptionError for sizes that are not positive or counts below 1.
     Example:
@@ -46,7 +46,7 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
     """Make a bar along x, centred at the origin, whose cells are as close to cubes as possible.
 
     Args:
-        length, width, height: edges along x, y and z [m].
+        length, width, height: edge lengths along x, y and z [m].
         cells_across: number of cells along the shortest edge. The smallest dihedral angle is 54.7 degrees
             if the cells are cubic and at least 32 otherwise.
     Raises: OptionError for sizes that are not positive or a count below 1.
@@ -62,7 +62,7 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
 
 
 def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh:
-    """Make a body with one cell for every True in a grid, such as a frame, a letter or a scanned shape.
+    """Make a body with one cell for every True entry of a grid, such as a frame, a letter or a scanned shape.
 
     Args:
         mask: bool (nx, ny, nz), True for filled cells. The bounding box of the filled cells is centred at

@@ -1,7 +1,8 @@
 """Remove the few tetrahedra that force small time steps, by flips, collapses and vertex moves.
 
-Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity. It
-applies the changes with the largest gain that share no vertex: the smallest size of the mesh never decreases.
+Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity.
+The round then applies the changes with the largest gains, as far as they have no vertex in common. The
+smallest size in the mesh therefore never decreases.
 """
 
 from __future__ import annotations
@@ -19,14 +20,15 @@ from taichi_soft.meshing.cavities import OUTSIDE, Bools, Cavities, ClosedMesh, I
 from taichi_soft.meshing.topology import LOCAL_EDGES
 
 SMALL = 0.3
-"""Fraction of the median size below which tetrahedra are improved: they need three times the substeps."""
+"""Fraction of the median size below which tetrahedra are improved. Such tetrahedra need more than three times
+as many substeps as a tetrahedron of median size."""
 
 _ROUNDS = 100
-_GENTLE_ROUNDS = 3  # number of first rounds without collapses: flips and moves keep all vertices
-_MAX_IDLE_ROUNDS = 6  # rounds without a change before the search stops; each draws new moves
+_GENTLE_ROUNDS = 3  # number of rounds at the start without collapses, so that all vertices stay
+_MAX_IDLE_ROUNDS = 6  # number of rounds without a change after which the search stops
 _MIN_GAIN = 1.02  # factor by which the smallest size of a cavity must grow, so that the rounds end
 _VOLUME_TOLERANCE = 0.01  # total change of volume at the surface, relative to the body's volume
-_MIN_NORMAL_COSINE = 0.77  # limit between the normals of a new surface triangle and the old ones
+_MIN_NORMAL_COSINE = 0.77  # between a new surface normal and the most similar old surface normal
 _DRIFT_PENALTY = 0.9  # relative reduction of a gain that uses the full surface tolerance
 _FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex can slide
 _GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, relative to the step to the target size
@@ -39,7 +41,7 @@ _RANDOM_STEPS = (
 
 
 class Improved(NamedTuple):
-    """Improved mesh: vertices (n, 3) [m], tetrahedra (m, 4), and the original tetrahedron of each, (m,)."""
+    """Improved mesh: vertices (n, 3) [m], tetrahedra (m, 4), and original of each tetrahedron, (m,)."""
 
     vertices: FloatArray
     tets: IntArray
@@ -52,7 +54,7 @@ def improve(
     """Improve a mesh until its tetrahedra have at least a given size, if possible.
 
     Args:
-        size: smallest size, as `cavities.sizes` defines it [m]; None: `SMALL` times the median.
+        size: smallest size, as `cavities.sizes` defines it [m]; None for `SMALL` times the median.
         tolerance: largest displacement of the surface [m].
     Returns: the improved mesh, or None if nothing can be improved.
     """
@@ -68,7 +70,7 @@ def improve(
 
 
 class _Work:
-    """Mesh that is being improved. Moving a vertex creates a new one; `result` drops unused vertices."""
+    """Mesh that is being improved. A move creates a new vertex, and `result` drops unused vertices."""
 
     def __init__(
         self, vertices: FloatArray, tets: IntArray, surface: IntArray, size: float | None, tolerance: float
@@ -94,7 +96,7 @@ class _Work:
         is_bad = self.sizes < self.target_size
         if not is_bad.any():
             return False
-        # Cavities are stars around corners of bad tetrahedra; their tests need the next layer too.
+        # A cavity consists of tetrahedra around a corner of a bad tetrahedron. Tests need the next layer too.
         rows = np.flatnonzero(self._touching(self._touching(is_bad)))
         mesh, bad = ClosedMesh(self.tets[rows], self.keys), np.flatnonzero(is_bad[rows])
         edges = np.unique(np.sort(mesh.tets[bad][:, LOCAL_EDGES].reshape(-1, 2), axis=1), axis=0)
@@ -111,7 +113,7 @@ class _Work:
         candidates, gain = candidates.kept(gain > 0), gain[gain > 0]
         drift, fits = self._fits(candidates)
         candidates, gain, drift = candidates.kept(fits), gain[fits], drift[fits]
-        # Among similar gains, prefer those that use less of the surface tolerance.
+        # Among changes with similar gains, prefer changes that use less of the surface tolerance.
         worth = gain * (1 - _DRIFT_PENALTY * drift / self.tolerance)
         chosen = self._select_independent(candidates, np.argsort(-worth, kind="stable"))
         self._commit(candidates.kept(chosen), drift[chosen])
@@ -125,7 +127,10 @@ class _Work:
         return np.asarray(is_touched[self.tets].any(axis=1))
 
     def _gain(self, cavities: Cavities) -> FloatArray:
-        """Increase of the smallest size in each cavity, up to the target, (k,) [m]; 0 if it is too small."""
+        """Return the increase of the smallest size in each cavity, (k,) [m].
+
+        Sizes count only up to the target size. An increase that is too small counts as 0.
+        """
         before, after = np.full(cavities.total, np.inf), np.full(cavities.total, self.target_size)
         np.minimum.at(before, cavities.removed_of, self.sizes[cavities.removed])
         np.minimum.at(after, cavities.added_of, cavity.sizes(self.x, cavities.added))
@@ -166,7 +171,10 @@ class _Work:
         return trial
 
     def _slide_projections(self, mesh: ClosedMesh, vertices: Ints) -> FloatArray:
-        """Projections (k, 3, 3) onto allowed moves: any inside the mesh, else along the surface or crease."""
+        """Return projections onto the allowed moves of vertices, (k, 3, 3).
+
+        Inner vertices can move in all directions, surface vertices only along the surface or a crease.
+        """
         rows, of = mesh.star(vertices)
         faces, of = patches.outer_faces(mesh.tets[rows], of)
         normal = patches.area_vectors(self.x[faces])
@@ -178,7 +186,11 @@ class _Work:
         return np.asarray(free @ np.swapaxes(free, 1, 2))
 
     def _fits(self, cavities: Cavities) -> tuple[FloatArray, Bools]:
-        """Upper bound of the surface's displacement at each cavity [m], and True if the change is allowed."""
+        """Check which changes the surface allows.
+
+        Returns: upper bound of the surface's displacement at each cavity, (k,) [m]; and True for cavities
+            that are allowed, (k,).
+        """
         count = cavities.total
         old, old_of = patches.outer_faces(self.tets[cavities.removed], cavities.removed_of)
         new, new_of = patches.outer_faces(cavities.added, cavities.added_of)
@@ -197,7 +209,10 @@ class _Work:
         return drift, fits & (drift <= self.tolerance)
 
     def _select_independent(self, cavities: Cavities, order: Ints) -> Bools:
-        """Select cavities without common vertices, in `order` of priority. Returns True for selected ones."""
+        """Select cavities without common vertices, in `order` of priority, within the volume budget.
+
+        Returns: True for selected cavities, (k,).
+        """
         count = cavities.total
         rank = np.empty(count, dtype=np.int64)
         rank[order] = np.arange(count)
@@ -234,7 +249,11 @@ class _Work:
         self.sizes = np.r_[self.sizes[keep], cavity.sizes(self.x, cavities.added)]
 
     def _sources(self, cavities: Cavities, added: Ints) -> Ints:
-        """Source of each added tetrahedron: source of the removed one in which its centre lies deepest."""
+        """Return the original tetrahedron for each tetrahedron in `added`, (k,).
+
+        It is the original of the removed tetrahedron in which the centre of the added tetrahedron lies
+        deepest.
+        """
         real = self.source[cavities.removed] >= 0
         removed = cavities.removed[real]
         i, j = patches.pairs(cavities.added_of[added], cavities.removed_of[real], cavities.total)

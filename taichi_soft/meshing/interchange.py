@@ -21,39 +21,39 @@ from taichi_soft.meshing import gmsh, medit
 from taichi_soft.meshing.advice import fill_hint
 from taichi_soft.meshing.tet_mesh import TetMesh
 
-# meshio's module for each suffix, and options for writing. They keep every digit, and older programs can read
-# the files. (.vtu is binary because meshio's text form keeps only twelve digits.)
+# meshio's module for each suffix, and options for writing. With these options, files keep every digit and
+# older programs can read them. (.vtu is binary because meshio's text form keeps only twelve digits.)
 FORMATS: dict[str, tuple[str, dict[str, object]]] = {
     ".msh": ("gmsh", {"fmt_version": "4.1", "binary": False}),
     ".vtk": ("vtk", {"fmt_version": "4.2", "binary": False}),
     ".vtu": ("vtu", {"binary": True}),
     ".mesh": ("medit", {}),
 }
-# Functions that reduce a file to the sections that meshio needs, because it fails on unknown ones.
+# Functions that reduce a file to the sections that meshio needs, because meshio fails on unknown sections.
 SECTIONS: dict[str, Callable[[Path, bytes], bytes]] = {
     "gmsh": gmsh.mesh_sections,
     "medit": medit.mesh_sections,
 }
-# meshio's names of tetrahedra of any order begin with one of these. Their four corners come first.
+# meshio's names for tetrahedra of any order begin with one of these. The first four nodes are the corners.
 TETRAHEDRA = ("tetra", "VTK_LAGRANGE_TETRAHEDRON")
 
 
 def read_interchange(path: Path) -> tuple[Any, Any]:
-    """Read points (n, 3) and the vertex indices (m, 4) of all blocks of tetrahedra, concatenated.
+    """Read a file with meshio. Returns: points (n, 3), and the tetrahedra of all blocks, (m, 4).
 
     Higher-order tetrahedra are reduced to their four corners. Cells of other kinds that are not part of a
     tetrahedron are skipped with a SkippedCellsWarning.
-    Raises: MeshError if meshio is missing or cannot read the file, or if it contains no tetrahedra.
+    Raises: MeshError if meshio is missing or cannot read the file, or if the file contains no tetrahedra.
     """
     name, _ = FORMATS[path.suffix.lower()]
     reader = _meshio_module(name)
-    content = path.read_bytes()  # raises OSError for missing or locked files before meshio hides it
+    content = path.read_bytes()  # raises OSError for missing or locked files, which meshio would hide
     declared = 0
     if name in SECTIONS:
         content = SECTIONS[name](path, content)
     else:
         declared = _declared_cells(path, name, content)
-    # Use the format's own reader: meshio.read() exits the process on a bad file.
+    # Use the format's own reader, because meshio.read() ends the process on a bad file.
     with tempfile.TemporaryDirectory() as folder, _quiet(f"{path.name}: cannot be read as {name}") as printed:
         source = path
         if name in SECTIONS:
@@ -88,9 +88,9 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
 
 
 def _declared_cells(path: Path, name: str, content: bytes) -> int:
-    """Number of cells that a VTK file declares, to detect skipped cells and truncated files.
+    """Return the number of cells that a VTK file declares, used to detect skipped cells and truncated files.
 
-    Raises: MeshError if a file is truncated, or has several pieces, of which meshio reads only the last.
+    Raises: MeshError if the file is truncated or has several pieces. (meshio reads only the last piece.)
     """
     if name == "vtu":
         pieces = re.findall(rb"<Piece\s[^>]*NumberOfCells\s*=\s*[\"'](\d+)", content)
@@ -113,7 +113,7 @@ def _declared_cells(path: Path, name: str, content: bytes) -> int:
 
 
 def _count_separate(block: Any, tets: NDArray[Any]) -> int:
-    """Number of cells in `block` without the points, edges and faces of `tets`, which programs write too."""
+    """Count the cells in `block` that are not points, edges or faces of `tets`."""
     if block.dim == 0:
         return 0
     if block.dim == 3:
@@ -178,7 +178,7 @@ def _quiet(failure: str) -> Iterator[io.StringIO]:
 
 def _reason(error: BaseException) -> str:
     text = " ".join(str(error).split())[:200]
-    if isinstance(error, KeyError):  # its text is only the missing key
+    if isinstance(error, KeyError):  # the text of a KeyError is only the missing key
         return f"meshio does not know {text}: if that is a kind of cell, save only the tetrahedra"
     if not text:
         return (

@@ -1,7 +1,7 @@
 """Read and write meshes; the suffix of the path selects the format.
 
-    .npz          this package's own: arrays `vertices` and `tets`, compressed
-    .node, .ele   TetGen, a pair of files; name either
+    .npz          format of this package: compressed arrays `vertices` and `tets`
+    .node, .ele   TetGen, a pair of files; the path can name either file
     .msh          Gmsh 1, 2, 4.0 and 4.1, text or binary (written as 4.1 text)
     .vtk, .vtu    VTK unstructured grids (.vtk written as text)
     .mesh         Medit, text
@@ -36,18 +36,19 @@ SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
     """Read a tetrahedral mesh.
 
-    Vertices that no tetrahedron uses (such as the construction points in Gmsh files) are dropped, and the
-    rest renumbered in their order. All blocks of tetrahedra become one mesh; tetrahedra with more than four
-    nodes are reduced to their corners. Cells of other kinds are skipped with a SkippedCellsWarning that
-    counts them, unless they are points, edges or faces of the body.
+    Vertices that no tetrahedron uses (such as the construction points in Gmsh files) are dropped. The other
+    vertices are renumbered in their order. All blocks of tetrahedra become one mesh. Tetrahedra with more
+    than four nodes are reduced to their corners. Cells of other kinds are skipped. A SkippedCellsWarning
+    counts the skipped cells that are not points, edges or faces of the body.
 
     Args:
         path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu, .mesh. Coordinates are metres.
         fix_orientation: reverse tetrahedra of negative volume. True by default, unlike in `TetMesh`, because
             programs differ in orientation. Overlapping neighbours are rejected in either case.
-    Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
-        cut short, without tetrahedra (the message says how to fill a surface) or not a valid mesh (see
-        `TetMesh`), or if meshio is needed and missing; OptionError if `path` does not name a file.
+    Raises: MeshError if the file is missing, has another format, is cut short, has no tetrahedra or is not a
+        valid mesh (see `TetMesh`), or if meshio is needed and missing; OptionError if `path` does not name a
+        file. The message of a MeshError is one line that starts with the file's name. For a surface, the
+        message says how to fill it.
     """
     source = as_path(path)
     suffix = source.suffix.lower()
@@ -68,13 +69,13 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
 
 
 def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
-    """Write a tetrahedral mesh in the format of the suffix of `path`; every digit is kept.
+    """Write a tetrahedral mesh, with every digit, in the format that the suffix of `path` selects.
 
-    The write is atomic: an existing file stays until the new one is complete. Naming either of TetGen's two
-    files writes both.
+    The write is atomic: an existing file stays until the new file is complete. If `path` names one of
+    TetGen's two files, both files are written.
     Args:
         mesh: tetrahedra.
-        path: path of the file. Its suffix is one of those that `load_mesh` reads.
+        path: path of the file, with a suffix that `load_mesh` reads.
     Raises: MeshError for an unknown suffix, a mesh that is not a TetMesh, a path that cannot be written to,
         or if meshio is needed and missing; OptionError if `path` does not name a file.
     Example:
@@ -136,7 +137,7 @@ def reject_placeholder(source: Path) -> None:
 
 
 def _file_name(error: OSError, source: Path) -> str:
-    """Name of the file that the error concerns: for TetGen, either one of the pair."""
+    """Return the name of the file that caused an error. For TetGen, this is one file of the pair."""
     return Path(os.fsdecode(error.filename)).name if error.filename else source.name
 
 
@@ -169,12 +170,12 @@ def _read_npz(path: Path) -> tuple[Any, Any]:
 
 
 def _write_npz(mesh: TetMesh, path: Path) -> None:
-    with path.open("wb") as file:  # given a path, numpy would append its own suffix
+    with path.open("wb") as file:  # numpy would append its own suffix to a path
         np.savez_compressed(file, vertices=mesh.vertices, tets=mesh.tets)
 
 
 def _without_unused(vertices: Any, tets: Any) -> tuple[Any, Any]:
-    """Drop vertices that no tetrahedron uses. Invalid indices are kept, because `TetMesh` reports them."""
+    """Drop vertices that no tetrahedron uses. Invalid indices stay, because `TetMesh` reports them."""
     if tets.dtype.kind not in "iu" or tets.size == 0 or tets.min() < 0 or tets.max() >= len(vertices):
         return vertices, tets
     used, inverse = np.unique(tets, return_inverse=True)

@@ -14,7 +14,8 @@ from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0), (0, 2))}
-"""Kinds of springs in a cloth: the steps over its grid (columns, rows) that they span."""
+"""Kinds of springs in a cloth. A kind is a list of steps over the grid, (columns, rows), that its springs
+span."""
 
 
 def rope(length: float, segments: int, mass: float) -> ParticleMesh:
@@ -23,7 +24,7 @@ def rope(length: float, segments: int, mass: float) -> ParticleMesh:
     Args:
         length: total length [m].
         segments: number of springs.
-        mass: total mass [kg]; the particles at the ends have half the mass of the others.
+        mass: total mass [kg]. The particles at the ends have half the mass of the other particles.
     Example:
         arena = World(floor=0.0)
         line = rope(length=2.0, segments=20, mass=0.5)
@@ -76,11 +77,11 @@ def cloth(
 
 
 def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float) -> FloatArray:
-    """Return a value for each spring of a `cloth`, such as its stiffness, according to its kind, (k,).
+    """Return a value for each spring of a cloth, such as the stiffness, (k,), by the kind of the spring.
 
     Args:
-        mesh: made by `cloth`.
-        cells: the same as for `cloth`.
+        mesh: result of `cloth`.
+        cells: number of cells along x and y, as passed to `cloth`.
         values: one value of 0 or more for each kind of spring in the cloth: tensile=, shear=, bend=.
     Raises: OptionError for an unknown or missing kind; MeshError for a mesh with other cells.
     Example:
@@ -109,7 +110,7 @@ def _as_cells(cells: Any) -> tuple[int, int]:
 
 
 def _kinds(mesh: ParticleMesh, nx: int, ny: int) -> NDArray[np.int64]:
-    """Index of each spring's kind in `KINDS`, (k,). Raises: MeshError if the cloth has other cells."""
+    """Return the index in `KINDS` of each spring's kind, (k,). Raises: MeshError if cells do not match."""
     if not isinstance(mesh, ParticleMesh):
         raise MeshError(f"mesh must be a ParticleMesh made by cloth, got {type(mesh).__name__}")
     if len(mesh.vertices) != (nx + 1) * (ny + 1):
@@ -136,7 +137,7 @@ def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> P
     Each particle gets a quarter of the mass of each tetrahedron around it.
 
     Args:
-        density: [kg/m^3], one number or one per tetrahedron.
+        density: density [kg/m^3], one number or one for each tetrahedron.
         mesh: tetrahedra, whose vertices become the particles.
     Raises: MeshError if `mesh` is not a TetMesh; OptionError for a density that is not positive or has
         another shape.

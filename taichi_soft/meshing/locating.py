@@ -13,20 +13,20 @@ from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 Ints = NDArray[np.int64]
 
 MAX_STEPS = 64
-"""Largest number of steps of a walk towards a point; after that, the surface is searched."""
+"""Largest number of steps of a walk towards a point. If the walk does not arrive, the surface is searched."""
 
 INSIDE = -1e-9
 """Smallest barycentric coordinate of a point that counts as inside a tetrahedron."""
 
 CHUNK = 1 << 20
-"""Pairs of points and elements that are processed at once."""
+"""Number of pairs of points and elements that are processed at once."""
 
 BATCH = 1 << 13
-"""Points that are processed at once."""
+"""Number of points that are processed at once."""
 
 
 class Locator:
-    """Finds the tetrahedra that contain given points, in one mesh at rest."""
+    """Search for the tetrahedra of a mesh at rest that contain points or are nearest to them."""
 
     def __init__(self, mesh: TetMesh) -> None:
         """Find the neighbours of the tetrahedra, and sort tetrahedra and surface triangles into bins."""
@@ -40,9 +40,9 @@ class Locator:
     def __call__(self, points: FloatArray, start: Ints | None = None) -> tuple[Ints, FloatArray]:
         """Locate points (k, 3).
 
-        Args: start: tetrahedron from which to walk, (k,), -1 if none is known.
-        Returns: the tetrahedron that contains each point or is nearest to it, (k,); and the barycentric
-            coordinates of the nearest point in that tetrahedron, (k, 4), 0 or more.
+        Args: start: tetrahedron at which the walk to each point starts, (k,), -1 if none is known.
+        Returns: the tetrahedron that contains each point or is nearest to the point, (k,); and the
+            barycentric coordinates of the nearest point in that tetrahedron, (k, 4), 0 or more.
         """
         tet = np.full(len(points), -1) if start is None else start.copy()
         unknown = tet < 0
@@ -68,9 +68,11 @@ class Locator:
         return shares_by(self._inverses[tet], points - self._corners[tet, 0])
 
     def _walk(self, points: FloatArray, start: Ints) -> tuple[Ints, FloatArray]:
-        """Walk towards each point, through the face that it lies farthest beyond, as far as the mesh extends.
+        """Walk from tetrahedron to tetrahedron towards each point, as far as the mesh extends.
 
-        Returns: the last tetrahedron of each walk, and the barycentric coordinates of the point in it.
+        Each step crosses the face beyond which the point lies farthest.
+        Returns: the last tetrahedron of each walk, (k,), and the barycentric coordinates of the point in this
+            tetrahedron, (k, 4).
         """
         tet = start.copy()
         weights = self._weights(points, tet)
@@ -87,7 +89,7 @@ class Locator:
         return tet, weights
 
     def _on_surface(self, points: FloatArray) -> tuple[Ints, FloatArray]:
-        """Nearest triangle of the surface, (k,), and the nearest point on it, (k, 3)."""
+        """Return the nearest triangle of the surface, (k,), and the nearest point on the triangle, (k, 3)."""
         triangle, nearest = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
         point, candidate = self._on_triangles.candidates(points)
         is_final = np.zeros(len(points), dtype=np.bool_)
@@ -106,10 +108,14 @@ class Locator:
         return triangle, nearest
 
     def _nearest_of(self, points: FloatArray, point: Ints, triangle: Ints) -> tuple[Ints, Ints, FloatArray]:
-        """Return, for each point that occurs in the pairs, its index, nearest triangle, and nearest point."""
+        """Find the nearest triangle of each point among pairs of a point and a triangle.
+
+        Returns: the points that occur in the pairs, (j,), their nearest triangles, (j,), and the nearest
+            points on these triangles, (j, 3).
+        """
         distance = np.linalg.norm(points[point] - self._on_triangles.centroids[triangle], axis=1)
         bound = np.full(len(points), np.inf)
-        np.minimum.at(bound, point, distance)  # upper bound: the centroid is on the triangle
+        np.minimum.at(bound, point, distance)  # an upper bound, because the centroid is on the triangle
         is_candidate = distance - self._on_triangles.radius <= bound[point]
         point, triangle = point[is_candidate], triangle[is_candidate]
         nearest = nearest_points(points[point], self._triangles[triangle])
@@ -136,7 +142,7 @@ class _Bins:
         self._begins = np.cumsum(self._counts) - self._counts
 
     def candidates(self, points: FloatArray) -> tuple[Ints, Ints]:
-        """Indices of all pairs of a point and an element in the point's bin or an adjacent one, (k,) each."""
+        """Return all pairs of a point and an element in the point's bin or an adjacent bin, (k,) each."""
         places = np.floor(points / self._pitch) - self._low
         is_in = ((places >= 1) & (places < self._shape - 1)).all(axis=1)
         inner, own_bin = np.flatnonzero(is_in), self._bins(points[is_in])
@@ -149,7 +155,7 @@ class _Bins:
         return point, self._order[np.repeat(self._begins[bins].ravel(), counts) + place]
 
     def any_element(self, points: FloatArray) -> Ints:
-        """An element in the bin of each point, or element 0 if the bin is empty, (k,)."""
+        """Return one element in the bin of each point, (k,), or element 0 if the bin is empty."""
         places = np.floor(points / self._pitch) - self._low
         found = np.zeros(len(points), dtype=np.int64)
         inner = np.flatnonzero(((places >= 0) & (places < self._shape)).all(axis=1))
@@ -164,7 +170,7 @@ class _Bins:
 
 
 def _neighbours(tets: NDArray[np.integer]) -> Ints:
-    """Tetrahedron on the other side of each face, (m, 4), -1 if there is none."""
+    """Return the tetrahedron on the other side of each face, (m, 4), or -1 if there is none."""
     one, other = shared_faces(tets).T
     neighbours = np.full(4 * len(tets), -1)
     neighbours[one], neighbours[other] = other // 4, one // 4
@@ -172,7 +178,12 @@ def _neighbours(tets: NDArray[np.integer]) -> Ints:
 
 
 def nearest_points(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Point of each triangle (k, 3, 3) that is nearest to the point (k, 3) in the same row, (k, 3)."""
+    """Return the point of each triangle that is nearest to the point in the same row, (k, 3).
+
+    Args:
+        points: (k, 3).
+        triangles: corners, (k, 3, 3).
+    """
     a = triangles[:, 0]
     edges = np.stack([triangles[:, 1] - a, triangles[:, 2] - a], axis=1)
     gram = np.einsum("kix,kjx->kij", edges, edges)

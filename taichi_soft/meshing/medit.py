@@ -41,7 +41,7 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
         raise MeshError(f"{path.name}: has dimension {got}: a body needs 3")
     lines = [b"MeshVersionFormatted 2", b"Dimension 3"]
     for word, body in found:
-        columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last column is a mark
+        columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last column is a label
         if columns == 1:
             continue
         count = int(body[0]) if body and body[0].isdigit() else -1

@@ -20,7 +20,7 @@ HEADER = re.compile(rb"(ST)?(C)?(N)?OFF(.*)", re.IGNORECASE)
 
 
 def read_off(path: Path) -> list[Surface]:
-    """Read the surface of an .off file, in its own axes and units.
+    """Read the surface of an .off file, in the axes and units of the file.
 
     Raises: MeshError if the file is cut short, of an unsupported variant, or has invalid numbers.
     """
@@ -46,7 +46,10 @@ def read_off(path: Path) -> list[Surface]:
 
 
 def _faces(lines: list[list[bytes]], count: int) -> list[list[bytes]]:
-    """Return the words of each face: one line or, if faces span several lines, as many as its count says."""
+    """Return the words of each face.
+
+    If faces span several lines, the first word of a face determines how many words belong to the face.
+    """
     if all(int(line[0]) < len(line) for line in lines[:count]):
         return lines[:count]
     words, faces, start = [word for line in lines for word in line], list[list[bytes]](), 0
@@ -85,7 +88,7 @@ def _surface(name: str, has: list[bool], vertices: list[list[bytes]], faces: lis
 def _columns(
     rows: list[list[bytes]], has_uv: bool, has_color: bool, has_normal: bool
 ) -> tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray | None]:
-    """Points (n, 3), and the optional normals, colours and texture coordinates of the vertices."""
+    """Return the points, (n, 3), normals, colours and texture coordinates of vertices; None if missing."""
     points = as_points(numbers(rows, 3, "vertex"))
     normals = colors = uv = None
     if has_normal:
@@ -101,9 +104,9 @@ def _columns(
 
 
 def _face_colors(rows: list[list[bytes]]) -> tuple[FloatArray, NDArray[np.int64]] | None:
-    """Return the colours, from 0 to 1, and each face's row in them; None without colours.
+    """Return a table of colours from 0 to 1, (c, 3), and the row in the table of each face, (f,).
 
-    Single numbers, which index a colour table, are ignored.
+    Single numbers, which are indices of a colour map, are ignored. The result is None without colours.
     """
     has_color = np.array([len(row) >= 3 for row in rows])
     if not has_color.any():

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.meshing.arrays import IntArray, as_indices, as_points
 
-# Bits per axis: three axes fill 63 of the 64 bits of one key.
+# Number of bits per axis. Three axes fill 63 of the 64 bits of a key.
 AXIS_BITS = 21
-# Shifts and masks that spread the bits of a 21-bit number, leaving two zeros after each.
+# Shifts and masks that spread the bits of a 21-bit number, with two zeros after each bit.
 SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -26,8 +26,8 @@ def spatial_order(vertices: ArrayLike) -> IntArray:
 
     Args:
         vertices: (n, 3) [m].
-    Returns: int32 (n,), a permutation: `vertices[spatial_order(vertices)]` lie along the curve. Equal
-        points keep their order, so the result is the same on every machine.
+    Returns: int32 (n,), a permutation. The points `vertices[spatial_order(vertices)]` are ordered along the
+        curve. Equal points keep their order, so the result is the same on every machine.
     Raises: MeshError if the points are not finite or have the wrong shape.
     """
     points = as_points(vertices)
@@ -45,10 +45,10 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
 
     Args:
         tets: (m, 4) vertex indices in the old numbering.
-        vertex_order: (n,) permutation, such as `spatial_order` returns: entry i is the old index of the i-th
+        vertex_order: (n,) permutation, such as `spatial_order` returns. Entry i is the old index of the i-th
             vertex.
-    Returns: int32 (m,), a permutation that sorts the rows of `tets` by lowest new vertex, then the next.
-        The rows themselves keep the old numbers: `renumbered(vertex_order)[tets[order]]` is the new array.
+    Returns: int32 (m,), a permutation that sorts the rows of `tets` by their lowest new vertex index, then by
+        the next. `renumbered(vertex_order)[tets[order]]` is the sorted array with new vertex indices.
     Raises: MeshError if a tetrahedron names a vertex that does not exist.
     """
     new_index = renumbered(vertex_order)
@@ -60,11 +60,14 @@ def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
 def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     """Choose which end owns each edge, so that most vertices own a multiple of `group` edges.
 
-    The method is greedy. Every vertex first takes as many full groups as its edges allow. Then the vertex
-    with the most unowned edges takes them all, repeatedly. Finally, edges of partly full groups move to
-    vertices with free places. Groups are much fuller than if the end with the lower number owned every edge.
+    The method is greedy. First, every vertex takes as many full groups as its edges allow. Then the vertex
+    with the most unowned edges takes all of these edges, again and again, until every edge has an owner.
+    Finally, the edges of partly full groups move to other vertices whose groups have free places. Groups are
+    much fuller than if the end with the lower number owned every edge.
     Args:
         edges: (k, 2) vertex indices.
+        vertex_count: number of vertices.
+        group: number of edges of a full group.
     Returns: vertex that owns each edge, int32 (k,).
     """
     ends = np.asarray(edges).tolist()
@@ -100,7 +103,10 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
 def _move_partial_groups(
     ends: list[list[int]], incident: list[list[int]], owner: list[int], group: int
 ) -> None:
-    """Give the edges of partly full groups, least full first, to their other ends if these have room."""
+    """Move the edges of partly full groups to the other ends of the edges, least full groups first.
+
+    A group moves only as a whole, to ends whose groups have free places.
+    """
     counts = np.bincount(owner, minlength=len(incident)).tolist()
     for _ in range(4):
         before = list(owner)
@@ -125,7 +131,7 @@ def _move_partial_groups(
 
 
 def renumbered(order: ArrayLike) -> IntArray:
-    """Return the inverse permutation: the new index of each old index, int32 (n,)."""
+    """Return the inverse of a permutation, int32 (n,). Entry i is the new index of the old index i."""
     old_index = np.asarray(order)
     new_index: IntArray = np.empty(len(old_index), dtype=np.int32)
     new_index[old_index] = np.arange(len(old_index), dtype=np.int32)

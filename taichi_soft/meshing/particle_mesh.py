@@ -1,4 +1,4 @@
-"""Particles joined by edges, without volume: cloth, ropes, spring lattices."""
+"""Meshes of particles and edges, without volume, for cloth, ropes and spring lattices."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from taichi_soft.meshing.body_mesh import BodyMesh
 
 @serialised("vertices", "edges", "masses", "surface")
 class ParticleMesh(BodyMesh):
-    """A body of particles and edges with given masses instead of a volume. Immutable.
+    """Mesh of particles and edges, with masses instead of a volume. It is immutable.
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        edges: (k, 2) integer vertex indices, in any order and direction. They are stored in this order, with
-            i < j. Values per edge in a `SpringMaterial` have the same order.
-        masses: (n,) mass of each particle [kg], all positive; or one number for all.
-        surface: (f, 3) triangles to draw, none by default. Triangles are one-sided, so a sheet needs each of
-            its triangles twice.
+        edges: (k, 2) integer vertex indices, in any order and direction. The rows are stored in this order,
+            with i < j. Values per edge in a `SpringMaterial` have the same order.
+        masses: (n,) mass of each particle [kg], above 0; or one number for all particles.
+        surface: (f, 3) triangles to draw, none by default. Triangles are one-sided, so a sheet needs each
+            triangle twice, once for each side.
 
     Raises: MeshError for wrong shapes or dtypes, numbers that are not finite, indices out of range, an edge
-        from a vertex to itself, an edge given twice or of zero length, a vertex without an edge, a mass that
-        is not positive, or no vertices or edges at all.
+        from a vertex to itself, a duplicate edge, an edge of zero length, a vertex without an edge, a mass
+        that is not positive, or a mesh without vertices or edges.
 
     The arrays are copied. `tets` is empty, (0, 4).
     """

@@ -1,4 +1,4 @@
-"""Compare patches of a surface with their replacements: distance and rotation of the normals."""
+"""Compare patches of a surface with their replacements, by distance and by rotation of the normals."""
 
 from __future__ import annotations
 
@@ -8,35 +8,56 @@ from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.cavities import OUTSIDE, Ints, ranges
 from taichi_soft.meshing.topology import LOCAL_FACES
 
-# Barycentric sample points of a triangle at which distances are measured, a quarter of a side apart.
+# Sample points of a triangle for distances, in barycentric coordinates, a quarter of a side apart.
 _SAMPLES = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4.0
 _SAMPLING_FACTOR = 4 / 3
-"""Bound of the largest distance over the largest distance at a sample. The distance is largest at a corner or
-where two sides cross, and falls from there at most linearly towards the end of a side. The nearest sample is
-at most an eighth of the side away, so its distance is at least three quarters of the largest."""
+"""Upper bound of the largest distance, divided by the largest distance at a sample. The distance is largest
+at a corner or at a point where two sides cross. From there, the distance falls at most linearly towards the
+end of the side. The nearest sample is at most an eighth of the side away, so the distance at this sample is
+at least three quarters of the largest distance."""
 _TINY = 1e-300  # [m^2], avoids division by zero for degenerate triangles
 
 
 def outer_faces(tets: Ints, of: Ints) -> tuple[Ints, Ints]:
-    """Surface triangles (f, 3) of tetrahedra, wound outwards, and the entry of `of` for each triangle."""
+    """Find the surface triangles of tetrahedra.
+
+    Args: of: group of each tetrahedron.
+    Returns: triangles, wound outwards, (f, 3), and the group of each triangle, (f,).
+    """
     row, corner = np.nonzero(tets == OUTSIDE)
     return tets[row[:, None], LOCAL_FACES[corner][:, ::-1]], of[row]
 
 
 def pairs(first_of: Ints, second_of: Ints, count: int) -> tuple[Ints, Ints]:
-    """Indices of all pairs of a first and a second entry of the same group; `second_of` must be sorted."""
+    """Return the indices of all pairs of a first and a second entry in the same group, (p,) each.
+
+    Args:
+        first_of: group of each first entry.
+        second_of: group of each second entry, ascending.
+        count: number of groups.
+    """
     starts = np.searchsorted(second_of, first_of)
     counts = np.bincount(second_of, minlength=count)[first_of]
     return np.repeat(np.arange(len(first_of)), counts), ranges(starts, counts)
 
 
 def area_vectors(p: FloatArray) -> FloatArray:
-    """Normal vectors (k, 3) of triangles (k, 3, 3), with twice the areas as lengths [m^2]."""
+    """Return the normal vectors of triangles, (k, 3). The length of a vector is twice the area [m^2].
+
+    Args: p: corners of the triangles, (k, 3, 3) [m].
+    """
     return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def largest_turn(old: FloatArray, old_of: Ints, new: FloatArray, new_of: Ints, count: int) -> FloatArray:
-    """Cosine of the largest angle between a new triangle and the most similar old one, (count,)."""
+    """Return the cosine of the largest angle between a new triangle and the most similar old triangle.
+
+    Args:
+        old, new: corners of the triangles, (k, 3, 3).
+        old_of, new_of: group of each triangle, (k,), ascending.
+        count: number of groups.
+    Returns: cosine for each group, (count,).
+    """
     normals = [area_vectors(side) for side in (new, old)]
     first, second = (n / np.maximum(np.linalg.norm(n, axis=1), _TINY)[:, None] for n in normals)
     i, j = pairs(new_of, old_of, count)
@@ -48,7 +69,7 @@ def largest_turn(old: FloatArray, old_of: Ints, new: FloatArray, new_of: Ints, c
 
 
 def distance(old: FloatArray, old_of: Ints, new: FloatArray, new_of: Ints, count: int) -> FloatArray:
-    """Upper bound of the distance between the old and the new patch of each group, (count,) [m]."""
+    """Return an upper bound of the distance between the old and the new patch of each group, (count,) [m]."""
     largest = np.zeros(count)
     for here, here_of, there, there_of in ((old, old_of, new, new_of), (new, new_of, old, old_of)):
         points = np.einsum("sc,tcd->tsd", _SAMPLES, here).reshape(-1, 3)
@@ -61,7 +82,7 @@ def distance(old: FloatArray, old_of: Ints, new: FloatArray, new_of: Ints, count
 
 
 def _squared_distances(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Squared distances from points (k, 3) to triangles (k, 3, 3), (k,) [m^2]."""
+    """Return the squared distances from points (k, 3) to triangles (k, 3, 3), (k,) [m^2]."""
     normal = area_vectors(triangles)
     length2 = np.einsum("ij,ij->i", normal, normal)
     inside = length2 > _TINY

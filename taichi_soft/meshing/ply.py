@@ -1,4 +1,4 @@
-"""Polygon files (.ply), text or binary: vertices with normals, colours and texture coordinates, and faces."""
+"""Read polygon files (.ply), text or binary, with their normals, colours and texture coordinates."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "
 @dataclass
 class _Property:
     name: str
-    kind: str  # NumPy's type of its numbers
-    count_kind: str = ""  # NumPy's type of a list's length; empty for a single number
+    kind: str  # NumPy type of the numbers
+    count_kind: str = ""  # NumPy type of a list's length; empty for a single number
 
 
 @dataclass
@@ -55,11 +55,11 @@ class _List:
     counts: Ints
 
 
-Columns = dict[str, Any]  # arrays (n,) or lists, by name
+Columns = dict[str, Any]  # arrays (n,) or lists of an element's properties, by name
 
 
 def read_ply(path: Path) -> list[Surface]:
-    """Read the surface of a .ply file, in its own axes and units.
+    """Read the surface of a .ply file, in the axes and units of the file.
 
     Raises: MeshError if the file is cut short, of another kind, or has invalid numbers.
     """
@@ -122,9 +122,9 @@ def _surface(
 
 
 def _strip_triangles(strips: _List) -> _List:
-    """Triangles of strips: each vertex and the two before it, with every second triangle reversed.
+    """Convert triangle strips to triangles. The value -1 ends a strip.
 
-    -1 ends a strip.
+    Each vertex forms a triangle with the two vertices before it. Every second triangle is reversed.
     """
     ends = np.cumsum(strips.counts)
     values = np.insert(strips.values.astype(np.int64), ends[:-1], -1)
@@ -151,7 +151,10 @@ def _table(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> FloatArray
 
 
 def _colors(columns: Columns) -> FloatArray | None:
-    """Colours from 0 to 1, (n, 3), or None: 16-bit integers are divided by 65535, other integers by 255."""
+    """Return the colours, (n, 3), from 0 to 1, or None without colours.
+
+    16-bit integers are divided by 65535, other integers by 255.
+    """
     for names in COLORS:
         if all(isinstance(columns.get(name), np.ndarray) for name in names):
             kind = columns[names[0]].dtype
@@ -179,7 +182,7 @@ def _look(path: Path, textures: list[str], notes: list[str]) -> Look | None:
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
-    """Byte order ("" for text), elements, texture files, and the data after the header."""
+    """Return the byte order ("" for text), elements, names of texture files, and data after the header."""
     start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
     end = (
         re.search(start[1] + rb"end_header[ \t]*" + (b"\r" if start[1] == b"\r" else b"\r?\n"), data)
@@ -215,7 +218,7 @@ def _property(words: list[bytes]) -> _Property:
 
 
 class _Text:
-    """Reads the numbers of a text file, element by element."""
+    """Reader of the numbers of a text file, element by element."""
 
     def __init__(self, body: bytes) -> None:
         self._values = numbers([[word] for word in body.split()], 1, "number")[:, 0]
@@ -248,7 +251,7 @@ class _Text:
 
 
 class _Binary:
-    """Reads the numbers of a binary file, element by element."""
+    """Reader of the numbers of a binary file, element by element."""
 
     def __init__(self, body: bytes, order: str) -> None:
         self._body, self._order, self._at = body, order, 0
@@ -287,7 +290,7 @@ class _Binary:
         return _gathered(element, found)
 
     def _first_lengths(self, element: _Element) -> list[int]:
-        """Lengths of the lists in the first row."""
+        """Return the lengths of the lists in the first row of an element."""
         start, lengths = self._at, []
         for each in element.properties:
             count = 1

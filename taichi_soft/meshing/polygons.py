@@ -17,9 +17,9 @@ class Polygons:
     """N convex polygons with up to c corners each.
 
     Attributes:
-        corners: (N, c, 3), of which the first `count` are valid.
+        corners: (N, c, 3), corners of each polygon. Only the first `count` corners are valid.
         labels: (N, c), label of the side from each corner to the next.
-        count: (N,), 0 for an empty polygon.
+        count: (N,), number of corners, 0 for an empty polygon.
     """
 
     corners: FloatArray
@@ -30,12 +30,12 @@ class Polygons:
         return Polygons(self.corners[rows], self.labels[rows], self.count[rows])
 
     def next_corner(self) -> Ints:
-        """Index of the corner after each corner, (N, c)."""
+        """Return the index of the next corner after each corner, (N, c)."""
         index = np.arange(self.corners.shape[1])
         return np.where(index + 1 < self.count[:, None], index + 1, 0)
 
     def area_vectors(self) -> FloatArray:
-        """Area vectors (N, 3), right-handed with respect to the order of the corners."""
+        """Return the area vectors, (N, 3), right-handed with respect to the order of the corners."""
         is_corner = np.arange(self.corners.shape[1]) < self.count[:, None]
         first = self.corners[:, :1]
         offsets = np.where(is_corner[..., None], self.corners - first, 0.0)
@@ -45,11 +45,13 @@ class Polygons:
     def clip(
         self, normal: FloatArray, offset: FloatArray, label: Ints | int, rows: NDArray[np.bool_]
     ) -> None:
-        """Clip each polygon in `rows` to the half-space normal.x <= offset; the new side gets `label`.
+        """Clip polygons to the half-spaces normal.x <= offset.
 
         Args:
             normal: (N, 3), not necessarily of unit length.
             offset: (N,).
+            label: label of the new side, one number or (N,).
+            rows: True for the polygons to clip, (N,).
         """
         width = self.corners.shape[1]
         index = np.arange(width)
@@ -68,7 +70,7 @@ class Polygons:
         following = np.take_along_axis(part.corners, after[..., None], axis=1)
         crossed = part.corners + t[..., None] * (following - part.corners)
 
-        # Every corner contributes itself if inside, then the point where its side crosses the plane.
+        # Each corner adds itself if it is inside, then the point at which its side crosses the plane.
         kept = np.stack([is_corner & inside, crossing], axis=2).reshape(len(part.count), -1)
         corners = np.stack([part.corners, crossed], axis=2).reshape(len(part.count), -1, 3)
         new = np.broadcast_to(np.asarray(label), (len(rows),))[is_cut][:, None]

@@ -1,4 +1,4 @@
-"""Shapes swept from a flat triangulation, in layers of prisms of three tetrahedra each."""
+"""Shapes swept from a flat triangulation in layers of prisms. A prism consists of three tetrahedra."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def cylinder(radius: float = 0.5, height: float = 1.0, rings: int = 3, layers: i
         height: height along z [m].
         rings: number of concentric rings of 6, 12, 18, ... points around the axis, evenly spaced.
         layers: number of layers. Tetrahedra have the best shape if height / layers is close to radius /
-            rings, with a smallest dihedral angle of 35 to 41 degrees.
+            rings. The smallest dihedral angle is then 35 to 41 degrees.
     Raises: OptionError for sizes that are not positive or counts below 1.
     """
     rings, layers = as_count(rings, "rings"), as_count(layers, "layers")
@@ -59,10 +59,10 @@ def torus(
         minor_radius: radius of the tube [m], less than `major_radius`.
         rings: number of concentric rings of points in the tube's cross-section, as in `cylinder`.
         segments: number of segments around the axis, 3 or more. Tetrahedra have the best shape if
-            2 pi major_radius / segments is close to minor_radius / rings, with a smallest dihedral angle of
-            31 degrees at the default proportions.
-    Raises: OptionError for sizes that are not positive, a minor radius that is not below the major one, or
-        counts too low.
+            2 pi major_radius / segments is close to minor_radius / rings. At the default proportions, the
+            smallest dihedral angle is 31 degrees.
+    Raises: OptionError for sizes that are not positive, a minor radius that is not below the major radius, or
+        counts that are too low.
     """
     major = as_positive(major_radius, "major_radius", "m")
     minor = as_positive(minor_radius, "minor_radius", "m")
@@ -78,7 +78,10 @@ def torus(
 
 
 def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
-    """The unit disc: a centre and rings of 6 k points, and the 6 * rings**2 triangles between them."""
+    """Return the points (n, 2) and triangles (6 * rings**2, 3) of a unit disc.
+
+    The points are the centre and 6 k points in ring k, from k = 1.
+    """
     angles = [np.arange(6 * k) * (np.pi / (3 * k)) for k in range(1, rings + 1)]
     points = [np.zeros((1, 2))]
     points += [np.column_stack([np.cos(a), np.sin(a)]) * (k + 1) / rings for k, a in enumerate(angles)]
@@ -86,7 +89,7 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
     for k in range(1, rings + 1):
         outer, inner = 3 * k * (k - 1) + 1, 3 * (k - 1) * (k - 2) + 1
         for sector in range(6):
-            # In each sixth of the circle, ring k has k steps and the ring inside it k - 1.
+            # In each sixth of the circle, ring k has k steps, and the next inner ring has k - 1 steps.
             outside = outer + (sector * k + np.arange(k + 1)) % (6 * k)
             inside = inner + (sector * (k - 1) + np.arange(k)) % (6 * (k - 1)) if k > 1 else np.zeros(1, int)
             triangles.append(np.column_stack([outside[:-1], outside[1:], inside]))
@@ -95,10 +98,11 @@ def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 def _prism_tets(triangles: NDArray[np.integer], stride: int, layers: int, levels: int) -> NDArray[np.int64]:
-    """Return three tetrahedra for each prism between one level and the next; the first can follow the last.
+    """Return three tetrahedra for each prism between one level and the next, (t, 4).
 
-    Vertex i of the triangulation is vertex i + level * stride. The diagonal of a prism's side face starts at
-    the lower-numbered of its two bottom vertices. Neighbours use the same diagonal, so their faces match.
+    If there are as many layers as levels, the first level follows the last. Vertex i of the triangulation has
+    the number i + level * stride. The diagonal of a prism's side face starts at the bottom vertex with the
+    lower number. Neighbouring prisms use the same diagonal, so their faces match.
     """
     a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
     level = np.arange(layers)[:, None] * stride

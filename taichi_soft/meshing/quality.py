@@ -9,8 +9,8 @@ import numpy as np
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
 
-# Volume over the cube of the longest edge (0.118 if regular) below which a tetrahedron degenerates in
-# float32, the precision of the simulation (rounding 1.2e-7).
+# Volume divided by the cube of the longest edge (0.118 for a regular tetrahedron). Below this value, a
+# tetrahedron degenerates in float32, the precision of the simulation (rounding 1.2e-7).
 FLATTEST = 1e-7
 
 
@@ -19,9 +19,11 @@ class MeshQuality:
     """Shape measures of every tetrahedron.
 
     Attributes:
-        min_dihedral: float64 (m,), smallest of the six angles between faces [degrees]; 70.53 if regular.
-        max_dihedral: float64 (m,), largest of these angles [degrees].
-        aspect_ratio: float64 (m,), 3 * inradius / circumradius; 1 if regular, towards 0 as it flattens.
+        min_dihedral: float64 (m,), smallest of the six angles between faces [degrees]. It is 70.53 for a
+            regular tetrahedron.
+        max_dihedral: float64 (m,), largest of the six angles between faces [degrees].
+        aspect_ratio: float64 (m,), 3 * inradius / circumradius. It is 1 for a regular tetrahedron and close
+            to 0 for a flat tetrahedron.
         shortest_edge: shortest edge of the mesh [m].
         longest_edge: longest edge of the mesh [m].
     """
@@ -42,7 +44,12 @@ class MeshQuality:
 
 
 def measure_quality(vertices: FloatArray, tets: IntArray) -> MeshQuality:
-    """Measure the tetrahedra `tets` (m, 4), which must have positive volume, over `vertices` (n, 3) [m]."""
+    """Measure the shapes of tetrahedra.
+
+    Args:
+        vertices: (n, 3) [m].
+        tets: (m, 4), with positive volumes.
+    """
     corners = vertices[tets]
     a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0

@@ -1,4 +1,4 @@
-"""Rings of edges in a tetrahedral mesh: the tetrahedra that share an edge, and their other vertices."""
+"""Rings of edges in a mesh. A ring has the tetrahedra that share an edge, and their other vertices."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from taichi_soft.meshing.topology import LOCAL_EDGES
 Ints = NDArray[np.int64]
 
 OPPOSITE = np.array([(2, 3), (3, 1), (1, 2), (0, 3), (2, 0), (0, 1)])
-"""The other two vertices of each of `LOCAL_EDGES`, counterclockwise when the edge points at the viewer."""
+"""For each of `LOCAL_EDGES`, the tetrahedron's other two vertices, counterclockwise if the edge points at the
+viewer."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeRings:
-    """The tetrahedra around every edge, edge by edge.
+    """The tetrahedra around every edge of a mesh, one row for each edge of each tetrahedron.
 
     Attributes:
         mesh: the mesh.
         edge: (r,) row of `mesh.edges`, ascending.
         tet: (r,) tetrahedron that contains the edge.
-        sides: (r, 2) other two vertices of `tet`, counterclockwise if the edge i -> j points at the viewer.
+        sides: (r, 2) the tetrahedron's other two vertices, counterclockwise if the edge i -> j points at the
+            viewer.
     """
 
     mesh: TetMesh
@@ -38,7 +40,7 @@ class EdgeRings:
     def of(cls, mesh: TetMesh) -> EdgeRings:
         """Find the rings of a mesh."""
         ends, sides = mesh.tets[:, LOCAL_EDGES], mesh.tets[:, OPPOSITE]
-        turned = ends[..., 0] > ends[..., 1]  # against the direction in which the edge is stored
+        turned = ends[..., 0] > ends[..., 1]  # True if the mesh stores the edge in the other direction
         sides[turned] = sides[turned][:, ::-1]
         order = np.argsort(mesh.tet_edges.ravel(), kind="stable")
         return cls(
@@ -50,10 +52,11 @@ class EdgeRings:
 
     @cached_property
     def area_vectors(self) -> FloatArray:
-        """Area vector of each edge's barycentric subface in each of its tetrahedra, (r, 3) [m^2].
+        """For each row, the area vector of the edge's barycentric subface in the tetrahedron, (r, 3) [m^2].
 
         The subface (thesis 4.4.1) is the quadrilateral between the centres of the edge, its two faces and the
-        tetrahedron. Its area vector is (a - m) x (b - m) / 12, with the edge's centre m and `sides` a, b.
+        tetrahedron. The area vector is (a - m) x (b - m) / 12, where m is the edge's centre and a, b are the
+        `sides`.
         """
         x = self.mesh.vertices
         center = x[self.mesh.edges[self.edge]].mean(axis=1)
@@ -71,19 +74,25 @@ class EdgeRings:
         return self.sum(self.areas)
 
     def sum(self, rows: FloatArray) -> FloatArray:
-        """Sum values per row, (r,) or (r, c), over the tetrahedra around each edge."""
+        """Sum values over the tetrahedra around each edge, (k,) or (k, c).
+
+        Args: rows: values for each row, (r,) or (r, c).
+        """
         start = np.searchsorted(self.edge, np.arange(len(self.mesh.edges)))
         return np.asarray(np.add.reduceat(rows, start, axis=0))
 
     def mean(self, per_tet: FloatArray) -> FloatArray:
-        """Mean of values per tetrahedron (m,) around each edge, weighted by subface area, (k,)."""
+        """Return the mean of values over the tetrahedra around each edge, weighted by subface area, (k,).
+
+        Args: per_tet: value for each tetrahedron, (m,).
+        """
         return self.sum(self.areas * per_tet[self.tet]) / self.edge_areas
 
     @cached_property
     def neighbours(self) -> tuple[Ints, Ints]:
-        """Vertices around each edge, each once: rows of edges (s,) ascending, and vertices (s,).
+        """Vertices around each edge, without repetition: the edge, ascending, (s,), and the vertex, (s,).
 
-        The vertices of an edge run counterclockwise, seen against its direction (thesis 4.4.3).
+        The vertices around an edge run counterclockwise if the edge points at the viewer (thesis 4.4.3).
         """
         pairs = np.unique(np.stack([np.repeat(self.edge, 2), self.sides.ravel()], axis=1), axis=0)
         edge, vertex = pairs.T
@@ -97,6 +106,6 @@ class EdgeRings:
         angle = np.arctan2(
             np.einsum("ka,ka->k", np.cross(axis, first), arm), np.einsum("ka,ka->k", first, arm)
         )
-        # Rounded, because round-off can put the first vertex of an edge just below a full turn.
+        # Rounded, because rounding errors can make the angle of an edge's first vertex slightly negative.
         order = np.lexsort((np.round(angle, 9) % (2 * np.pi), edge))
         return edge[order], vertex[order]

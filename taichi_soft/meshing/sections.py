@@ -9,11 +9,12 @@ from taichi_soft.meshing.arrays import FloatArray
 
 
 def section_areas(heights: FloatArray, volumes: FloatArray) -> FloatArray:
-    """Areas of the sections of tetrahedra with the plane at height 0, (m,) [m^2].
+    """Return the areas of the sections of tetrahedra with the plane at height 0, (m,) [m^2].
 
-    As a function of height, the area of a tetrahedron's section is its volume times the quadratic B-spline
-    whose knots are the heights of its corners and whose integral is 1 (Curry and Schoenberg 1966). A face in
-    the plane belongs to the tetrahedron above it, so that a shared face is counted once.
+    As a function of height, the area of the section is the volume of the tetrahedron times a quadratic
+    B-spline (Curry and Schoenberg 1966). The knots of the B-spline are the heights of the corners, and its
+    integral is 1. A face in the plane belongs to the tetrahedron above the plane, so that a shared face is
+    counted once.
     Args:
         heights: heights of the corners above the plane, (m, 4) [m].
         volumes: (m,) [m^3], 0 or more.

@@ -1,4 +1,4 @@
-"""Built-in bodies of well-shaped tetrahedra, without an external mesher and identical on every machine."""
+"""Built-in bodies of well-shaped tetrahedra. They need no external mesher and are equal on every machine."""
 
 from taichi_soft.meshing.grid_shapes import beam, box, voxels
 from taichi_soft.meshing.prism_shapes import cylinder, extrude, torus

@@ -17,12 +17,12 @@ class InnerFaces(NamedTuple):
     """Faces between two tetrahedra."""
 
     tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each face, the lower number first
-    corners: NDArray[np.int64]  # (f, 2, 3) its vertices as corners of both tetrahedra, in the same order
+    corners: NDArray[np.int64]  # (f, 2, 3) vertices as local corners of both tetrahedra, in the same order
 
 
 def inner_faces(tets: IntArray) -> InnerFaces:
-    """All faces that two tetrahedra share."""
-    # If the corners of each tetrahedron are in ascending order, so are the corners of its faces.
+    """Return all faces that two tetrahedra share."""
+    # If the corners of a tetrahedron are in ascending order, the corners of its faces are too.
     corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
     rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
     pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)
@@ -34,12 +34,12 @@ def split_vertices(
 ) -> tuple[IntArray, NDArray[np.int64]]:
     """Separate tetrahedra that are connected only through cut faces.
 
-    Around a vertex of a cut face, the tetrahedra form groups that are connected by other faces. The group
-    with the lowest tetrahedron keeps the vertex; every other group gets a copy of it.
+    Around a vertex of a cut face, the tetrahedra form groups that are connected by faces without a cut. The
+    group with the first tetrahedron keeps the vertex. Every other group gets a copy of the vertex.
     Args:
-        is_cut: (f,), True for each of `faces` that is cut.
-    Returns: the tetrahedra with their new vertices, and the original of each vertex, (n,). Old vertices keep
-        their numbers and are their own originals.
+        is_cut: True for each of `faces` that is cut, (f,).
+    Returns: the tetrahedra with their new vertices, (m, 4), and the original of each vertex, (n,). Old
+        vertices keep their numbers and are their own originals.
     """
     if not is_cut.any():
         return tets, np.arange(vertex_count)
@@ -68,9 +68,9 @@ def split_vertices(
 
 
 def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
-    """Component of each tetrahedron, (m,), counted from 0 in the order of their first tetrahedra.
+    """Return the component number of each tetrahedron, (m,). Components have no vertex in common.
 
-    Components have no vertex in common.
+    Components are numbered from 0, in the order of their first tetrahedra.
     """
     label = connected(vertex_count, tets[:, :3].ravel(), tets[:, 1:].ravel())[tets[:, 0]]
     _, first, part = np.unique(label, return_index=True, return_inverse=True)
@@ -80,13 +80,16 @@ def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
 
 
 def connected(count: int, first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.int64]:
-    """Lowest number that the links (first, second) connect to each of the numbers 0 to `count` - 1."""
+    """Return the lowest number that is connected to each of the numbers 0 to `count` - 1, (count,).
+
+    Each number in `first` is connected to the number in the same row of `second`.
+    """
     label = np.arange(count)
     while True:
         ends = label[first], label[second]
         low = np.minimum(*ends)
         before = label.copy()
-        for end in ends:  # labels, not numbers, so that paths halve in each pass
+        for end in ends:  # update labels instead of numbers, so that paths halve in each pass
             np.minimum.at(label, end, low)
         label = label[label]
         if (label == before).all():

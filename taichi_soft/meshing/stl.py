@@ -1,4 +1,4 @@
-"""STL files: triangles with their own three vertices each. A text file has one surface for each solid."""
+"""Read STL files. Triangles share no vertices. A text file has one surface for each solid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ VERTEX = rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)"
 
 
 def read_stl(path: Path) -> list[Surface]:
-    """Read the surfaces of a .stl file, in its own axes and units. Each vertex has its triangle's normal.
+    """Read the surfaces of a .stl file, in the axes and units of the file.
+
+    Each vertex has the normal of its triangle.
 
     Raises: MeshError if the file is cut short or has invalid numbers.
     """
@@ -56,7 +58,7 @@ def _binary(data: bytes, name: str) -> list[Surface]:
 
 
 def _colors(header: bytes, words: np.ndarray) -> FloatArray | None:  # type: ignore[type-arg]
-    """Colours of triangles, (m, 3) from 0 to 1, or None.
+    """Return the colours of triangles, (m, 3), from 0 to 1, or None without colours.
 
     A colour has 15 bits. VisCAM sets bit 15 of a triangle that has a colour. Materialise Magics clears bit 15
     instead, and stores a default colour in the header.

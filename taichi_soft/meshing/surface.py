@@ -19,7 +19,7 @@ class Surface:
     vertices: FloatArray  # (n, 3) [m]
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
-    visual: Any = None  # trimesh visual: texture coordinates, material, colours; None without any
+    visual: Any = None  # trimesh visual with texture coordinates, material or colours, or None
     notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or skipped
 
 
@@ -63,7 +63,11 @@ def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]
 
 
 def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
-    """Unit normals of vertices, (n, 3): means of the triangles' normals, weighted by their angles there."""
+    """Return the unit normals of vertices, (n, 3).
+
+    A normal is the mean of the normals of the triangles around the vertex, weighted by their angles at the
+    vertex.
+    """
     corners = points[triangles]
     to_next, to_previous = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     across = np.cross(to_next, to_previous)  # along the normal, at each corner

@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 
 def surface_mesh(mesh: TetMesh, positions: ArrayLike | None = None) -> trimesh.Trimesh:
-    """Return the surface at rest or at `positions`; its vertex i is vertex `mesh.surface_vertices[i]`.
+    """Return the surface as a trimesh. Vertex i of the result is vertex `mesh.surface_vertices[i]`.
 
         surface_mesh(ball.mesh, ball.positions()).export("ball.glb")
 
     Args:
         mesh: tetrahedra of the body.
-        positions: positions of all vertices, (n, 3) [m], such as `Body.positions()` returns; None: the rest
-            shape.
-    Returns: a `trimesh.Trimesh` with its own arrays, triangles counterclockwise seen from outside. z is up,
-        in files too.
+        positions: positions of all vertices, (n, 3) [m], such as `Body.positions()` returns; None for the
+            rest shape.
+    Returns: a `trimesh.Trimesh` with its own arrays. Triangles are counterclockwise seen from outside. z is
+        up, also in exported files.
     Raises: MeshError if `mesh` is not a TetMesh, or if the number of positions does not match.
     """
     if not isinstance(mesh, TetMesh):

@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 Up = Literal["y", "z"]
 
 UP: dict[str, Up] = {".glb": "y", ".gltf": "y", ".obj": "y", ".ply": "z", ".stl": "z", ".off": "z"}
-"""Axis that points up in files of each format. glTF defines it. For other formats it is the default of common
-exporters: Blender, and OpenSCAD and FreeCAD for .off files."""
+"""Axis that points up in files of each format. glTF defines this axis. For the other formats, it is the
+default of common exporters: OpenSCAD and FreeCAD for .off files, and Blender for .obj, .ply and .stl
+files."""
 
 DEFINED = (".glb", ".gltf")
 """Formats that define which axis points up."""
@@ -45,15 +46,15 @@ def read_surfaces(
     """Read all triangle meshes of a file or an object, each with its own vertices.
 
     Vertices have the order of the file. Some files (.obj, some .ply and .off) index texture coordinates,
-    normals or colours by the corner of a face. If these differ, vertices are copied. Copies follow all
-    other vertices, ordered by vertex and then by their first corners. Each mesh of an .obj file, one for each
-    material, has only the vertices that it uses.
+    normals or colours by the corner of a face. If the corners at a vertex have different values, the vertex
+    is copied. Copies follow all other vertices, ordered by vertex and then by their first corners. An .obj
+    file has one mesh for each material. Each of these meshes has only the vertices that it uses.
 
     Args:
         source: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh, a trimesh.Scene,
             (vertices (n, 3) [m], triangles (m, 3)), or several of these in a tuple.
-        up: axis that points up in `source`; None: from `UP` for a file, "z" for anything else. The result
-            has z up.
+        up: axis that points up in `source`. None means the axis in `UP` for a file, and "z" for other
+            sources. In the result, z is up.
         center: True to move the centre of the bounding box to the origin.
         scale: factor from the unit of `source` to metres, such as 0.001 for millimetres.
     Raises: MeshError, with the file's name, if a source has no triangles or cannot be read; OptionError for
@@ -67,7 +68,7 @@ def read_surfaces(
 
 
 def assumed_up(source: Any) -> str:
-    """Return a sentence on the axis that is assumed to point up in a file; empty if nothing is assumed."""
+    """Return a sentence on the axis that is assumed to point up in a file, or "" if no axis is assumed."""
     suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""
@@ -78,7 +79,7 @@ def assumed_up(source: Any) -> str:
 
 
 def _all(source: Any, up: Up | None) -> Iterator[Surface]:
-    """Yield the surfaces of all sources in order, z up."""
+    """Yield the surfaces of all sources in order, with z up."""
     if isinstance(source, Surface):
         yield source
     elif isinstance(source, (tuple, list)) and source and not _are_arrays(source):
@@ -97,7 +98,7 @@ def _are_arrays(source: Any) -> bool:
 
 
 def _read(path: Path) -> list[Surface]:
-    """Read the surfaces of a file, in its own axes and units.
+    """Read the surfaces of a file, in the axes and units of the file.
 
     Raises: MeshError in one line that begins with the file's name.
     """
@@ -161,7 +162,7 @@ def _of_scene(scene: trimesh.Scene) -> list[Surface]:
 def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
     if len(mesh.faces) == 0:
         raise MeshError("there are no triangles in it")
-    # The normals of the file, if any: copies of a vertex at a seam of the texture share them.
+    # Use the normals of the file, if it has any, because copies of a vertex at a texture seam share a normal.
     with _silent(logging.getLogger("trimesh.util")):
         normals = np.asarray(mesh.vertex_normals, dtype=np.float64)
     return surface_of(name, mesh.vertices, mesh.faces, normals=normals, visual=mesh.visual)
@@ -169,7 +170,7 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 @contextlib.contextmanager
 def _silent(log: logging.Logger) -> Iterator[None]:
-    """Silence a logger: without scipy, trimesh logs a traceback before it computes normals differently."""
+    """Silence a logger. Without scipy, trimesh logs a traceback before it computes normals without scipy."""
     was, log.disabled = log.disabled, True
     try:
         yield
@@ -180,7 +181,8 @@ def _silent(log: logging.Logger) -> Iterator[None]:
 def _with_valid_normals(surface: Surface) -> Surface:
     """Recompute normals that point away from all triangles around their vertex.
 
-    If most normals point away and the volume is negative, the triangles face inwards: the normals are kept.
+    If most normals point away and the volume is negative, the triangles face inwards, and all normals are
+    kept.
     """
     corners = surface.vertices[surface.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -215,7 +217,10 @@ def _with_z_up(surface: Surface, up: Up) -> Surface:
 
 
 def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[Surface, ...]:
-    """Scale surfaces, and move them to the origin if `center`; else add a note if float32 is too coarse."""
+    """Scale surfaces, and move them to the origin if `center` is True.
+
+    If `center` is False and float32 is too coarse at their distance from the origin, add a note.
+    """
     if not surfaces:
         return surfaces
     low, high = _box(surfaces)
@@ -241,13 +246,13 @@ def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[
 
 
 def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """Return the surface with all `notes` added that it does not have yet."""
+    """Return the surface with those of `notes` added that it does not have yet."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 
 
 def _box(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner of the bounding box of all vertices in triangles, (3,) each."""
+    """Return the lowest and highest corner of the bounding box of all vertices in triangles, (3,) each."""
     corners = [each.vertices[each.triangles].reshape(-1, 3) for each in surfaces]
     low, high = (np.array([f(rows, axis=0) for rows in corners]) for f in (np.min, np.max))
     return low.min(axis=0), high.max(axis=0)

@@ -24,24 +24,24 @@ class TetMesh(BodyMesh):
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        tets: (m, 4) integer vertex indices. A tetrahedron has positive volume when
+        tets: (m, 4) integer vertex indices. A tetrahedron has positive volume if
             det[x1-x0, x2-x0, x3-x0] > 0.
         fix_orientation: reverse tetrahedra of negative volume by swapping their last two vertices.
 
     Attributes:
         vertices: float64 (n, 3) [m].
-        tets: int32 (m, 4), in the order given.
-        edges: int32 (k, 2), each row i < j, rows in ascending order.
-        tet_edges: int32 (m, 6), rows of `edges` that are each tetrahedron's edges
-            (0,1), (0,2), (0,3), (1,2), (1,3), (2,3).
+        tets: int32 (m, 4), in the order of the argument.
+        edges: int32 (k, 2), vertex indices (i, j) with i < j. Rows are in ascending order.
+        tet_edges: int32 (m, 6), rows of `edges` for the edges (0,1), (0,2), (0,3), (1,2), (1,3), (2,3) of
+            each tetrahedron.
         surface: int32 (f, 3), boundary triangles, counterclockwise seen from outside.
         volumes: float64 (m,), volume of each tetrahedron, all positive [m^3].
-        fill: float64 (m,), fraction of each tetrahedron that is solid: 1 except in a `CageMesh`.
+        fill: float64 (m,), fraction of each tetrahedron that is solid. It is 1 except in a `CageMesh`.
 
-    Raises: MeshError, naming the element, for wrong shapes or dtypes, numbers that are not finite, indices
-        out of range, a vertex twice in a tetrahedron, the same tetrahedron twice, a tetrahedron of zero
-        volume (relative to its longest edge) or negative volume, a vertex without a tetrahedron, a face of
-        more than two tetrahedra, neighbours that overlap, or an empty mesh.
+    Raises: MeshError, which names the element, for wrong shapes or dtypes, numbers that are not finite,
+        indices out of range, a tetrahedron that uses a vertex twice, a duplicate tetrahedron, a tetrahedron
+        of zero volume (relative to its longest edge) or negative volume, a vertex without a tetrahedron, a
+        face of more than two tetrahedra, neighbours that overlap, or an empty mesh.
 
     The arrays are copied. A mesh can have several components that do not touch.
     """
@@ -74,11 +74,11 @@ class TetMesh(BodyMesh):
         )
 
     def part(self, vertices: NDArray[Any], tets: IntArray, rows: NDArray[Any]) -> TetMesh:
-        """Return a mesh of some of the tetrahedra, for example after a cut. It is not validated.
+        """Return a mesh of some of the tetrahedra, for example after a cut. The new mesh is not validated.
 
         Args:
             vertices: vertex of this mesh that each new vertex copies, (n,).
-            tets: new vertices of each tetrahedron, (m, 4); every vertex is used.
+            tets: tetrahedra of the new mesh, as indices of new vertices, (m, 4). They must use all vertices.
             rows: tetrahedron of this mesh that each new tetrahedron copies, (m,).
         """
         mesh = type(self).__new__(type(self))
@@ -87,7 +87,10 @@ class TetMesh(BodyMesh):
         return mesh
 
     def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        """Copy the data of `original` that is not geometry to this part of it. Arguments as for `part`."""
+        """Copy data other than geometry from `original` to this part of it.
+
+        The arguments `vertices` and `rows` are those of `part`.
+        """
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copying and unpickling rebuild the mesh, so that its arrays are read-only again.
@@ -118,17 +121,18 @@ class TetMesh(BodyMesh):
     ) -> TetMesh | tuple[TetMesh, IntArray]:
         """Return the same body without the tetrahedra that force the smallest time steps.
 
-        They are flipped, reshaped or collapsed. The size of a tetrahedron is the edge of the regular one with
-        the same sum of squared gradients of its shape functions: the stable step grows with the smallest size
-        of the mesh. The smallest size never decreases, components and holes stay, and the result is the same
-        on every run. Small tetrahedra remain where the surface allows no change.
+        These tetrahedra are flipped, reshaped or collapsed. The size of a tetrahedron is the edge length of a
+        regular tetrahedron with the same sum of squared gradients of the shape functions. The stable step
+        grows with the smallest size in the mesh. The smallest size never decreases, components and holes
+        stay, and the result is the same on every run. Small tetrahedra remain if the surface allows no
+        change.
         Args:
-            min_size: size below which a tetrahedron is improved [m]; None: 0.3 of the median size.
-            tolerance: largest displacement of the surface [m]; None: a quarter of the mean edge, at most 1 %
-                of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
-            return_source: True to return also the tetrahedron of this mesh that each new one replaces, int32
-                (m,): `values[source]` transfers values per tetrahedron. A border between materials can shift
-                by a few tetrahedra.
+            min_size: size below which a tetrahedron is improved [m]; None for 0.3 of the median size.
+            tolerance: largest displacement of the surface [m]; None for a quarter of the mean edge, but at
+                most 1 % of the diagonal of the bounding box. The volume changes by at most 1 % in any case.
+            return_source: True to return also `source`, int32 (m,), the tetrahedron of this mesh that each
+                new tetrahedron replaces. `values[source]` transfers values per tetrahedron to the new mesh. A
+                border between materials can shift by a few tetrahedra.
         Returns: the improved mesh, or this mesh itself if nothing was improved.
         Raises: OptionError if min_size or tolerance is not positive.
         """
@@ -155,12 +159,12 @@ class TetMesh(BodyMesh):
 
     @cached_property
     def fill(self) -> FloatArray:
-        """Fraction of each tetrahedron that is solid, float64 (m,): 1 except in a `CageMesh`."""
+        """Fraction of each tetrahedron that is solid, float64 (m,). It is 1 except in a `CageMesh`."""
         return read_only(np.ones(len(self.tets)))
 
     @cached_property
     def vertex_volumes(self) -> FloatArray:
-        """Volume of each particle: a quarter of each tetrahedron around it, float64 (n,) [m^3]."""
+        """Volume of each particle, float64 (n,) [m^3]: a quarter of the tetrahedra around the particle."""
         sums = np.bincount(self.tets.ravel(), np.repeat(self.volumes / 4.0, 4), len(self.vertices))
         volumes: FloatArray = read_only(sums)
         return volumes
@@ -179,18 +183,21 @@ class TetMesh(BodyMesh):
 
     @cached_property
     def quality(self) -> MeshQuality:
-        """Angles, aspect ratios and edge lengths; `mesh.quality.summary()` is one line."""
+        """Angles, aspect ratios and edge lengths. `mesh.quality.summary()` describes them in one line."""
         return measure_quality(self.vertices, self.tets)
 
 
 def _checked_volumes(points: FloatArray, tets: IntArray, allow_negative: bool) -> FloatArray:
-    """Signed volumes (m,) [m^3]. Raises: MeshError for flat or, unless allowed, inverted tetrahedra."""
+    """Return signed volumes, (m,) [m^3].
+
+    Raises: MeshError for flat tetrahedra, and for inverted tetrahedra unless `allow_negative` is True.
+    """
     corners = points[tets]
     a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
     volumes: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     ends = corners[:, LOCAL_EDGES]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
-    # Negated, so that 0 > 0, if both sides underflow, also counts as flat.
+    # The comparison is negated so that a tetrahedron also counts as flat if both sides underflow to 0.
     flat = ~(np.abs(volumes) > FLATTEST * longest**3)
     if flat.any():
         row = int(np.argmax(flat))

@@ -15,11 +15,12 @@ from taichi_soft.meshing.tet_mesh import TetMesh
 
 
 def read_tetgen(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Read points (n, 3) and vertex numbers (m, 4), counted from 0; `path` is either file of the pair.
+    """Read the points, (n, 3), and the tetrahedra, (m, 4), as indices of points, counted from 0.
 
     The number of the first point decides whether the file counts from 0 or 1. Comments (#), attributes and
     boundary markers are skipped. Second-order tetrahedra (10 nodes) are reduced to their four corners.
-    Raises: MeshError if a file is cut short or invalid; OSError if one is missing.
+    Args: path: path of either file of the pair.
+    Raises: MeshError if a file is cut short or invalid; OSError if a file is missing.
     """
     node_path, element_path = path.with_suffix(".node"), path.with_suffix(".ele")
     header, table = _read_table(node_path, "points")

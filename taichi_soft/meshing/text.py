@@ -1,4 +1,4 @@
-"""Decode and parse text files of various systems and programs."""
+"""Decode and parse text files from various systems and programs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taichi_soft.meshing.arrays import FloatArray
 def as_ascii(data: bytes) -> bytes:
     """Convert a text file so that keywords and numbers are ASCII (UTF-16 becomes UTF-8) and lines end in LF.
 
-    Names in files of other encodings stay unchanged: see `decoded`.
+    Names in other encodings stay unchanged. `decoded` decodes these names.
     """
     return _as_bytes(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
@@ -44,9 +44,9 @@ def numbers(
     """Parse the first `width` numbers of each row, (n, width).
 
     Args:
-        element: name of a row, for errors.
-        allow_missing: True to return NaN for a row that has too few numbers or an invalid one.
-    Raises: MeshError for such a row, unless `allow_missing`.
+        element: name of a row in error messages.
+        allow_missing: True to return NaN for a row that has too few numbers or an invalid number.
+    Raises: MeshError for such a row, unless `allow_missing` is True.
     """
     try:
         return np.fromiter(
@@ -80,6 +80,6 @@ def is_number(word: bytes) -> bool:
 
 
 def without_comments(lines: Iterable[bytes]) -> list[list[bytes]]:
-    """Split lines into words, without comments from # on and without empty lines."""
+    """Split lines into words. Drop comments, which begin with #, and empty lines."""
     split = (re.sub(rb"#.*", b"", line).split() for line in lines)
     return [words for words in split if words]

@@ -12,12 +12,12 @@ from taichi_soft.meshing.arrays import IntArray, name_vertices
 
 # The six edges of a tetrahedron in local vertex numbers.
 LOCAL_EDGES: NDArray[np.int64] = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
-# Face i lies opposite vertex i; seen from outside a tetrahedron of positive volume it runs counterclockwise.
+# Face i lies opposite vertex i. Seen from outside, faces run counterclockwise if the volume is positive.
 LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 
 
 def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
-    """Return edges (k, 2), i < j, in ascending order; and the rows of each tetrahedron's edges, (m, 6)."""
+    """Return the edges (k, 2), i < j, ascending, and the rows of each tetrahedron's edges, (m, 6)."""
     pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
     stride = int(tets.max()) + 1
     keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
@@ -26,10 +26,11 @@ def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def surface_of(tets: IntArray) -> IntArray:
-    """Triangles (f, 3) that belong to only one tetrahedron, wound outwards, in the order of `tets`.
+    """Return the triangles that belong to only one tetrahedron, (f, 3), in the order of `tets`.
 
-    The tetrahedra must have positive volume.
-    Raises: MeshError if more than two of them share a face, or if two lie on the same side of their face.
+    The triangles are wound outwards. The tetrahedra must have positive volume.
+    Raises: MeshError if more than two tetrahedra share a face, or if two tetrahedra lie on the same side of
+        their common face.
     """
     faces = tets[:, LOCAL_FACES].reshape(-1, 3)
     order, starts, counts = groups(np.sort(faces, axis=1))
@@ -42,7 +43,7 @@ def surface_of(tets: IntArray) -> IntArray:
             f"({', '.join(map(str, owners))}): at most two can meet in a face, repair the mesh"
         )
     first, second = order[starts[counts == 2]], order[starts[counts == 2] + 1]
-    # Neighbours see their common face from opposite sides, so they traverse it in opposite directions.
+    # Neighbours lie on opposite sides of their common face, so they traverse the face in opposite directions.
     folded = _is_ascending(faces[first]) == _is_ascending(faces[second])
     if folded.any():
         pair = int(np.argmax(folded))
@@ -54,7 +55,7 @@ def surface_of(tets: IntArray) -> IntArray:
 
 
 def shared_faces(tets: NDArray[Any]) -> NDArray[np.int64]:
-    """Pairs of coincident faces, (k, 2): face i of tetrahedron t has number 4 t + i.
+    """Return the pairs of coincident faces, (k, 2). Face i of tetrahedron t has the number 4 t + i.
 
     A face must not belong to more than two tetrahedra.
     """
@@ -65,7 +66,7 @@ def shared_faces(tets: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
-    """First two rows with the same four vertices, lower row first; None if there are none."""
+    """Return the first two rows with the same four vertices, ascending, or None if there are no such rows."""
     order, starts, counts = groups(np.sort(tets, axis=1))
     if counts.max() == 1:
         return None
@@ -75,7 +76,7 @@ def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
 
 
 def groups(rows: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Group equal rows. Returns the order that sorts them, and the start and size of each group."""
+    """Group equal rows. Returns: the order that sorts the rows, and the start and size of each group."""
     order = np.lexsort(rows.T[::-1])
     in_order = rows[order]
     starts = np.flatnonzero(np.r_[True, (in_order[1:] != in_order[:-1]).any(axis=1)])

@@ -14,11 +14,11 @@ FOLDED = 1e-9
 
 
 def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:
-    """Triangulate polygons: by a fan if it lies within the polygon, otherwise by ear clipping.
+    """Triangulate polygons by fans. Polygons that do not contain their fan are triangulated by ear clipping.
 
     Args:
         corners: corners of all polygons in sequence, (k, 3).
-        counts: number of corners of each polygon, (f,). Polygons with fewer than three make no triangle.
+        counts: number of corners of each polygon, (f,). Polygons with fewer than three corners are skipped.
     Returns: triangles as rows of `corners`, (m, 3), in the order and orientation of the polygons; and the
         polygon of each triangle, (m,).
     """
@@ -42,19 +42,22 @@ def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:
 
 
 def _flattened(points: FloatArray, normal: FloatArray) -> FloatArray:
-    """Project points onto the coordinate plane most perpendicular to `normal`, (n, 2), counterclockwise."""
+    """Project a polygon onto the coordinate plane most perpendicular to its normal, (n, 2).
+
+    The projected polygon runs counterclockwise.
+    """
     axis = int(np.abs(normal).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     return points[:, axes if normal[axis] > 0.0 else axes[::-1]]
 
 
 def _ears(points: FloatArray) -> Ints:
-    """Triangles (n - 2, 3) of a counterclockwise polygon in the plane, by ear clipping (Meisters, 1975)."""
+    """Triangulate a counterclockwise polygon in the plane, (n - 2, 3), by ear clipping (Meisters, 1975)."""
     remaining, found = list(range(len(points))), []
     index = misses = 0
     while len(remaining) > 3:
         index %= len(remaining)
-        if misses == len(remaining):  # self-intersecting or flat: cut off the corner that turns least
+        if misses == len(remaining):  # self-intersecting or flat: cut off the smallest triangle
             turns = [abs(_turn(*points[_ear(remaining, i)])) for i in range(len(remaining))]
             index, misses = int(np.argmin(turns)), 0
         elif not _is_ear(points, remaining, index):
@@ -71,18 +74,18 @@ def _ear(remaining: list[int], index: int) -> list[int]:
 
 
 def _is_ear(points: FloatArray, remaining: list[int], index: int) -> bool:
-    """True if the corner is convex and no other corner lies in the triangle with its neighbours."""
+    """True if a corner is convex and its triangle with both neighbours contains no other corner."""
     corners = points[_ear(remaining, index)]
     if _turn(*corners) <= 0.0:
         return False
     others = points[remaining]
     is_corner = (
         (others[:, None] == corners).all(axis=2).any(axis=1)
-    )  # a cut to a hole has copies of its corners
+    )  # polygons with a cut to a hole contain copies of corners
     sides = [_turn(corners[k], corners[(k + 1) % 3], others.T) for k in range(3)]
     return not bool(((np.min(sides, axis=0) >= 0.0) & ~is_corner).any())
 
 
 def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Twice the area of a triangle in the plane, positive if it is counterclockwise."""
+    """Return twice the area of a triangle in the plane, positive for a counterclockwise triangle."""
     return np.asarray((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

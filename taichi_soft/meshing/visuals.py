@@ -27,10 +27,10 @@ class Look:
 def visual_of(
     *, uv: FloatArray | None = None, colors: FloatArray | None = None, look: Look | None = None
 ) -> Any:
-    """Return a trimesh visual from a texture, else from colours, else from a material; None without any.
+    """Return a trimesh visual from a texture, colours or a material, in this order of preference, or None.
 
     Args:
-        uv: texture coordinates from the lower left corner, (n, 2); NaN for vertices without any.
+        uv: texture coordinates from the lower left corner, (n, 2); NaN for vertices without coordinates.
         colors: colours of vertices, (n, 3) or (n, 4), from 0 to 1 or from 0 to 255.
     """
     from trimesh.visual import ColorVisuals, TextureVisuals  # slow to import, and games do not need it
@@ -63,8 +63,8 @@ def read_image(name: str, content: bytes) -> Any:
     """Decode an image with Pillow.
 
     Args:
-        name: name of its file, for errors.
-    Raises: MeshError if it cannot be read or Pillow is not installed.
+        name: name of the image's file, for error messages.
+    Raises: MeshError if the image cannot be read or Pillow is not installed.
     """
     if missing_packages("film", "PIL"):
         raise MeshError(
@@ -84,11 +84,11 @@ def read_image(name: str, content: bytes) -> Any:
 
 
 def find_referenced_file(path: Path, name: str, folder: Path | None = None) -> Path | None:
-    """Find the file that another file names; None if there is none.
+    """Return the path of the file `name` to which the file `path` refers, or None if there is no such file.
 
-    The search tries `name` relative to `folder`, then relative to the folder of `path`, then a file in that
-    folder with the same last part, ignoring case. Files outside the folder's parent are ignored, because
-    visitors of a server can send such names.
+    The search tries `name` relative to `folder`, then relative to the folder of `path`. Then it looks in the
+    folder of `path` for a file with the same last part of the name, ignoring case. Files outside the parent
+    of that folder are ignored, because visitors of a server can send such names.
     """
     parts = [part for part in name.strip().strip('"').replace("\\", "/").split("/") if part not in ("", ".")]
     if not parts:

@@ -18,11 +18,12 @@ from taichi_soft.meshing.topology import LOCAL_FACES
 Ints = NDArray[np.int64]
 
 PERTURBATION = 1e-9
-"""Random shift of the Voronoi faces, relative to an edge. Without it, faces in regular meshes would coincide
-with the sides of tetrahedra, and belong to both neighbours or to neither."""
+"""Random shift of the Voronoi faces, relative to an edge. Without this shift, faces in regular meshes would
+coincide with faces of tetrahedra and would belong to both neighbours or to none."""
 
 SMALLEST_FACE = 1e-7
-"""Area relative to the squared edge below which a face is an artefact of `PERTURBATION`."""
+"""Area of a face, relative to the squared length of its edge, below which the face is an artefact of
+`PERTURBATION`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,13 @@ class VoronoiGraph:
     """Voronoi faces of the edges and Voronoi cells of the particles, clipped by the surface of the body.
 
     Attributes:
-        areas: (k,) area of each edge's face [m^2]; 0 if it is clipped away or does not exist.
-        corner_edge: (c,) edge of each corner, ascending; corners run around the edge's direction i -> j, and
-            the first is repeated at the end.
+        areas: (k,) area of each edge's face [m^2]; 0 if the face is clipped away or does not exist.
+        corner_edge: (c,) edge of each corner, ascending. The corners of an edge's face run right-handed
+            around the direction i -> j of the edge, and the first corner is repeated at the end.
         corner_tet: (c,) a tetrahedron that contains the corner at rest.
         corner_weights: (c, 4) barycentric coordinates of the corner in that tetrahedron.
-        cell_tet, cell_vertex, cell_volume: (s,) tetrahedron, vertex, and the volume of the tetrahedron's part
-            that is nearest to the vertex [m^3].
+        cell_tet, cell_vertex, cell_volume: (s,) a tetrahedron, a vertex, and the volume of the
+            part of the tetrahedron that is nearest to this vertex [m^3].
     """
 
     mesh: TetMesh
@@ -49,28 +50,32 @@ class VoronoiGraph:
     cell_volume: FloatArray
 
     def masses(self, density: FloatArray) -> FloatArray:
-        """Mass of each particle's cell, (n,) [kg], for a density per tetrahedron (m,) [kg/m^3]."""
+        """Return the mass of each particle's cell, (n,) [kg].
+
+        Args: density: density of each tetrahedron, (m,) [kg/m^3].
+        """
         parts = self.cell_volume * density[self.cell_tet]
         return np.bincount(self.cell_vertex, parts, len(self.mesh.vertices)).astype(np.float64)
 
     def corners(self) -> FloatArray:
-        """Positions of the corners at rest, (c, 3) [m]."""
+        """Return the positions of the corners at rest, (c, 3) [m]."""
         tets = self.mesh.vertices[self.mesh.tets[self.corner_tet]]
         return np.asarray(np.einsum("ci,cia->ca", self.corner_weights, tets))
 
 
 def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
-    """Return the clipped Voronoi graph of a mesh, computed once per mesh (about 1 s for 1,000 tetrahedra).
+    """Return the clipped Voronoi graph of a mesh.
 
+    The graph is computed once for each mesh, which takes about 1 s for 1,000 tetrahedra.
     Args:
-        mesh: Delaunay tetrahedra, such as those of `delaunay_mesh`.
+        mesh: Delaunay mesh, such as `delaunay_mesh` returns.
     Raises: MeshError if the mesh is not Delaunay; OptionError if scipy is missing.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"a Voronoi graph needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
     cache = mesh.__dict__
     if "_voronoi_graph" not in cache:
-        # Centred at the origin: far from it, float64 has too few digits.
+        # Centre the mesh at the origin, because float64 has too few digits far from the origin.
         cache["_voronoi_graph"] = _graph_of(mesh, mesh.translated(-mesh.bounds.mean(axis=0)))
     graph: VoronoiGraph = cache["_voronoi_graph"]
     return graph
@@ -113,7 +118,7 @@ class _Neighbours:
         self.pairs = both[both[:, 0] < both[:, 1]]
         ends = mesh.vertices[self.pairs]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        # Weights as in a power diagram: cells stay a partition, and faces stay perpendicular to their edges.
+        # Weights of a power diagram: cells still fill space, and faces stay perpendicular to their edges.
         scale = PERTURBATION * float(self.length.min()) ** 2
         self.weight = np.random.default_rng(0).uniform(-scale, scale, len(mesh.vertices))
 
@@ -121,12 +126,12 @@ class _Neighbours:
 
     @property
     def distance(self) -> FloatArray:
-        """Distance of each pair's face from its first vertex [m]."""
+        """Distance of each pair's face from the first vertex of the pair, (p,) [m]."""
         first, second = self.weight[self.pairs].T
         return np.asarray(0.5 * (self.length + (first - second) / self.length))
 
     def edge_rows(self) -> Ints:
-        """Row of `mesh.edges` for each pair, -1 if the pair is not an edge of the mesh."""
+        """Return the row of `mesh.edges` for each pair, (p,), or -1 if the pair is not an edge."""
         n = len(self.mesh.vertices)
         keys = self.mesh.edges[:, 0].astype(np.int64) * n + self.mesh.edges[:, 1]
         wanted = self.pairs[:, 0] * n + self.pairs[:, 1]
@@ -134,7 +139,13 @@ class _Neighbours:
         return np.where(keys[index] == wanted, index, -1)
 
     def clip_to_cells(self, polygons: Polygons, vertex: Ints, other: Ints) -> None:
-        """Clip each polygon to the cell of its `vertex`, ignoring the plane against `other`."""
+        """Clip each polygon to the Voronoi cell of a vertex.
+
+        Args:
+            polygons: N polygons, changed in place.
+            vertex: vertex whose cell clips each polygon, (N,).
+            other: neighbour of this vertex towards which the polygon is not clipped, (N,), or -1.
+        """
         x = self.mesh.vertices
         for column in self.of.T:
             neighbour = column[vertex]
@@ -145,7 +156,10 @@ class _Neighbours:
 
 
 def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
-    """Unclipped Voronoi face of each pair, right-handed about its direction; labels are vertices."""
+    """Return the unclipped Voronoi face of each pair, right-handed about the direction of the pair.
+
+    The label of a side is the vertex beyond this side.
+    """
     ends = mesh.vertices[neighbours.pairs]
     axis = (ends[:, 1] - ends[:, 0]) / neighbours.length[:, None]
     helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
@@ -164,9 +178,10 @@ def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
 
 
 def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
-    """Split each face by the tetrahedra. Returns the pieces, their faces and their tetrahedra.
+    """Split the Voronoi faces by the tetrahedra.
 
-    Sides along the k-th face of a tetrahedron are labelled -1 - k.
+    Sides of pieces along the k-th face of a tetrahedron have the label -1 - k.
+    Returns: the pieces, the Voronoi face of each piece, (q,), and the tetrahedron of each piece, (q,).
     """
     boxes = mesh.vertices[mesh.tets]
     low, high = boxes.min(axis=1), boxes.max(axis=1)
@@ -194,7 +209,10 @@ def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
 def _outlines(
     mesh: TetMesh, pieces: Polygons, edge: Ints, tet: Ints, areas: FloatArray
 ) -> tuple[Ints, Ints, FloatArray]:
-    """Join the pieces of each edge's face. Returns its `corner_edge`, `corner_tet`, `corner_weights`."""
+    """Join the pieces of each edge's face.
+
+    Returns: `corner_edge`, `corner_tet` and `corner_weights` of the graph.
+    """
     outer = _is_surface(mesh)
     order = np.argsort(edge, kind="stable")
     bounds = np.searchsorted(edge[order], np.arange(len(mesh.edges) + 1))
@@ -208,7 +226,7 @@ def _outlines(
                 label = int(pieces.labels[row, i])
                 if label < 0 and not outer[t, -1 - label]:
                     continue
-                # A side of the unclipped face spans several tetrahedra, a side on the surface only one.
+                # A side of the unclipped face can cross several tetrahedra, a side on the surface only one.
                 key = (label, -1) if label >= 0 else (label, t)
                 sides.setdefault(key, []).append((pieces.corners[row, i], following[row, i], t))
         path = _closed_path(
@@ -226,7 +244,10 @@ Side = tuple[FloatArray, FloatArray, int, int]
 
 
 def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> list[Side]:
-    """Join collinear segments that touch end to end. Each result has a first and a last tetrahedron."""
+    """Join collinear segments that touch end to end.
+
+    Returns: start, end, first tetrahedron and last tetrahedron of each joined segment.
+    """
     direction = max((b - a for a, b, _ in parts), key=lambda d: float((d * d).sum()))
     parts = sorted(parts, key=lambda part: float((part[0] * direction).sum()))
     joined: list[Side] = []
@@ -239,10 +260,10 @@ def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> li
 
 
 def _closed_path(sides: list[Side]) -> list[tuple[FloatArray, int]]:
-    """Order sides into one path of corners and their tetrahedra, in which every loop is closed.
+    """Order sides into one closed path. Returns: corners of the path and their tetrahedra.
 
-    The path reaches further loops by a bridge from its first corner and returns on it, so that bridges
-    enclose no area.
+    If the sides form several loops, bridges connect the first corner of the path with the other loops. The
+    path runs along each bridge in both directions, so that bridges enclose no area.
     """
     remaining = list(sides)
     path: list[tuple[FloatArray, int]] = []
@@ -280,8 +301,8 @@ def _cells(
 ) -> tuple[Ints, Ints, FloatArray]:
     """Return `cell_tet`, `cell_vertex` and `cell_volume` of the graph.
 
-    A volume is the sum of the pyramids from the vertex to each piece of the boundary of its part, which
-    consists of Voronoi faces and of the tetrahedron's own faces.
+    The boundary of a part consists of pieces of Voronoi faces and of the tetrahedron's faces. The volume of
+    the part is the sum of the pyramids from the vertex to these pieces.
     """
     n = len(mesh.vertices)
     ends = neighbours.pairs[face]

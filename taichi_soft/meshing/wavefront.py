@@ -1,7 +1,7 @@
-"""Wavefront .obj files: each corner of a polygon has its own vertex, texture coordinate and normal.
+"""Read Wavefront .obj files. A polygon corner has separate indices for vertex, texture coordinate and normal.
 
-There is one surface for each material, in the order in which faces first use them. Objects and groups are
-merged.
+There is one surface for each material, in the order in which faces first use the materials. Objects and
+groups are merged.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from taichi_soft.meshing.wavefront_materials import read_materials
 Ints = NDArray[np.int64]
 
 SKIPPED = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
-"""Statements that define no triangles, with their names for notes."""
+"""Statements that define no triangles, and their names in notes."""
 
 
 @dataclass
@@ -35,8 +35,8 @@ class _Content:
     vertices: list[list[bytes]] = field(default_factory=list)
     texcoords: list[list[bytes]] = field(default_factory=list)
     normals: list[list[bytes]] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)  # row of each, NONE if missing
-    counts: list[int] = field(default_factory=list)  # corners of each face
+    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows in the lists above, or NONE
+    counts: list[int] = field(default_factory=list)  # number of corners of each face
     material: list[int] = field(default_factory=list)  # material of each face
     materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # material numbers by name
     libraries: list[bytes] = field(default_factory=list)
@@ -44,16 +44,19 @@ class _Content:
     skipped: dict[str, int] = field(default_factory=dict)
 
     def name_of(self, material: str, is_single: bool) -> str:
-        """Name of the surface of a material. A single surface gets the name of the single object, or ""."""
+        """Return the name of the surface of a material.
+
+        A single surface gets the name of the object, or "" if the file has no object or several objects.
+        """
         if not is_single:
             return material
         return next(iter(self.objects)) if len(self.objects) == 1 else ""
 
 
 def read_obj(path: Path) -> list[Surface]:
-    """Read the surfaces of a .obj file, in its own axes and units.
+    """Read the surfaces of a .obj file, in the axes and units of the file.
 
-    Raises: MeshError for invalid numbers, and for faces of vertices that do not exist.
+    Raises: MeshError for invalid numbers, and for faces that name vertices that do not exist.
     """
     content = _statements(path.read_bytes())
     if not content.counts:
@@ -95,9 +98,10 @@ def read_obj(path: Path) -> list[Surface]:
 
 
 def _remove_missing(rows: Ints, texcoords: int, normals: int) -> list[str]:
-    """Replace missing texture coordinates and normals of corners (k, 3) by NONE. Returns notes with counts.
+    """Replace rows of texture coordinates and normals that do not exist by NONE. Returns: notes with counts.
 
     Args:
+        rows: vertex, texture coordinate and normal of each corner, (k, 3), changed in place.
         texcoords, normals: number of texture coordinates and of normals in the file.
     """
     notes = []
@@ -139,7 +143,7 @@ def _statements(data: bytes) -> _Content:
 
 
 def _arguments(words: list[bytes]) -> list[bytes]:
-    """Words after the first one, up to a comment."""
+    """Return the words after the first word, up to a comment."""
     for number, word in enumerate(words):
         if word.startswith(b"#"):
             return words[1:number]
@@ -176,7 +180,11 @@ def _add_face(content: _Content, words: list[bytes], material: int) -> None:
 
 
 def _row(index: bytes, length: int) -> int:
-    """Convert an index, which counts from 1 or backwards from -1, to a row; `length` rows exist so far."""
+    """Convert an index of a file to a row, counted from 0.
+
+    A positive index counts from 1. A negative index counts backwards from the end of the `length` rows that
+    precede the face.
+    """
     number = int(index)
     if number == 0:
         raise ValueError
@@ -186,7 +194,7 @@ def _row(index: bytes, length: int) -> int:
 
 
 def _points(rows: list[list[bytes]]) -> tuple[FloatArray, FloatArray | None]:
-    """Return vertices (n, 3), and their colours (n, 3), or None unless all have one."""
+    """Return the vertices, (n, 3), and their colours, (n, 3), or None unless all vertices have a colour."""
     points = numbers(rows, 3, "vertex")
     if rows and all(len(row) >= 6 for row in rows):
         return points, numbers([row[3:6] for row in rows], 3, "colour of vertex")

@@ -9,16 +9,17 @@ from taichi_soft.meshing.text import as_ascii, decoded, is_number
 from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image
 
 MAX_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
-"""Largest number of arguments of a texture's option; options that are not listed have one."""
+"""Largest number of arguments of a texture's options. Options that are not listed have one argument."""
 
 
 def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[dict[str, Look], list[str]]:
-    """Read the materials that a .obj file uses. Returns: materials by name; sentences on missing ones.
+    """Read the materials that a .obj file uses.
 
     Args:
         path: path of the .obj file.
-        libraries: arguments of its `mtllib` statements.
-        used: names of the materials that it uses.
+        libraries: arguments of the file's `mtllib` statements.
+        used: names of the materials that the file uses.
+    Returns: materials by name, and sentences on missing materials and textures.
     """
     looks: dict[str, Look] = {}
     notes: list[str] = []
@@ -58,7 +59,7 @@ def _texture_image(
 
 
 def _materials(data: bytes) -> dict[str, tuple[tuple[float, float, float, float] | None, bytes]]:
-    """Colour and texture file of each material."""
+    """Return for each material, by name, the colour or None, and the name of the texture file or b""."""
     found: dict[str, dict[bytes, list[bytes]]] = {}
     current: dict[bytes, list[bytes]] = {}
     for line in as_ascii(data).split(b"\n"):
@@ -82,7 +83,7 @@ def _color(values: dict[bytes, list[bytes]]) -> tuple[float, float, float, float
             opacity = float(values[b"d"][-1])
         elif b"tr" in values:
             opacity = 1.0 - float(values[b"tr"][-1])
-    except (KeyError, ValueError):  # no colour, or a spectrum
+    except (KeyError, ValueError):  # no colour, or a colour defined by a spectrum
         return None
     red, green, blue = (rows * 3)[:3] if len(rows) == 1 else (rows + rows[-1:] * 2)[:3]
     clipped = [min(max(part, 0.0), 1.0) for part in (red, green, blue, opacity)]
@@ -90,7 +91,7 @@ def _color(values: dict[bytes, list[bytes]]) -> tuple[float, float, float, float
 
 
 def _file(line: bytes) -> bytes:
-    """Return the file name after the options of a texture; it can contain spaces."""
+    """Return the file name after the options of a texture. The name can contain spaces."""
     rest = line.split(None, 1)[1].strip()
     while rest.startswith(b"-") and b" " in rest:
         option, rest = rest.split(None, 1)

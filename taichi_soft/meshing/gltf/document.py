@@ -32,8 +32,8 @@ COMPONENTS: dict[Any, np.dtype[Any]] = {
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 MAX_IMPLICIT_ROWS = 2_000_000
-"""Largest number of rows of an accessor without a buffer view: its zeros are not in the file, so even a small
-file could request any number."""
+"""Largest number of rows of an accessor without a buffer view. Such rows are zeros that the file does not
+contain, so even a small file could request any number of rows."""
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -66,19 +66,19 @@ class Document:
             raise MeshError(f"is glTF of version {version[:10]}: {upgrade_command(path)}")
 
     def entry(self, name: str, parent: Entry | None = None) -> Entry:
-        """Return the object `name` of `parent` (None: the root), or an empty one."""
+        """Return the object `name` of `parent`, or an empty object if it is missing. None means the root."""
         found = (self.json if parent is None else parent).get(name, {})
         return found if isinstance(found, dict) else {}
 
     def entries(self, kind: str) -> list[Any]:
-        """Return the list `kind` of the root, such as "nodes", or an empty one."""
+        """Return the list `kind` of the root, such as "nodes", or an empty list."""
         found = self.json.get(kind, [])
         if not isinstance(found, list):
             raise MeshError(f"cannot be read: its {kind!r} are not a list")
         return found
 
     def named(self, kind: str, number: Any) -> Entry:
-        """Return entry `number` of the list `kind`. Raises: MeshError if it does not exist."""
+        """Return entry `number` of the list `kind`. Raises: MeshError if this entry does not exist."""
         found = self.entries(kind)
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
             raise MeshError(f"cannot be read: it refers to {kind}[{number!r}] but has {len(found)} of these")
@@ -92,9 +92,9 @@ class Document:
 
         Args:
             number: number of the accessor.
-            types: allowed values of its `type`, such as "VEC3".
-        Raises: MeshError, before memory is allocated, for an accessor of another type, or one that extends
-            beyond the end of its buffer.
+            types: allowed values of the accessor's `type`, such as "VEC3".
+        Raises: MeshError, before memory is allocated, for an accessor of another type, or for an accessor
+            that extends beyond the end of its buffer.
         """
         entry, name = self.named("accessors", number), f"accessor {number}"
         kind, count = entry.get("type"), read_count(entry, "count", name)
@@ -117,7 +117,7 @@ class Document:
         return decoded(rows, self.named("accessors", number))
 
     def view(self, number: Any) -> tuple[memoryview, int]:
-        """Return the bytes of a buffer view and its stride, 0 if it has none."""
+        """Return the bytes of a buffer view, and its stride [bytes], or 0 if the view defines no stride."""
         entry, name = self.named("bufferViews", number), f"buffer view {number}"
         start, length = read_count(entry, "byteOffset", name, 0), read_count(entry, "byteLength", name)
         data = self._buffer(entry.get("buffer"))
@@ -130,8 +130,8 @@ class Document:
     def fetch(self, uri: Any) -> bytes:
         """Return the content of a data: URI, or of a file whose path is relative to this file.
 
-        Raises: MeshError for a missing file, a network address or an absolute path. A .glb must not name
-            files outside its folder either, because the live page reads files from any visitor.
+        Raises: MeshError for a missing file, a network address, an absolute path or, in a .glb, a file
+            outside its folder. (The live page reads .glb files from any visitor.)
         """
         if not isinstance(uri, str):
             raise MeshError(f"cannot be read: {uri!r} is not a URI")
@@ -190,7 +190,7 @@ class Document:
         return np.asarray(np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize)))
 
     def _with_sparse(self, rows: NDArray[Any], sparse: Entry, name: str) -> NDArray[Any]:
-        """Return a copy of `rows` in which those that a sparse accessor stores are replaced."""
+        """Return a copy of `rows`, with some rows replaced by the rows that a sparse accessor stores."""
         count, name = read_count(sparse, "count", name), f"the sparse part of {name}"
         indices, values = sparse["indices"], sparse["values"]
         replaced = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(
@@ -220,7 +220,7 @@ def component_type(entry: Entry, name: str) -> np.dtype[Any]:
 
 
 def read_count(entry: Entry, key: str, name: str, default: int | None = None) -> int:
-    """Return the count or offset `key` of an entry. Raises: MeshError unless it is a whole number from 0."""
+    """Return the count or offset `key` of an entry. Raises: MeshError unless it is an integer from 0."""
     value = entry.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise MeshError(f"cannot be read: {key} of {name} is {value!r}, not a whole number of at least 0")

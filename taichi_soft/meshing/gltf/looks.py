@@ -35,7 +35,7 @@ ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # pillow cannot always read thes
 
 
 class Looks:
-    """Reads the appearance of a file's primitives as trimesh visuals.
+    """Reader of the appearance of a file's primitives, as trimesh visuals.
 
     Attributes:
         notes: sentences on images and materials that were not read.
@@ -48,7 +48,10 @@ class Looks:
         self._images: dict[int, Any] = {}
 
     def of(self, primitive: Primitive) -> Any:
-        """Return a primitive's TextureVisuals or ColorVisuals; None without material, texture and colours."""
+        """Return a primitive's TextureVisuals or ColorVisuals.
+
+        The result is None for a primitive without material, texture coordinates and colours.
+        """
         number = primitive.entry.get("material")
         uv = self._texture_coordinates(primitive)
         colors = _colors(primitive)
@@ -64,7 +67,7 @@ class Looks:
         return visual
 
     def _texture_coordinates(self, primitive: Primitive) -> FloatArray | None:
-        """Texture coordinates of the vertices for the base colour, (n, 2), v upwards; None without any."""
+        """Return the texture coordinates for the base colour, (n, 2), with v upwards, or None without any."""
         number = primitive.entry.get("material")
         material = {} if number is None else self.document.named("materials", number)
         texture = _flat(material).get("baseColorTexture", {})
@@ -105,7 +108,7 @@ class Looks:
         return found
 
     def _image(self, reference: Entry) -> Any:
-        """Return the pillow image of a texture. If it cannot be read, add a note and return None."""
+        """Return the pillow image of a texture. If the image cannot be read, add a note and return None."""
         texture = self.document.named("textures", reference.get("index"))
         sources = [texture.get("source"), *(extension(texture, name).get("source") for name in ALL_SOURCES)]
         reasons = []
@@ -149,7 +152,7 @@ class Looks:
 
 
 def _colors(primitive: Primitive) -> NDArray[np.uint8] | None:
-    """Red, green, blue and alpha of the vertices, from 0 to 255, (n, 4); None without colours."""
+    """Return red, green, blue and alpha of the vertices, (n, 4), from 0 to 255, or None without colours."""
     rows = primitive.values("COLOR_0", "VEC3", "VEC4")
     if rows is None:
         return None

@@ -15,9 +15,9 @@ VISIBILITY = "KHR_node_visibility"
 
 
 def world_matrices(document: Document) -> FloatArray:
-    """Matrix from each node's axes to the file's axes, (n, 4, 4).
+    """Return the matrix from each node's axes to the file's axes, (n, 4, 4).
 
-    Raises: MeshError for a node with two parents, or one that is its own descendant.
+    Raises: MeshError for a node that has two parents or is its own descendant.
     """
     nodes = document.entries("nodes")
     parents = np.full(len(nodes), -1)
@@ -30,7 +30,7 @@ def world_matrices(document: Document) -> FloatArray:
                 )
             parents[child] = number
     order = [int(root) for root in np.flatnonzero(parents < 0)]
-    for number in order:  # the list grows: children follow their parents
+    for number in order:  # the list grows during the loop: children follow their parents
         order.extend(nodes[number].get("children", ()))
     if len(order) < len(nodes):
         number = min(set(range(len(nodes))) - set(order))
@@ -43,9 +43,9 @@ def world_matrices(document: Document) -> FloatArray:
 
 
 def shown_nodes(document: Document) -> list[int]:
-    """Numbers of the visible nodes of the default scene, parents before their children.
+    """Return the numbers of the visible nodes of the default scene, parents before their children.
 
-    If the file has no default scene, the first scene is used. If it has no scene, all nodes are used.
+    If the file has no default scene, the first scene is used. If the file has no scene, all nodes are used.
     """
     nodes = document.entries("nodes")
     if document.entries("scenes"):
@@ -66,7 +66,7 @@ def shown_nodes(document: Document) -> list[int]:
 
 
 def instance_matrices(document: Document, node: Entry) -> FloatArray | None:
-    """Matrices from the instances of a node's mesh to the node's axes, (k, 4, 4); None without instances."""
+    """Return the matrices from mesh instances to the node's axes, (k, 4, 4), or None without instances."""
     attributes = extension(node, INSTANCING).get("attributes")
     if not attributes:
         return None
@@ -93,10 +93,12 @@ def extension(entry: Entry, name: str) -> Entry:
 
 
 def composed(translations: FloatArray, rotations: FloatArray, scales: FloatArray) -> FloatArray:
-    """Matrices that scale, then rotate, then translate, (k, 4, 4).
+    """Return matrices that scale, then rotate, then translate, (k, 4, 4).
 
     Args:
-        rotations: quaternions x, y, z, w. They are normalised; one of length 0 does not rotate.
+        translations: (k, 3) [m].
+        rotations: quaternions (x, y, z, w), (k, 4), of any length. A quaternion of length 0 does not rotate.
+        scales: factors along x, y and z, (k, 3).
     """
     lengths = np.linalg.norm(rotations, axis=1, keepdims=True)
     unit = np.where(lengths > 0.0, rotations / np.where(lengths > 0.0, lengths, 1.0), [0.0, 0.0, 0.0, 1.0])

@@ -25,15 +25,15 @@ from taichi_soft.meshing.gltf.nodes import extension
 DRACO = "KHR_draco_mesh_compression"
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-"""Modes of primitives with triangles; the other modes are points and lines."""
+"""Modes of primitives with triangles. The other modes are points and lines."""
 
 
 class Primitive:
     """One primitive of a mesh.
 
     Attributes:
-        entry: its JSON.
-        name: text for errors, such as "primitive 0 of mesh 2".
+        entry: JSON of the primitive.
+        name: name for error messages, such as "primitive 0 of mesh 2".
     """
 
     def __init__(self, document: Document, entry: Entry, name: str) -> None:
@@ -43,11 +43,11 @@ class Primitive:
 
     @property
     def has_triangles(self) -> bool:
-        """True if it has triangles and not only points or lines."""
+        """True if the primitive has triangles and not only points or lines."""
         return "POSITION" in self._attributes and self.entry.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)
 
     def values(self, attribute: str, *types: str) -> FloatArray | None:
-        """Read an attribute as real numbers, (n, columns); None if it is missing."""
+        """Return an attribute as real numbers, (n, columns), or None if it is missing."""
         rows = self.rows(attribute, *types)
         return (
             None
@@ -56,9 +56,9 @@ class Primitive:
         )
 
     def rows(self, attribute: str, *types: str) -> NDArray[Any] | None:
-        """Read an attribute as stored, (n, columns); None if it is missing.
+        """Return an attribute as stored, (n, columns), or None if it is missing.
 
-        Raises: MeshError unless it has a row for every vertex.
+        Raises: MeshError unless the attribute has one row for each vertex.
         """
         if attribute not in self._attributes:
             return None
@@ -81,10 +81,10 @@ class Primitive:
         return read_count(self.document.named("accessors", number), "count", f"accessor {number}")
 
     def vertices(self, weights: Sequence[float]) -> tuple[FloatArray, FloatArray | None]:
-        """Return positions (n, 3) and normals (n, 3) with the morph targets blended in; normals can be None.
+        """Blend the morph targets. Returns: positions (n, 3), and normals (n, 3) or None.
 
         Args:
-            weights: weights of the morph targets; missing ones are 0.
+            weights: weights of the morph targets. Missing weights are 0.
         """
         positions, normals = self.values("POSITION", "VEC3"), self.values("NORMAL", "VEC3")
         assert positions is not None
@@ -123,8 +123,9 @@ class Primitive:
         return _strip(corners) if mode == STRIP else _fan(corners)
 
     def _decompress(self) -> tuple[NDArray[Any] | None, dict[str, NDArray[Any]]]:
-        """Decompress triangles and attributes with Draco; None and {} if they are not compressed.
+        """Decompress triangles and attributes with Draco.
 
+        Returns: triangles (m, 3), and attributes by name; None and {} if they are not compressed.
         Raises: MeshError for damaged data, or if DracoPy is missing and the file has no uncompressed copy.
         """
         compression = extension(self.entry, DRACO)
@@ -164,7 +165,7 @@ class Primitive:
 
 
 def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of a strip, (m, 3). Triangles that repeat a corner only connect strips, and are skipped."""
+    """Return the triangles of a strip, (m, 3). Triangles that repeat a corner are dropped."""
     found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     found[1::2] = found[1::2, [1, 0, 2]]
     a, b, c = found.T
@@ -172,6 +173,6 @@ def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _fan(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of a fan, which share the first corner, (m, 3)."""
+    """Return the triangles of a fan, (m, 3). All triangles share the first corner."""
     rim = corners[1:]
     return np.stack([np.broadcast_to(corners[:1], max(len(rim) - 1, 0)), rim[:-1], rim[1:]], axis=1)

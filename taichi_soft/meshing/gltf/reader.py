@@ -33,10 +33,11 @@ SHAPELESS = (
     "EXT_lights_",
     "KHR_animation_",
 )
-"""Prefixes of extensions that do not change shapes: files that require them are read."""
+"""Prefixes of extensions that do not change shapes. Files that require these extensions are read."""
 
 MAX_ROWS = 10_000_000
-"""Largest sum of all vertices and triangles. Many nodes can show one mesh, so a small file can exceed it."""
+"""Largest sum of all vertices and triangles. Even a small file can exceed this sum, if many nodes show the
+same mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,8 @@ class _Part:
 def read_gltf(path: Path) -> list[Surface]:
     """Read the default scene of a .glb or .gltf file. Animations are ignored.
 
-    Joints pose the skins, and default weights blend the morph targets: glTF 2.0 specification, sections 3.7.2
-    and 3.7.3.
+    Joints pose the skins, and default weights blend the morph targets (glTF 2.0 specification, sections 3.7.2
+    and 3.7.3).
     Raises: MeshError, in one line without the file's name, if the file is damaged, requires an unsupported
         extension, or has no triangles.
     """
@@ -73,7 +74,7 @@ def read_gltf(path: Path) -> list[Surface]:
 class _Reader:
     def __init__(self, document: Document) -> None:
         self.document, self.looks = document, Looks(document)
-        self.counts: Counter[str] = Counter()  # for the notes
+        self.counts: Counter[str] = Counter()  # numbers for the notes
         self.joints: set[int] = set()
         self.primitives: dict[tuple[int, int], Primitive] = {}
         self.remaining_rows = MAX_ROWS
@@ -133,7 +134,7 @@ class _Reader:
                 yield _posed(part, poses)
 
     def _primitive(self, mesh: int, order: int, entry: Entry) -> Primitive:
-        """Return a primitive. It is cached, so that it is decompressed once even if several nodes use it."""
+        """Return a primitive. Primitives are cached, because several nodes can use the same primitive."""
         key = mesh, order
         if key not in self.primitives:
             self.primitives[key] = Primitive(self.document, entry, f"primitive {order} of mesh {mesh}")
@@ -142,7 +143,7 @@ class _Reader:
     def _skin_matrices(
         self, node: Entry, primitive: Primitive, worlds: FloatArray, count: int
     ) -> FloatArray | None:
-        """Skinning matrices from the vertices to the file's axes, (n, 4, 4), or None without a skin."""
+        """Return skinning matrices from vertices to the file's axes, (n, 4, 4), or None without a skin."""
         joints, weights = _influences(primitive)
         if "skin" not in node or not len(joints):
             return None
@@ -233,7 +234,7 @@ def _posed(part: _Part, poses: FloatArray) -> _Part:
     vertices = np.einsum("...ij,...j->...i", linear, part.vertices) + poses[..., :3, 3]
     is_mirrored = np.asarray(np.linalg.det(linear) < 0.0)
     normals = None
-    if part.normals is not None:  # transformed by the inverse transpose, up to a factor
+    if part.normals is not None:  # normals transform by the inverse transpose, up to a factor
         cofactors = np.cross(linear[..., [1, 2, 0], :], linear[..., [2, 0, 1], :])
         moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
         normals = np.where(is_mirrored[..., None], -moved, moved).reshape(-1, 3)
@@ -265,7 +266,7 @@ def _repeated(visual: Any, count: int) -> Any:
 
 
 def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
-    """Joints of each vertex and their weights, (n, 4 k) each; (0, 0) if there are none."""
+    """Return the joints of each vertex and their weights, (n, 4 k) each, or empty arrays (0, 0)."""
     joints, weights = [], []
     for group in range(16):
         numbers = primitive.rows(f"JOINTS_{group}", "VEC4")
@@ -280,7 +281,7 @@ def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
 
 
 def _unique(parts: list[_Part]) -> list[str]:
-    """Names of the parts. Duplicate names get a number at the end."""
+    """Return the names of the parts. Duplicate names get a number at the end."""
     found: dict[str, None] = {}
     last: Counter[str] = Counter()
     for part in parts:
