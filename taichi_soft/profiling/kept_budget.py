@@ -1,4 +1,4 @@
-"""Measure whether bodies that take twice the time budget are reduced until they keep it."""
+"""Measure whether bodies that need twice the time budget are reduced in detail until their steps fit it."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ SETTLING = 60
 """Number of frames until the bodies have landed."""
 
 SHARE = 0.5
-"""Budget over the median step without a budget."""
+"""Budget as a fraction of the median step time without a budget."""
 
 EYE = (-8.0, 0.0, 2.0)  # [m]
 
 IN_TURN = 10
-"""A budget counts as met if the first and the median of this many steps fit it."""
+"""The budget is met from the first step that fits it, if the median of this many steps from there also
+fits."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,10 @@ class KeptBudget:
     is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
     step: Spread  # time of `World.step` [ms]
     work: Spread  # CPU time of a step [ms], without waiting for other programs
-    settled: Spread  # time of the steps after the budget was met, or of all steps [ms]
+    settled: Spread  # time of the steps after the budget was met; of all steps if it was never met [ms]
     frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
-    late_settled: float  # the same after the budget was met; of all steps if it was never met
+    late_settled: float  # fraction of late steps in `settled`
     met_after: int | None  # steps until the budget was met; None if it was never met
     deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
     changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any
@@ -66,10 +67,10 @@ class KeptBudget:
 
 
 def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
-    """Measure bodies without a budget, with a budget of half their median step, and at the final levels of
-    that run.
+    """Make three runs: without a budget, with a budget of half the median step, and at the final levels of
+    the second run.
 
-    The third run has no budget: longer steps in it are caused by other programs on the machine. The runs are
+    The third run has no budget, so its long steps are caused by other programs on the machine. The runs are
     consecutive, because a game has one world. Sleep is off, so that there is work to reduce.
     """
     kinds = _kinds()
