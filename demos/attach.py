@@ -1,7 +1,7 @@
-"""A soft bar hangs from a swinging plate: the game moves the plate and reads the load on it.
+"""A soft bar hangs from a swinging plate. The game moves the plate and reads the load on the plate.
 
-The bar is longest at the lowest point of each swing, where the load is largest. At both ends of the swing
-the load is less than its weight.
+The bar is longest at the lowest point of each swing, where the load is largest. At both ends of the swing,
+the load is smaller than the weight of the bar.
 """
 
 import numpy as np
@@ -77,7 +77,7 @@ def stage() -> Stage:
 
 
 def _turn(angle: float) -> NDArray[np.float64]:
-    """Return the rotation about y that swings the bar towards -x; `angle` in rad."""
+    """Return the rotation (3, 3) about y that swings the bar towards -x by `angle` [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 

@@ -1,6 +1,6 @@
-"""A complex object of bars falls on its corner, bends, and keeps vibrating after it lifts off (fig. 6.2).
+"""An object made of bars falls on its corner, bends, and keeps vibrating after it lifts off (fig. 6.2).
 
-The arms vibrate long after the impact, and the crossings of the bars turn red each time.
+The arms vibrate long after the impact. The crossings of the bars turn red each time the arms bend.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # contact thickness of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
-DRAG = 1.0  # damping rate [1/s]; without it, balls between others would keep rolling
+DRAG = 1.0  # damping rate [1/s], which stops balls that would roll between other bodies forever
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -58,7 +58,7 @@ def _bowl() -> trimesh.Trimesh:
 
 
 def proof(stage: Stage) -> float:
-    """Return the depth of the deepest vertex inside another body [m]; 0 if there is none."""
+    """Return the depth of the deepest vertex inside another body [m]; 0 if no vertex is inside."""
     depths = [
         near.distance
         for body in stage.world.bodies

@@ -1,4 +1,4 @@
-"""Sixty-four soft spheres rain down: bodies run in parallel, one per CPU core at a time.
+"""Sixty-four soft spheres rain down. Each CPU core steps one sphere at a time, in parallel.
 
 They land at different times, and each deforms and bounces independently.
 """

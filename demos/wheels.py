@@ -1,6 +1,7 @@
 """Soft wheels with motors at their hubs climb steps and brake at the top.
 
-The softest wheel has a large contact area and folds around the edge of each step; the stiffest rolls over it.
+The softest wheel has a large contact area and folds around the edge of each step. The stiffest wheel rolls
+over the edges.
 """
 
 import numpy as np
