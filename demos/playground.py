@@ -70,8 +70,8 @@ class Course:
 
 
 def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
-    """Return the matrix (3, 3) that rotates first about x, then about y [rad]. The second rotation turns the x
-    axis towards -z.
+    """Return the matrix (3, 3) that rotates first about x, then about y [rad]. The rotation about y turns the
+    x axis towards -z.
     """
     c, s, k, w = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, k, -w], [0, w, k]])
