@@ -10,7 +10,7 @@ class Rollback:
     """Snapshots of the last steps of a world.
 
     If other code calls `World.restore`, for example to load a game, the snapshots no longer lead to the
-    current state. `steps` is then empty, and `save` starts again.
+    current state. `steps` is then empty, and the next `save` starts a new history.
 
     Args:
         world: a built world.
@@ -52,7 +52,7 @@ class Rollback:
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks + 1:  # the newest is the current state
+        while len(self._snapshots) > self._ticks + 1:  # the newest snapshot is of the current state
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:
