@@ -75,7 +75,7 @@ class Machine:
         self.known[tick, me] = (x, y, float(tick % (61 + 12 * me) == 40))
 
     def receive(self, tick: int, keys: Keys) -> None:
-        """Receive the other player's input of a tick. If the prediction was wrong, repeat from that tick on."""
+        """Receive the other player's input for a tick. If it was not predicted, repeat from that tick on."""
         self.known[tick, 1 - self.player] = keys
         if self.used[tick][1 - self.player] == keys:
             return
