@@ -14,9 +14,9 @@
  * world; calls from other threads return TS_ERROR_BUSY. Different threads can use different worlds at the same time.
  *
  * Positions, velocities, forces, impulses and radii use the axes and the unit of length of the engine for which the
- * world was exported. In Unreal an impulse is in kg cm/s and a moment in kg cm^2/s. Masses are in kg, times in s, angles
- * in rad; the density of air is always in kg/m^3. Rotations are unit quaternions x, y, z, w. The caller owns all buffers
- * and passes the number of their elements; the library keeps no pointers to buffers. Text is UTF-8.
+ * world was exported. In Unreal an impulse is in kg cm/s and a moment in kg cm^2/s. Masses are in kg, times in s,
+ * angles in rad; the density of air is always in kg/m^3. Rotations are unit quaternions x, y, z, w. The caller owns all
+ * buffers and passes the number of their elements; the library keeps no pointers to buffers. Text is UTF-8.
  */
 #ifndef TAICHI_SOFT_H
 #define TAICHI_SOFT_H
@@ -201,7 +201,7 @@ typedef struct ts_event {
   int64_t step;     /* step of the world, from 0 */
   double time;      /* simulated time at the end of the step [s] */
   ts_body body;
-  ts_body other;     /* body in a higher slot that `body` touches; 0 for a collider. Both bodies may have been removed */
+  ts_body other;     /* body in a higher slot that `body` touches; 0 for a collider. Both can have been removed since */
   double impulse[3]; /* impulse that `body` exerted in the step, or in the whole contact if the contact ended */
   double duration;   /* duration of a contact that ended [s] */
 } ts_event;
@@ -277,8 +277,8 @@ TS_API ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* ver
                                 int32_t feels);
 /* Detach vertices from their frames. The vertices keep their velocity. A count of 0 means all attached vertices. */
 TS_API ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count);
-/* Mean force of the body on a frame in the last step [N, in Unreal kg cm/s^2], and mean torque about the frame's origin.
- * The body must be attached to the frame. Both pointers can be null. */
+/* Mean force of the body on a frame in the last step [N, in Unreal kg cm/s^2], and mean torque about the frame's
+ * origin. The body must be attached to the frame. Both pointers can be null. */
 TS_API ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]);
 
 typedef struct ts_pull {
@@ -301,9 +301,9 @@ TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]
 
 /* ---- joints and motors, in worlds with contact. They are removed together with their body ---- */
 
-/* Attach vertices of a body to the body `other`. If `onto` is null, the vertices are attached at their current positions
- * in `other`; otherwise `onto` lists a vertex of `other` for each. A world has at most 64 joints with 2,048 vertices in
- * total. */
+/* Attach vertices of a body to the body `other`. If `onto` is null, the vertices are attached at their current
+ * positions in `other`; otherwise `onto` lists a vertex of `other` for each. A world has at most 64 joints with 2,048
+ * vertices in total. */
 TS_API ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
                               const int32_t* onto, ts_joint* joint);
 /* Joint with an index, 0 to 63; the handle is 0 if there is none. The exported world can also contain joints. */

@@ -1,5 +1,5 @@
-// taichi_soft.h for C++17: handles with RAII, and errors as exceptions. To use a C function that has no method here, pass
-// `handle()`.
+// taichi_soft.h for C++17: handles with RAII, and errors as exceptions. To call a C function that has no method here,
+// pass `handle()`.
 //
 //     auto scene = taichi_soft::Scene("game.softworld");
 //     auto world = scene.create();
@@ -296,7 +296,7 @@ class World {
     return Grab(handle_, found);
   }
 
-  // Attaches vertices to `other` at their current positions. If `onto` is not empty, attaches each to a vertex in `onto`.
+  // Attaches vertices to `other` at their current positions or, if `onto` is not empty, each to a vertex in `onto`.
   Joint join(Body body, const std::vector<int32_t>& vertices, Body other, const std::vector<int32_t>& onto = {}) {
     if (!onto.empty() && onto.size() != vertices.size()) throw std::invalid_argument("onto differs in size");
     Joint found;

@@ -35,7 +35,7 @@ int main(int count, char** arguments) {
       const ts_clock clock = world.advance(frame);
       for (Body each : balls) world.mesh(each, skin, vertices, normals);  // draw them with index_buffer
       world.drain_events(events);
-      for (const ts_event& each : events) touches += each.collider == lift;  // a game can play a sound, as loud as each.impulse
+      for (const ts_event& each : events) touches += each.collider == lift;  // or play a sound, as loud as each.impulse
       if (i % 50 != 0) continue;
       const auto [impulse, moment] = world.collider_impulse(lift);
       std::printf("%.2f s: %zu ball%s of %zu triangles, the first at %.3f m; the lift feels %.1f N, touched %d times\n",
