@@ -558,7 +558,7 @@ Variant detach(Self self, In in) {
   return of(true);
 }
 
-// Returns the load on a frame. The name is not `load`, because that method reads the world file.
+// Returns force and torque of a body on a frame. The name is not `load`, because that method reads the world file.
 Variant frame_load(Self self, In in) {
   double force[3], torque[3];
   check(ts_body_get_load(self.world, body_of(in), in.small(1), force, torque));

@@ -1,4 +1,4 @@
-// The memory of one world, and calls of its kernels.
+// Owns the memory of one world and calls its kernels.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct Argument {
   int32_t whole;
   float real;
   const void* data;
-  int32_t rows, width;  // a width of 0 means that there is only one dimension
+  int32_t rows, width;  // with a width of 0, the array has only one dimension
 };
 
 class Machine {
