@@ -87,7 +87,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mean load along the rod over the last full swing, over the weight of the bar."""
+    """Return the mean load along the rod in the last full swing, divided by the weight of the bar."""
     swing = stage.act
     assert isinstance(swing, Swing)
     weight = float(swing.hold.body.masses.sum()) * GRAVITY_EARTH
@@ -96,7 +96,7 @@ def proof(stage: Stage) -> float:
 
 
 def period() -> float:
-    """Return the period of the swing [s], by Legendre's arithmetic-geometric mean."""
+    """Return the period of the swing [s], computed with Legendre's arithmetic-geometric mean."""
     a, b = 1.0, float(np.cos(WIDEST / 2))
     while a - b > 1e-12:
         a, b = (a + b) / 2, float(np.sqrt(a * b))

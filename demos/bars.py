@@ -47,7 +47,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Return the volume over the rest volume."""
+    """Return the ratio of the volume to the rest volume."""
     body = stage.actors[0].body
     return body.volume() / body.mesh.volume
 

@@ -21,7 +21,7 @@ WIDTH, ROPE, THICKNESS = (
     1.7,
     0.12,
     0.12,
-)  # width of the bridge, width of its side ropes, thickness of both [m]
+)  # width of the bridge, width of its side ropes, thickness of planks and ropes [m]
 EDGE = 0.16  # height of the ropes' outer edges above the planks [m], so that nothing rolls off
 HEIGHT = 1.5  # height of the straight bridge [m]
 WOOD, HEMP = 1.5e6, 1.0e6  # Young's moduli of planks and ropes [Pa]

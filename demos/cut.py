@@ -41,7 +41,7 @@ class Knife:
         self.start = blade.position.astype(np.float64)
         self.fallen: Body | None = None
         self.parted = 0.0  # time of the cut [s]
-        self.whole = self.below = 0.0  # mass of the bar and of its part below the blade at the cut [kg]
+        self.whole = self.below = 0.0  # mass of the bar, and mass below the blade at the time of the cut [kg]
 
     def __call__(self, world: World) -> None:
         """Move the blade before a step."""
@@ -116,7 +116,7 @@ def _mass_below(body: Body) -> float:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mass of the fallen part over the mass below the blade at the cut."""
+    """Return the mass of the fallen part, divided by the mass below the blade at the time of the cut."""
     knife = stage.act
     assert isinstance(knife, Knife)
     assert knife.fallen is not None

@@ -80,7 +80,7 @@ def stage() -> Stage:
 
 
 def ear_span(body: Body) -> float:
-    """Return the distance between the tips of the ears over the rest distance."""
+    """Return the ratio of the distance between the tips of the ears to their distance at rest."""
     rest, now = body.mesh.vertices, body.positions()
     x = rest[:, 0]
     left, right = x < 0.85 * x.min(), x > 0.85 * x.max()

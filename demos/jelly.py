@@ -65,7 +65,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mean load on the floor in the last second, over the total weight."""
+    """Return the mean load on the floor in the last second, divided by the total weight."""
     scale = stage.act
     assert isinstance(scale, Scale)
     weight = sum(float(body.masses.sum()) for body in stage.world.bodies) * GRAVITY_EARTH

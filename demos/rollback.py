@@ -25,7 +25,7 @@ PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # acceleration of a pressed key [m/s^2],
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 Keys = tuple[float, float, float]
-"""Input of a player in a tick: direction (x, y), and 1 to jump or 0."""
+"""Input of a player in a tick: direction (x, y), and 1 to jump, else 0."""
 
 
 def make_world() -> World:

@@ -25,7 +25,7 @@ steps."""
 
 SPREAD, LONG, LEAST_LONG, MOST_LONG = 240, 0.97, 1.15, 1.5
 """The expected time of a long step is the median time multiplied by a factor. The factor is the quantile LONG
-of time over median in the last SPREAD steps, clamped to [LEAST_LONG, MOST_LONG]. Without the upper limit,
+of time divided by median in the last SPREAD steps, clamped to [LEAST_LONG, MOST_LONG]. Without this limit,
 other programs that interrupt many steps would reduce detail too far."""
 
 PATIENCE = 30

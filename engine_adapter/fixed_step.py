@@ -48,7 +48,7 @@ class Accumulator:
 
     @property
     def alpha(self) -> float:
-        """Return `remainder` over dt, at least 0 and below 1."""
+        """Return `remainder` divided by dt, at least 0 and below 1."""
         return max(self.remainder / self._dt, 0.0)
 
     def put(self, frame_dt: float) -> tuple[int, float]:

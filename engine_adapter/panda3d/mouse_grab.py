@@ -28,7 +28,8 @@ class MouseGrab:
         button: event of the mouse button. None if the game calls `press`, `move` and `release` itself.
         bodies: bodies that can be grabbed; None for all.
         frequency, max_force: strength of the grab, see `World.grab`.
-        sort: sort of the task that follows the mouse. The task must run before the step of the world.
+        sort: Panda3D's sort value of the task that follows the mouse. The task must run before the task that
+            steps the world.
     Raises: OptionError if `world` is not a World.
     """
 

@@ -26,7 +26,7 @@ class PlacedShape:
     """A shape in the coordinates of its node, without the node's scale.
 
     Args:
-        shape: shape of taichi-soft, scaled.
+        shape: shape of taichi-soft. Its size includes the node's scale.
         position: position of the shape's origin, (3,) [m].
         rotation: axes of the shape as columns, (3, 3).
     """
@@ -191,8 +191,8 @@ _SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
     core.CollisionCapsule: _capsule,
     core.CollisionPlane: _plane,
 }
-"""Converters by exact class: CollisionPolygon is a subclass of CollisionPlane but no plane, and hollow solids
-are subclasses of spheres."""
+"""Converters by exact class, because subclasses can be other shapes: CollisionPolygon is a subclass of
+CollisionPlane, and hollow solids are subclasses of spheres."""
 
 _BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
     bullet.BulletSphereShape: _bullet_sphere,

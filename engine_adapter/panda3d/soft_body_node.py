@@ -13,8 +13,8 @@ from engine_adapter.panda3d.looks import render_state, texture_places, vertex_co
 from taichi_soft import Body, OptionError, RenderMesh
 
 _POSITIONS, _NORMALS, _LOOK = range(3)
-"""Columns of a vertex buffer: arrays of positions, normals, and texture coordinates or colours. A kernel
-fills the first two in place."""
+"""Indices of the arrays in a vertex buffer: positions, normals, and texture coordinates or colours. A kernel
+fills positions and normals in place."""
 
 
 class SoftBodyNode(core.NodePath):  # type: ignore[misc]

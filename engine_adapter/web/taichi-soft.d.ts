@@ -19,11 +19,11 @@ export type Kind = "body" | "asset" | "collider" | "frame" | "mesh" | "joint" | 
 /** A world file, read by `loadScene`. All worlds of a scene share the compiled code. */
 export class Scene {
   readonly counts: Record<Kind, number>;
-  /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
+  /** Return the name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor" with a number. */
   nameOf(kind: Kind, number: number): string;
-  /** Number of an object with a name. */
+  /** Return the number of the object with a name. */
   find(kind: Kind, name: string | number): number;
-  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
+  /** Return `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name: string | number): {
     number: number;
     vertexCount: number;
@@ -106,7 +106,7 @@ export class World {
   setFriction(friction: number): void;
   /** Set the wind velocity [m/s] and the air density [kg/m^3]. */
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
-  /** Push all bodies away from a point, with an impulse from `impulse` [N s] at the point to 0 at `radius` [m]. */
+  /** Push all bodies away from a point. The impulse falls from `impulse` [N s] at the point to 0 at `radius` [m]. */
   radialImpulse(center: Vector, impulse: number, radius: number): void;
   /** Return a hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash(): string;

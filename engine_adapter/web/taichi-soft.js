@@ -237,14 +237,14 @@ export class Scene {
     return { number, asset, level: level < 0 ? null : level, vertexCount, triangles, uv };
   }
 
-  /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
+  /** Return the name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor" with a number. */
   nameOf(kind, number) {
     const found = this.#namesOf(kind)[number];
     if (found === undefined) throw new SoftError(-1, `${kind} ${number} does not exist (${this.names[kind].length} in all, numbered from 0)`);
     return found;
   }
 
-  /** Number of an object with a name. */
+  /** Return the number of the object with a name. */
   find(kind, name) {
     const names = this.#namesOf(kind);
     if (typeof name === "number") return whole(name, kind);
@@ -258,7 +258,7 @@ export class Scene {
     throw new SoftError(-1, `kind is ${kind}: give one of ${Object.keys(KINDS).join(", ")}`);
   }
 
-  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
+  /** Return `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const found = this.assets[this.find("asset", name)];
     if (!found) throw new SoftError(-1, `asset ${name} does not exist (${this.assets.length} in all, numbered from 0)`);

@@ -40,7 +40,7 @@ export class SoftMesh {
     return hit?.body.handle === handle ? { grab: hit.body.grab(hit), distance: hit.distance } : null;
   }
 
-  /** Move a grab of `grab` to the ray, at its initial distance from the ray's origin. */
+  /** Move the target of a grab to the ray, at the initial distance from the ray's origin. Pass a result of `grab`. */
   pull({ grab, distance }, raycaster) {
     const { origin, direction } = raycaster.ray;
     grab.moveTo(origin.clone().addScaledVector(direction, distance).toArray());

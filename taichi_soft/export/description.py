@@ -212,8 +212,8 @@ def _of_frames(context: WorldContext) -> Arrays:
 
 
 def _attached(context: WorldContext) -> Arrays:
-    """Return two arrays over all particles, by name: 1 if the load is recorded, or 0; and the number of the
-    attachment, from 1, or 0.
+    """Return two arrays by name, with a number per particle: 1 if the load is recorded, else 0; and the
+    number of the attachment, from 1, or 0 if the particle is not attached.
     """
     count = context.layout.particle_count
     feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)

@@ -105,7 +105,7 @@ class CompiledKernels:
 def compile_kernels(
     texts: Path, names: Sequence[str], platforms: Sequence[str], folder: Path, world: str | None
 ) -> CompiledKernels:
-    """Compile kernels for platforms.
+    """Compile kernels to machine code for one or more platforms.
 
     Args:
         texts: folder with the assembly of each kernel in a file NAME.ll.

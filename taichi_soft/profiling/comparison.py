@@ -41,7 +41,7 @@ class Comparison:
     taichi: Spread  # time in Taichi, including Python [ns per element and substep]
     native: Spread
     ratio: Spread  # time in Taichi over time in C++, for each pair of runs
-    deviation: float  # largest difference of positions after the same steps, over the size of the body
+    deviation: float  # largest difference of positions after equal steps, divided by the body's size
 
 
 def compare_with_baseline(

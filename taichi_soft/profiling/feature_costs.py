@@ -57,8 +57,8 @@ class Heap:
     tets: int
     threads: int
     step: Spread  # times of consecutive steps [ms]
-    real_time: float  # simulated time over median step time
-    ratio: Spread  # step time over that of the same number of free bodies, for each pair of steps
+    real_time: float  # simulated time divided by median step time
+    ratio: Spread  # step time divided by the step time of as many free bodies, for each pair of steps
     stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 

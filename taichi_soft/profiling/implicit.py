@@ -16,7 +16,7 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 GROWTH = 100
-"""Step of implicit Euler over the step of leapfrog in the thesis, 1e-2 s over about 1e-4 s."""
+"""Step of implicit Euler divided by the step of leapfrog in the thesis: 1e-2 s divided by about 1e-4 s."""
 
 CMPM_MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
 """Leapfrog needs steps of about 1e-4 s for this stiffness. Without damping, CMPM gains energy at any step
@@ -38,8 +38,8 @@ class ImplicitGain:
     other_step: float  # step of the other method [s]
     implicit: Spread  # time of implicit Euler [ms per simulated second]
     other: Spread
-    gain: Spread  # time of the other method over the time of implicit Euler, for each pair of runs
-    deviation: float | None  # largest difference of positions over the body's size; None if not compared
+    gain: Spread  # time of the other method divided by the time of implicit Euler, for each pair
+    deviation: float | None  # largest difference of positions, relative to the body's size; None if unknown
     is_sound: bool  # True if the body was valid at the end
 
 

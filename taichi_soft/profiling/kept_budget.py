@@ -26,7 +26,8 @@ ROWS = 5
 """Number of rows of bodies."""
 
 SPACING = 1.6
-"""Distance between bodies of at most 1 m [m]. They do not touch, see docs/speed.md."""
+"""Distance between the centres of bodies [m]. The bodies are at most 1 m wide and do not touch, see
+docs/speed.md."""
 
 SETTLING = 60
 """Number of frames until the bodies have landed."""
@@ -45,7 +46,7 @@ fits."""
 class KeptBudget:
     """Times of the same bodies, without a budget or with one."""
 
-    budget: float  # budget [ms]; in a run without one, only for comparison
+    budget: float  # budget [ms]; in a run without a budget, only for comparison
     is_kept: bool  # True if the run had a budget
     is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
     step: Spread  # time of `World.step` [ms]
@@ -58,7 +59,7 @@ class KeptBudget:
     deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
     changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any
     frames_with_changes: int
-    skipped: float  # skipped steps over all steps of all bodies
+    skipped: float  # fraction of steps that bodies skipped
     levels: dict[int, int]  # number of bodies by final level
     levels_in_order: tuple[int, ...]  # level of each body
     tets: int  # number of tetrahedra at the end

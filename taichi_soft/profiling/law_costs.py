@@ -32,7 +32,7 @@ class LawCost:
     is_anisotropic: bool
     element: str  # "tetrahedron" or "edge"
     cost: Spread  # time of a substep, including edge damping [ns per element]
-    ratio: Spread  # cost over the cost of "virial" with the linear strain, in alternating runs
+    ratio: Spread  # cost divided by that of "virial" with the linear strain, in alternating runs
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:

@@ -55,8 +55,8 @@ class Startup:
 
     world: str  # key of `WORLDS`
     cache: str  # "empty", or "full" after an earlier run of the same program
-    first_frame: float  # [s]
-    warm: float  # [s], until the end of `World.warm_up`
+    first_frame: float  # time until the first frame [s]
+    warm: float  # time until the end of `World.warm_up` [s]
 
 
 def measure_startup(

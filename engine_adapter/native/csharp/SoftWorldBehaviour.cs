@@ -130,7 +130,7 @@ namespace TaichiSoft
         // If a listener throws, the remaining events are delivered in the next frame.
         private void TellEvents()
         {
-            while (World != null) // a listener can destroy it
+            while (World != null) // a listener can destroy the world
             {
                 if (toldCount == eventCount)
                 {

@@ -283,7 +283,7 @@ namespace TaichiSoft
         private Vector3d point;
         /// <summary>Target speed [rad/s], or [unit of length/s] for Push.</summary>
         public double Speed;
-        /// <summary>Limit of the torque, or of the force for Push.</summary>
+        /// <summary>Largest torque, or largest force for Push.</summary>
         public double Limit;
 
         private Drive(bool turns, Vector3d axis, double speed, double limit) : this()
@@ -1444,8 +1444,8 @@ namespace TaichiSoft
         internal static readonly uint Bytes = (uint)Marshal.SizeOf(typeof(T));
     }
 
-    // The functions of taichi_soft.h. Bytes converts strings to zero-terminated UTF-8, because .NET's conversion
-    // depends on the system.
+    // The functions of taichi_soft.h. The method Bytes converts strings to zero-terminated UTF-8, because .NET's
+    // conversion depends on the system.
     internal static class Native
     {
         internal const uint Version = 1;

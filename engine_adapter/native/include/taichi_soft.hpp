@@ -156,7 +156,7 @@ class World {
   }
   // Sets the number of threads for a step, including the calling thread.
   void set_threads(int32_t count) { check(ts_world_set_threads(handle_, count)); }
-  // Sets a function that `advance` calls before each step. It must not throw or call `on_step`.
+  // Sets a function that `advance` calls before each step. The function must not throw or call `on_step`.
   void on_step(std::function<void()> function) {
     auto next = std::make_unique<std::function<void()>>(std::move(function));
     const ts_before_step call = [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); };

@@ -35,7 +35,7 @@ struct Collider {
   uint32_t serial;  // distinguishes successive colliders in the same row
 
   bool moves() const;
-  // Box around the collider's path during `dt` [s], and its highest speed [m/s].
+  // Box around the collider's path during `dt` [s]. `fastest` receives the collider's highest speed [m/s].
   Box way(double dt, double* fastest) const;
 };
 

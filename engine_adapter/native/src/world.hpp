@@ -73,7 +73,7 @@ class World {
   void set_job_system(ts_run_jobs function, void* user) { machine_->threads.use_host(function, user); }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
-  int32_t steps_due(double seconds);  // adds the time of a frame
+  int32_t steps_due(double seconds);  // adds the time of a frame, and returns the number of due steps
   void step_in_time();
   void end_frame();  // drops the time of steps that were due but not made
   ts_before_step before_step() const { return before_step_; }
