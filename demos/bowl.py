@@ -48,7 +48,7 @@ def stage() -> Stage:
 
 
 def _bowl() -> trimesh.Trimesh:
-    """Make the lower half of a hollow ball with a round rim. Its origin is the centre of the opening."""
+    """Make the lower half of a hollow ball with a round rim. The origin is the centre of the opening."""
     angles = np.linspace(0, np.pi / 2, 25)
     outer = (RADIUS + WALL) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = RADIUS * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]

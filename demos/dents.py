@@ -1,7 +1,7 @@
 """Two soft spheres hit the floor hard. Inverted tetrahedra recover only in the right sphere.
 
-The left sphere tolerates inverted tetrahedra, as in the thesis (section 6.6). They are at rest in their
-mirrored shape, so the dent remains.
+The left sphere tolerates inverted tetrahedra, as in the thesis (section 6.6). Inverted tetrahedra are at rest
+in their mirrored shape, so the dent remains.
 """
 
 import numpy as np

@@ -18,7 +18,7 @@ from taichi_soft.render.film import Actor, Stage
 TOY = ASSETS / "elephant.glb"
 HEIGHT = 0.5  # height of the toy in its file [m]
 CELLS = 8  # cells of the cages along their longest side
-DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all toys: density [kg/m^3], Poisson's ratio, damping ratio
+DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # density [kg/m^3], Poisson's ratio, damping ratio
 STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # number of steps, and their height, depth and width [m]
 STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, lowest step first
 THICKNESS = 0.01  # contact thickness of the bodies [m]

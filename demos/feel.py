@@ -1,6 +1,6 @@
 """Three puddings wobble on a jerked tray. Each pudding has its requested sag, frequency and settling time.
 
-After the same jerk, the left pudding shivers briefly, and the right one sways for seconds.
+After the same jerk, the left pudding shivers briefly, and the right pudding sways for seconds.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ WISHES = (
 [s]."""
 
 PROFILE = ((0.0, 0.0), (0.50, 0.0), (0.52, 0.05), (0.40, 0.45), (0.36, 0.52), (0.28, 0.55), (0.0, 0.55))
-"""Radius and height of the profile [m]."""
+"""Radius and height of each corner of a pudding's profile [m]."""
 
 CELLS, DENSITY, POISSON = 9, 300.0, 0.4
 SPACE = 1.5  # distance between the centres of puddings [m]

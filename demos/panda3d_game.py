@@ -100,7 +100,7 @@ class Game(ShowBase):
         return look
 
     def draw(self, node: core.NodePath) -> core.NodePath:
-        """Add a node to those drawn in every frame, and return it."""
+        """Draw a node in every frame from now on, and return the node."""
         node.reparent_to(self.render)
         self.task.nodes.append(node)
         return node
@@ -143,8 +143,8 @@ class Game(ShowBase):
     def play(self, pictures: list[str]) -> None:
         """Write up to three images, with 1 s of play before each.
 
-        A toy falls before the first image. It is pulled up before the second one, while another toy falls.
-        The third image shows debug lines.
+        Before the first image, a toy falls. Before the second image, the toy is pulled up while another toy
+        falls. The third image shows debug lines.
         """
         clock, spot = core.ClockObject.get_global_clock(), core.LPoint2()
         clock.mode, clock.dt = core.ClockObject.M_non_real_time, DT

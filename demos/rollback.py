@@ -29,7 +29,7 @@ Keys = tuple[float, float, float]
 
 
 def make_world() -> World:
-    """Make an arena with the two players' bodies and four free ones."""
+    """Make an arena with the two players' bodies and four free bodies."""
     world = World(friction=0.3)
     reach = (ROOM + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -112,7 +112,7 @@ _NONE: Keys = (0.0, 0.0, 0.0)
 
 
 class Match:
-    """Both machines and the slow connection between them."""
+    """Two machines and the slow connection between them."""
 
     def __init__(self, worlds: tuple[World, World]) -> None:
         """Start before the first tick."""

@@ -22,8 +22,8 @@ from taichi_soft.core.threads import one_thread
 class EngineAdapter:
     """Runs a built world in fixed steps at any frame rate, and interpolates the positions to draw.
 
-    While an adapter is in use, only the adapter must step and restore its world, because `alpha` and `time`
-    count its steps. Only one thread at a time can call it, as for a world.
+    While an adapter is in use, no other code must step or restore its world, because `alpha` and `time` count
+    the adapter's steps. Only one thread at a time can call an adapter, as for a world.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -35,7 +35,7 @@ class EngineAdapter:
         fixed_step: length of a step, its substeps, and the largest number of steps per frame.
         before_step: function that the adapter calls with the world before every fixed step. Move colliders
             and frames, apply forces and grab here, so that the result does not depend on the frame rate.
-        rewind_ticks: number of steps that `rewind` can go back; 0 stores none.
+        rewind_ticks: largest number of steps that `rewind` can undo; 0 turns `rewind` off.
         budget_ms: time budget of a fixed step including changes of level [ms]. If steps take longer, bodies
             with levels of detail get coarser, the farthest first (see `see_from`). If that is not enough, the
             farthest bodies skip steps. When steps take less time again, the adapter reverts these changes.
@@ -94,7 +94,7 @@ class EngineAdapter:
 
     @property
     def alpha(self) -> float:
-        """Interpolation factor between the previous step and the last one, at least 0 and below 1."""
+        """Interpolation factor between the states before (0) and after (1) the last step; always below 1."""
         return self._accumulator.alpha
 
     @property
@@ -244,8 +244,8 @@ class EngineAdapter:
         return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Read the positions of a body, interpolated between the previous step and the last one, float32
-        (n, 3) [m].
+        """Read the positions of a body, interpolated between the states before and after the last step,
+        float32 (n, 3) [m].
 
         Args:
             body: body of this adapter's world.
@@ -261,8 +261,8 @@ class EngineAdapter:
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Read positions [m] and normals of a render mesh, interpolated between the previous step and the
-        last one, float32 (k, 3) each.
+        """Read positions [m] and normals of a render mesh, interpolated between the states before and after
+        the last step, float32 (k, 3) each.
 
         Args:
             mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; or a body, for the

@@ -71,7 +71,7 @@ class Budget:
         self._viewer: NDArray[np.float64] | None = None
         self._costs: deque[float] = deque(maxlen=REMEMBERED)  # cost of a tetrahedron in recent steps [s]
         self._spread: deque[float] = deque(maxlen=SPREAD)  # ratio of each cost to the median before it
-        self._load = 0  # tetrahedra that move in the next step, or moved in the last one
+        self._load = 0  # number of tetrahedra that move in the next step, or moved in the last step
         self._calm = 0  # steps since a reduction or an attempt to raise levels
         self._waits = 0  # steps until the next attempt to lower levels
         self._skips = Skips(world, self._from_near)

@@ -66,8 +66,8 @@ class RollbackSession:
         delay: ticks until an own input takes effect, 0 to `ticks`. A larger delay shortens rewinds and
             increases input latency.
         hash_every: ticks between comparisons of hashes, 1 to 10000.
-        patience: largest number of consecutive `advance` calls that wait for another player. Further calls
-            raise an error.
+        patience: number of consecutive `advance` calls that make no tick, after which `advance` raises an
+            error.
     Raises: OptionError for an argument out of range; StateError if the world is not built.
     Example:
         session = RollbackSession(world, lambda inputs: None, player=0, input_size=1)
@@ -110,13 +110,13 @@ class RollbackSession:
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
         self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
         self._heard = [first] * self._players  # per player, the first tick without a known input
-        self._acknowledged = [first] * self._players  # per player, first of our inputs that is missing there
+        self._acknowledged = [first] * self._players  # per player, first own input that it has not received
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
         self._hashes: dict[int, int] = {}  # own hashes, by tick
         self._their_hashes: dict[tuple[int, int], int] = {}  # hashes still to compare, by tick and player
-        self._newest = [first] * self._players  # per player, tick of its newest message
+        self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
         self._waits = 0
         self._rollbacks = self._longest_rewind = 0
@@ -208,8 +208,8 @@ class RollbackSession:
         return missing
 
     def message(self) -> bytes:
-        """Return a datagram for all other machines. Send one after each call of `advance`, even if it
-        returned False."""
+        """Return a datagram for all other machines. Send a datagram after each call of `advance`, even if the
+        call returned False."""
         first, end = min(self._acknowledged[each] for each in self._others), self._heard[self._player]
         own = [self._inputs[self._player][tick] for tick in range(first, end)]
         # Leave out hashes of states that a rewind or a late input can still change.

@@ -75,7 +75,7 @@ class BulletCoupling:
 
     Args:
         world: world of the soft bodies.
-        bullet_world: a BulletWorld. No other code must step it.
+        bullet_world: a BulletWorld. No other code must step this world.
     Raises: OptionError for other arguments.
     """
 
@@ -100,7 +100,7 @@ class BulletCoupling:
         Args:
             path: NodePath of a BulletRigidBodyNode that is attached to the Bullet world.
             friction, restitution, thickness: see `add_colliders`.
-        Returns: the colliders of its shapes.
+        Returns: the colliders of the body's shapes.
         Raises: as `add_colliders`; OptionError if the node is of another type or was already added.
         """
         node = path.node()

@@ -27,7 +27,7 @@ export interface SessionOptions {
   delay?: number;
   /** Number of ticks between comparisons of hashes. */
   hashEvery?: number;
-  /** Largest number of consecutive `advance` calls that wait for another player. Further calls throw an error. */
+  /** Number of consecutive `advance` calls that make no tick, after which `advance` throws an error. */
   patience?: number;
 }
 

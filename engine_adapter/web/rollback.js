@@ -24,7 +24,7 @@ export class Rollback {
   #world;
   #ticks;
   #snapshots = new Map(); // by step count, ascending
-  #restoreCount; // the world's count when the snapshots were stored
+  #restoreCount; // `restoreCount` of the world when the snapshots were stored
 
   constructor(world, ticks) {
     this.#world = world;
@@ -32,7 +32,7 @@ export class Rollback {
     this.#restoreCount = world.restoreCount;
   }
 
-  /** Step counts that `rewindTo` can restore, ascending. */
+  /** Step counts that `rewindTo` can restore, in ascending order. */
   get steps() {
     return this.#isPast ? [...this.#snapshots.keys()] : [];
   }
@@ -42,7 +42,7 @@ export class Rollback {
     return this.#restoreCount === this.#world.restoreCount;
   }
 
-  /** Store the current state. Call this between a step and the inputs of the next one. */
+  /** Store the current state. Call this between a step and the inputs of the next step. */
   save() {
     if (!this.#isPast) {
       this.#snapshots.clear();
@@ -97,7 +97,7 @@ export class RollbackSession {
   #inputs; // known inputs, by player and tick
   #used = new Map(); // inputs with which each tick was made
   #heard; // by player, the first tick without a known input
-  #acknowledged; // by player, the first of our inputs that is missing there
+  #acknowledged; // by player, the first own input that the player has not received
   #wrong = null; // first tick with a wrong prediction
   #hashes = new Map(); // own hashes, by tick
   #theirHashes; // hashes still to compare, by player and tick
@@ -221,7 +221,7 @@ export class RollbackSession {
     return missing;
   }
 
-  /** Return a datagram for all other machines. Send one after each call of `advance`, even if it returned false. */
+  /** Return a datagram for all other machines. Send it after each call of `advance`, even if that returned false. */
   message() {
     const { player, players, inputSize, ticks, hashEvery } = this.#settings;
     const first = Math.min(...this.#others.map((each) => this.#acknowledged[each]));

@@ -33,7 +33,7 @@ export class Scene {
   };
   /** Create a world in the exported state. */
   createWorld(): World;
-  /** Free the scene after the last of its worlds is destroyed. */
+  /** Release the scene. Its memory is freed when the last of its worlds is destroyed. */
   unload(): void;
 }
 
@@ -169,7 +169,7 @@ export class Body {
    * `release` is true; otherwise the call fails.
    */
   setLevel(level: number, how?: { release?: boolean }): void;
-  /** Return the vertex positions [m], interpolated between the previous step (alpha 0) and the last step (alpha 1). */
+  /** Return the vertex positions [m], interpolated between before (alpha 0) and after (alpha 1) the last step. */
   positions(alpha?: number): Float32Array;
   /** Return the mesh with a number or name, or the first mesh of the body's asset and level. Call this only once. */
   mesh(name?: string | number | null): Mesh;
@@ -183,7 +183,7 @@ export class Body {
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
   /** Apply an impulse [N s] to the vertices within `radius` [m] of a point. */
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
-  /** Set the factor on gravity for this body. */
+  /** Set the factor by which gravity is multiplied for this body. */
   setGravityScale(scale: number): void;
   /** Set the Coulomb coefficient for contact with other bodies. The world must have soft contact. */
   setFriction(friction: number): void;

@@ -270,7 +270,7 @@ export class Scene {
     return new World(this);
   }
 
-  /** Free the scene after the last of its worlds is destroyed. */
+  /** Release the scene. Its memory is freed when the last of its worlds is destroyed. */
   unload() {
     this.native.call("ts_scene_unload", this.handle);
   }
@@ -664,7 +664,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** Return the vertex positions [m], interpolated between the previous step (alpha 0) and the last step (alpha 1). */
+  /** Return the vertex positions [m], interpolated between before (alpha 0) and after (alpha 1) the last step. */
   positions(alpha = 1) {
     const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {

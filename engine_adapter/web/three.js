@@ -20,7 +20,7 @@ export class SoftMesh {
     if (this.drawn.uv) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(this.drawn.uv), 2));
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(this.drawn.triangles), 1));
     this.mesh = new THREE.Mesh(geometry, material);
-    this.mesh.frustumCulled = false; // three.js would use the bounding box of the first frame
+    this.mesh.frustumCulled = false; // three.js would compute the bounds only once
   }
 
   /** Update the mesh with the current shape of the body. */

@@ -59,7 +59,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
 
 @dataclass
 class BodyEntry:
-    """A body of a manifest, which will occupy a slot."""
+    """Entry of a manifest for a body that will occupy a slot."""
 
     serial: int
     first_step: int

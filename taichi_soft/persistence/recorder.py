@@ -197,8 +197,8 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
     """Read a file that a web page saved. Return content and snapshot as in `read_recording`.
 
-    The file contains a recording, and the visitor's entries. They replace all entries of the recording from
-    its first step on.
+    The file contains a recording, and the visitor's entries. The visitor's entries replace all entries of the
+    recording from its first step on.
     """
     try:
         played = json.loads(data)

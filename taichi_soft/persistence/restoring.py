@@ -20,7 +20,7 @@ from taichi_soft.solver.state import State
 
 
 def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
-    """Set the time and the bodies of a world from a manifest, without fields and slices. This cannot fail."""
+    """Set the time and the bodies of a world from a manifest, without fields and slices. Never raises."""
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings

@@ -28,7 +28,7 @@ RELAXED = (
 thread that loads the library, and scipy's trees would then crash the process."""
 
 FLAGS = ("-O3", "-march=native", *RELAXED, "-shared", "-fPIC", "-std=c++17")
-"""Compiler options. As Taichi does, they compile for this processor and with relaxed rounding."""
+"""Compiler options. Like Taichi's kernels, the code is for this processor and uses relaxed rounding."""
 
 NO_FLOOR = -1.0e9
 

@@ -81,7 +81,7 @@ def _spheres(
     damping_ratio: float = 0.0,
     **options: Any,
 ) -> World:
-    """Make spheres in a row, with centres at `height` [m]."""
+    """Make a grid of spheres with centres at `height` [m]."""
     world = bare_world(**options)
     material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
@@ -174,8 +174,8 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
     """Drop 32 spheres into a pit and time their steps at rest.
 
-    First, only steps of the heap are timed, as in a game with one world. Then they alternate with steps of
-    the same number of free spheres, which evict the heap from the CPU's caches."""
+    First, only steps of the heap are timed, as in a game with one world. Then steps of the heap alternate
+    with steps of as many free spheres, which evict the heap from the CPU's caches."""
     world = bare_world(collider_room=8, soft_contact=True)
     free = bare_world(floor=None)
     for side in (-1, 1):

@@ -44,7 +44,7 @@ fits."""
 
 @dataclass(frozen=True)
 class KeptBudget:
-    """Times of the same bodies, without a budget or with one."""
+    """Times of one of the runs, see `measure_kept_budget`."""
 
     budget: float  # budget [ms]; in a run without a budget, only for comparison
     is_kept: bool  # True if the run had a budget
@@ -61,9 +61,9 @@ class KeptBudget:
     frames_with_changes: int
     skipped: float  # fraction of steps that bodies skipped
     levels: dict[int, int]  # number of bodies by final level
-    levels_in_order: tuple[int, ...]  # level of each body
+    levels_in_order: tuple[int, ...]  # final level of each body
     tets: int  # number of tetrahedra at the end
-    frozen: int  # bodies that became non-finite
+    frozen: int  # number of bodies that became non-finite
     stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 

@@ -31,7 +31,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Scaling:
-    """Time of a step of 64 spheres, on one thread and on several [ms]."""
+    """Time of a step of 64 spheres, on one thread and on several threads [ms]."""
 
     substeps: int
     threads: int

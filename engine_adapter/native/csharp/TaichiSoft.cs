@@ -441,9 +441,9 @@ namespace TaichiSoft
         public long Steps;
         /// <summary>Simulated time [s].</summary>
         public double Time;
-        /// <summary>Interpolation between the previous step and the last one, 0 to 1.</summary>
+        /// <summary>Interpolation factor between the states before (0) and after (1) the last step.</summary>
         public double Alpha;
-        /// <summary>Total time dropped because frames were too long [s].</summary>
+        /// <summary>Total time that was dropped because frames were too long [s].</summary>
         public double Dropped;
     }
 
@@ -1096,8 +1096,8 @@ namespace TaichiSoft
             Check(Native.ts_body_set_level(World.Handle, Id, level, release ? 1 : 0));
         }
 
-        /// <summary>Reads the positions of all vertices, 3 numbers each, interpolated between the previous step (alpha
-        /// 0) and the last step (alpha 1).</summary>
+        /// <summary>Reads the positions of all vertices, 3 numbers each, interpolated between the states before (alpha
+        /// 0) and after (alpha 1) the last step.</summary>
         public void ReadPositions(double alpha, float[] positions)
         {
             Check(Native.ts_body_positions(World.Handle, Id, alpha, positions, Native.Length(positions)));
@@ -1163,7 +1163,7 @@ namespace TaichiSoft
             Check(Native.ts_body_impulse_at(World.Handle, Id, ref impulse, ref point, radius));
         }
 
-        /// <summary>Sets the factor on the world's gravity for this body.</summary>
+        /// <summary>Sets the factor by which the world's gravity is multiplied for this body.</summary>
         public void SetGravityScale(double scale)
         {
             Check(Native.ts_body_set_gravity_scale(World.Handle, Id, scale));

@@ -61,9 +61,9 @@ typedef uint64_t ts_scene; /* a world file in memory; 0 is none */
 typedef uint64_t ts_world; /* a running instance of a scene */
 typedef uint64_t ts_body;  /* the body in a slot; a later body in the slot has a different handle. After
                             * ts_world_restore, repeated calls return the same handles again */
-typedef uint64_t ts_grab;  /* a grab of a body; its handle is unique in the same way */
-typedef uint64_t ts_joint; /* a joint between two bodies; its handle is unique in the same way */
-typedef uint64_t ts_motor; /* a motor on a part of a body; its handle is unique in the same way */
+typedef uint64_t ts_grab;  /* a grab of a body; handles follow the same rules as ts_body */
+typedef uint64_t ts_joint; /* a joint between two bodies; handles follow the same rules as ts_body */
+typedef uint64_t ts_motor; /* a motor on a part of a body; handles follow the same rules as ts_body */
 
 /* Kinds of named objects. The number of a TS_BODY is its slot. */
 enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4, TS_JOINT = 5, TS_MOTOR = 6 };
@@ -139,7 +139,7 @@ typedef struct ts_clock {
   int32_t steps_made; /* number of steps that the last ts_world_advance made */
   int64_t steps;      /* total number of steps */
   double time;        /* simulated time [s] */
-  double alpha;       /* interpolation between the previous step and the last one, 0 to 1 */
+  double alpha;       /* interpolation factor between the states before (0) and after (1) the last step */
   double dropped;     /* total dropped time [s] */
 } ts_clock;
 
@@ -148,8 +148,8 @@ typedef void (*ts_before_step)(ts_world world, void* user);
 
 /* A job of a step. A job can wait for jobs of the same step with lower numbers. */
 typedef void (*ts_job)(void* closure, int32_t number);
-/* Function of the host's job system. It must call job(closure, number) for each number from 0 to count - 1, start the
- * calls in this order on any number of threads, and return when all calls have ended. One thread is enough. */
+/* Function of the host's job system. The function must call job(closure, number) for each number from 0 to count - 1.
+ * It must start the calls in this order, on one or more threads, and return when all calls have ended. */
 typedef void (*ts_run_jobs)(void* user, int32_t count, ts_job job, void* closure);
 
 /* Create a world in the exported state. Worlds of one scene share kernels, but each world has its own memory. */
@@ -241,8 +241,8 @@ TS_API ts_result ts_body_set_level(ts_world world, ts_body body, int32_t level, 
 TS_API ts_result ts_body_get_level(ts_world world, ts_body body, int32_t* level);
 /* Number of vertices at the body's level. */
 TS_API ts_result ts_body_get_vertex_count(ts_world world, ts_body body, int32_t* count);
-/* Positions of the body's vertices, 3 numbers each, interpolated between the previous step (alpha 0) and the last step
- * (alpha 1). */
+/* Positions of the body's vertices, 3 numbers each, interpolated between the states before (alpha 0) and after (alpha
+ * 1) the last step. */
 TS_API ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count);
 /* Positions and unit normals for drawing, 3 numbers per vertex each. After ts_world_advance, both are interpolated by
  * `alpha` of ts_clock. After ts_world_step, both are from the last step. `normals` can be null. */
@@ -299,7 +299,7 @@ TS_API ts_result ts_grab_release(ts_world world, ts_grab grab);
 /* Force of the grab in the last substep [N, in Unreal kg cm/s^2]. */
 TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]);
 
-/* ---- joints and motors, in worlds with contact. They are removed together with their body ---- */
+/* ---- joints and motors, in worlds with contact; removed together with their body ---- */
 
 /* Attach vertices of a body to the body `other`. If `onto` is null, the vertices are attached at their current
  * positions in `other`; otherwise `onto` lists a vertex of `other` for each. A world has at most 64 joints with 2,048

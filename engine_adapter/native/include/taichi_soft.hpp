@@ -258,7 +258,7 @@ class World {
   void set_velocity(Body body, const Vector& linear, const Vector& spin = {}) {
     check(ts_body_set_velocity(handle_, body.handle, linear.data(), spin.data()));
   }
-  // Applies an impulse to all vertices, or to those in a list.
+  // Applies an impulse to the vertices in a list; an empty list means all vertices.
   void apply_impulse(Body body, const Vector& impulse, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_apply_impulse(handle_, body.handle, impulse.data(), vertices.data(), vertices.size()));
   }
@@ -270,7 +270,7 @@ class World {
   void attach(Body body, const std::vector<int32_t>& vertices, int32_t frame, bool feels = false) {
     check(ts_body_attach(handle_, body.handle, vertices.data(), vertices.size(), frame, feels ? 1 : 0));
   }
-  // Detaches all attached vertices, or those in a list.
+  // Detaches the vertices in a list; an empty list means all attached vertices.
   void detach(Body body, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_detach(handle_, body.handle, vertices.data(), vertices.size()));
   }

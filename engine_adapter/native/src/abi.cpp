@@ -1,4 +1,4 @@
-// The functions of taichi_soft.h. Each checks its arguments, locks the world and catches all exceptions.
+// The functions of taichi_soft.h. Each function checks its arguments, locks the world and catches all exceptions.
 
 #include <algorithm>
 #include <cstring>

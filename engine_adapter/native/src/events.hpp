@@ -16,7 +16,7 @@ namespace taichi_soft {
 using Pair = std::array<int32_t, 3>;  // slot of a body; kind of the other object; slot or number of the other object
 
 struct Contact {    // current contact
-  ts_body a, b;     // b is 0 for a collider
+  ts_body a, b;     // b is 0 if a touches a collider
   uint32_t serial;  // serial number of the collider
   int32_t slot, kind, other;
   double began, touched, pause;  // start of the first step, end of the last step, time since the last impulse [s]
@@ -25,8 +25,8 @@ struct Contact {    // current contact
 
 // Bodies and colliders that exist after a step.
 struct Present {
-  std::vector<ts_body> bodies;      // by slot, 0 for an empty slot
-  std::vector<uint32_t> colliders;  // serial numbers, 0 for none
+  std::vector<ts_body> bodies;      // body in each slot; 0 for an empty slot
+  std::vector<uint32_t> colliders;  // serial number of each collider; 0 for an empty row
 };
 
 class Events {

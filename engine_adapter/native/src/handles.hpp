@@ -11,7 +11,7 @@
 namespace taichi_soft {
 
 // Reference to an object during a call. In WebAssembly the reference is a raw pointer, because a refused call runs no
-// destructors. This is safe, because WebAssembly has only one thread.
+// destructors. The raw pointer is safe, because WebAssembly has only one thread.
 #if defined(__wasm__)
 template <typename Thing>
 using Kept = Thing*;
@@ -50,7 +50,7 @@ class Handles {
     return row_of(handle).thing;
   }
 
-  // Removes a handle. Running calls keep the object until they end.
+  // Removes a handle. The object exists until all running calls that use it have ended.
   std::shared_ptr<Thing> remove(uint64_t handle) {
     const Guard lock(mutex_);
     return std::move(row_of(handle).thing);

@@ -52,7 +52,7 @@ class Machine {
   static Argument array(const Buffer& buffer, uint32_t rows, uint32_t width = 0) {
     return array(buffer.data(), rows, width);
   }
-  // Returns: the kernel's return value, if it has one.
+  // Runs a kernel. Returns: the kernel's return value, if the kernel has one.
   float launch(const char* kernel, const std::vector<Argument>& arguments);
 
   Threads threads;

@@ -290,7 +290,7 @@ class World {
   std::vector<float> present_, coming_;  // poses of frames after the last and the next step, (f, 12): rotation by
                                          // rows, then position
   std::vector<unsigned char> frame_alive_;
-  std::vector<int32_t> levels_;             // level of detail in each slot, even in empty ones
+  std::vector<int32_t> levels_;             // level of detail in each slot, even in empty slots
   std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser level represent
   std::vector<int32_t> attachments_;        // attachment of each particle, or 0
   std::vector<unsigned char> feels_;        // 1 for each particle whose load on a frame is reported
@@ -300,7 +300,7 @@ class World {
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
   int32_t steps_left_ = 0;  // steps that remain in the current frame
-  double picture_ = 1.0;    // interpolation factor from the previous step to the last one
+  double picture_ = 1.0;    // interpolation factor between before (0) and after (1) the last step
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;

@@ -1,4 +1,4 @@
-// Events: reads contacts and sleep from the fields.
+// Reads contacts and the status of bodies from the fields, for events.
 
 #include <algorithm>
 

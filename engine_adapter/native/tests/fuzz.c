@@ -73,7 +73,7 @@ static ts_body any_body(ts_world world) {
   return found;
 }
 
-static ts_grab any_grab(ts_world world) { /* a current grab, an earlier one, or one of another world */
+static ts_grab any_grab(ts_world world) { /* a current grab, an earlier grab, or a grab of another world */
   static ts_grab known[16];
   ts_grab found = 0;
   if (bad(15)) return next();

@@ -1,4 +1,4 @@
-// Player of the network sample in Node.js, with a WebAssembly world. It does the same as `player.py`.
+// Player of the network sample in Node.js, with a WebAssembly world. The program does the same as `player.py`.
 //
 //     node player.mjs FOLDER --port N --ticks N [--fast]
 

@@ -424,8 +424,8 @@ func _set_step(delta: float) -> bool:
     if native.set_fixed_step(delta, substeps, 1) == null:
         return false
     _dt = delta
-    # Drawn positions are interpolated by alpha between the previous step and the last one. Adding nearly a step of time
-    # here keeps alpha close to 1, so that soft bodies are drawn after the last step, like Godot's own bodies.
+    # Drawn positions are interpolated between the states before (alpha 0) and after (alpha 1) the last step. Adding
+    # nearly a step of time here keeps alpha close to 1, so that soft bodies are drawn in step with Godot's own bodies.
     return native.advance(NEARLY * delta) != null
 
 
