@@ -110,7 +110,7 @@ class RollbackSession:
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
         self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
         self._heard = [first] * self._players  # per player, the first tick without a known input
-        self._acknowledged = [first] * self._players  # per player, first own input that it has not received
+        self._acknowledged = [first] * self._players  # per player, first own input not yet received there
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction

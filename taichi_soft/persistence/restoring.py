@@ -33,7 +33,7 @@ def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
 
 
 def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEntry | None) -> None:
-    """Fill a slot with the body of an entry, or empty it for None."""
+    """Fill a slot with the body of `entry`. If `entry` is None, empty the slot."""
     present = context.slots.slots[slot]
     if present is not None and (entry is None or serial_of(present) != entry.serial):
         _remove(context, state, present)

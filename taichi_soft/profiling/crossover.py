@@ -25,7 +25,7 @@ class Crossover:
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:
-    """Time bodies of increasing size under both schedules, alternating."""
+    """Time bodies of increasing size under both schedules, in alternating runs."""
     found = []
     for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))
