@@ -1,7 +1,7 @@
-"""A soft bar hangs from a swinging plate: the game moves the plate and reads the load on it.
+"""A soft bar hangs from a swinging plate. The game moves the plate and reads the load on the plate.
 
-The bar is longest at the lowest point of each swing, where the load is largest. At both ends of the swing
-the load is less than its weight.
+The bar is longest at the lowest point of each swing, where the load is largest. At both ends of the swing,
+the load is smaller than the weight of the bar.
 """
 
 import numpy as np
@@ -77,7 +77,7 @@ def stage() -> Stage:
 
 
 def _turn(angle: float) -> NDArray[np.float64]:
-    """Return the rotation about y that swings the bar towards -x; `angle` in rad."""
+    """Return the rotation (3, 3) about y that swings the bar towards -x by `angle` [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
@@ -87,7 +87,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mean load along the rod over the last full swing, over the weight of the bar."""
+    """Return the mean load along the rod in the last full swing, divided by the weight of the bar."""
     swing = stage.act
     assert isinstance(swing, Swing)
     weight = float(swing.hold.body.masses.sum()) * GRAVITY_EARTH
@@ -96,7 +96,7 @@ def proof(stage: Stage) -> float:
 
 
 def period() -> float:
-    """Return the period of the swing [s], by Legendre's arithmetic-geometric mean."""
+    """Return the period of the swing [s], computed with Legendre's arithmetic-geometric mean."""
     a, b = 1.0, float(np.cos(WIDEST / 2))
     while a - b > 1e-12:
         a, b = (a + b) / 2, float(np.sqrt(a * b))

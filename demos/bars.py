@@ -1,6 +1,6 @@
-"""A complex object of bars falls on its corner, bends, and keeps vibrating after it lifts off (fig. 6.2).
+"""An object made of bars falls on its corner, bends, and keeps vibrating after it lifts off (fig. 6.2).
 
-The arms vibrate long after the impact, and the crossings of the bars turn red each time.
+The arms vibrate long after the impact. The crossings of the bars turn red each time the arms bend.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def _stress(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """Return the volume over the rest volume."""
+    """Return the ratio of the volume to the rest volume."""
     body = stage.actors[0].body
     return body.volume() / body.mesh.volume
 

@@ -1,6 +1,6 @@
-"""The thesis's sphere: 4 m^3 of E = 1 MPa fall from 7 m, at 700 steps per second (section 6.6).
+"""The thesis's sphere falls from 7 m (section 6.6): volume 4 m^3, E = 1 MPa, 700 steps per second.
 
-It flattens at the impact, and its shape oscillates between flat and long while it flies up again.
+The sphere flattens at the impact. While it flies up again, its shape oscillates between flat and long.
 """
 
 from engine_adapter import FixedStep
@@ -21,7 +21,7 @@ def stage() -> Stage:
         mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]), law="virial"
     )
     world.build()
-    # Near the floor, the sphere fills a quarter of the image; at the top, it still fits.
+    # The sphere fills a quarter of the image near the floor, and is still in view at the top.
     camera = Camera(eye=(1.1, -5.3, 1.2), target=(0.0, 0.0, 3.4), fov_degrees=82.0)
     step = FixedStep(dt=1 / 50, substeps=14)
     title = f"E = 1 MPa, falls {HEIGHT:g} m"

@@ -17,7 +17,7 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # contact thickness of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
-DRAG = 1.0  # damping rate [1/s]; without it, balls between others would keep rolling
+DRAG = 1.0  # damping rate [1/s], which stops balls that would roll between other bodies forever
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -48,7 +48,7 @@ def stage() -> Stage:
 
 
 def _bowl() -> trimesh.Trimesh:
-    """Make the lower half of a hollow ball with a round rim. Its origin is the centre of the opening."""
+    """Make the lower half of a hollow ball with a round rim. The origin is the centre of the opening."""
     angles = np.linspace(0, np.pi / 2, 25)
     outer = (RADIUS + WALL) * np.column_stack([np.sin(angles), -np.cos(angles)])
     inner = RADIUS * np.column_stack([np.sin(angles), -np.cos(angles)])[::-1]
@@ -58,7 +58,7 @@ def _bowl() -> trimesh.Trimesh:
 
 
 def proof(stage: Stage) -> float:
-    """Return the depth of the deepest vertex inside another body [m]; 0 if there is none."""
+    """Return the depth of the deepest vertex inside another body [m]; 0 if no vertex is inside."""
     depths = [
         near.distance
         for body in stage.world.bodies

@@ -1,6 +1,6 @@
-"""Soft bodies fall onto a rope bridge: it sags, swings, and carries them.
+"""Soft bodies fall onto a rope bridge, which sags, swings, and carries them.
 
-The planks stay straight, and the ropes between them bend: the bridge is one mesh of two materials.
+The bridge is one mesh of two materials: the planks stay straight, and the ropes between the planks bend.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ WIDTH, ROPE, THICKNESS = (
     1.7,
     0.12,
     0.12,
-)  # width of the bridge, width of its side ropes, thickness of both [m]
-EDGE = 0.16  # rise of the ropes towards the outside, so that nothing rolls off [m]
+)  # width of the bridge, width of its side ropes, thickness of planks and ropes [m]
+EDGE = 0.16  # height of the ropes' outer edges above the planks [m], so that nothing rolls off
 HEIGHT = 1.5  # height of the straight bridge [m]
 WOOD, HEMP = 1.5e6, 1.0e6  # Young's moduli of planks and ropes [Pa]
 SOFT = Material(young=3.0e4, poisson=0.3, density=400.0, damping_ratio=0.1)
-DRAG = 1.0  # damping rate of swinging [1/s]
+DRAG = 1.0  # damping rate of the bodies [1/s], so that the bridge stops swinging
 LENGTH = PLANKS * PLANK + (PLANKS - 1) * GAP
 STEP = FixedStep(dt=1 / 50)
 
@@ -94,8 +94,8 @@ def _bridge() -> TetMesh:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mean load on the ends in the last 2 s, over the weight of the bridge and all bodies
-    on it.
+    """Return the mean load on both ends in the last 2 s, divided by the weight of the bridge and all bodies
+    on the bridge.
     """
     carriers = stage.act
     assert isinstance(carriers, Carriers)

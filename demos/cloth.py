@@ -38,7 +38,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Return the largest length of a thread over its rest length."""
+    """Return the largest ratio of a thread's length to its rest length."""
     (actor,) = stage.actors
     mesh = actor.body.mesh
     threads = mesh.edge_lengths < 1.01 * SIDE / CELLS[0]

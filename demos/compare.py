@@ -1,7 +1,7 @@
-"""The same sphere under every law, with the cost of a step.
+"""Equal spheres fall, one for each force law; the legend shows the cost of a step.
 
-Laws on tetrahedra agree for small strains. In laws along edges, Poisson's ratio affects at most the volume.
-CMPM and its variants compute strain along each edge (thesis section 4.3).
+Laws with forces on tetrahedra agree for small strains. In laws with forces along edges, Poisson's ratio
+affects at most the volume. CMPM and its variants compute the strain along each edge (thesis section 4.3).
 """
 
 from functools import partial

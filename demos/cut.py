@@ -1,6 +1,7 @@
-"""A bar hangs from its upper end and is cut in two: the lower part falls and comes to rest on the floor.
+"""A bar hangs from its upper end and is cut in two. The lower part falls and comes to rest on the floor.
 
-The upper part springs up without the weight below it. Both parts have closed surfaces at the cut.
+The upper part springs up, because it no longer carries the lower part. Both parts have closed surfaces at the
+cut.
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ HEIGHT = 2.05  # initial height of the bar's centre [m]
 SEAM, SLOPE = (
     -0.3,
     0.1,
-)  # plane of the cut: height above the bar's centre at its axis [m], and slope
+)  # plane of the cut: height above the bar's centre, measured on the bar's axis [m], and slope
 CUT = np.array([0.0, 0.0, 1.53])  # point where the blade crosses the axis of the stretched bar [m]
 ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # direction of the blade's motion
 ASIDE = np.array([0.0, 1.0, 0.0])  # direction of the blade's edge
@@ -40,7 +41,7 @@ class Knife:
         self.start = blade.position.astype(np.float64)
         self.fallen: Body | None = None
         self.parted = 0.0  # time of the cut [s]
-        self.whole = self.below = 0.0  # mass of the bar and of its part below the blade at the cut [kg]
+        self.whole = self.below = 0.0  # mass of the bar, and mass below the blade at the time of the cut [kg]
 
     def __call__(self, world: World) -> None:
         """Move the blade before a step."""
@@ -107,7 +108,7 @@ def _flesh(color: Color) -> Paint:
 def _mass_below(body: Body) -> float:
     """Return the mass below the blade [kg].
 
-    A tetrahedron across the plane counts in proportion to its height below.
+    A tetrahedron that crosses the plane counts with the fraction of its height that is below the plane.
     """
     heights = np.sort((body.positions()[body.tets] - CUT) @ np.cross(ALONG, ASIDE), axis=1)
     share = np.clip(-heights[:, 0] / (heights[:, 3] - heights[:, 0]), 0.0, 1.0)
@@ -115,7 +116,7 @@ def _mass_below(body: Body) -> float:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mass of the fallen part over the mass below the blade at the cut."""
+    """Return the mass of the fallen part, divided by the mass below the blade at the time of the cut."""
     knife = stage.act
     assert isinstance(knife, Knife)
     assert knife.fallen is not None

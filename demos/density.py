@@ -1,4 +1,4 @@
-"""A block whose density increases to the right (fig. 6.3): its heavy side deforms most and rises last.
+"""A block that is denser on the right falls (fig. 6.3). Its heavy side deforms most and rises last.
 
 The light side is in the air while the heavy side is still compressed, so the block rotates as it rises. The
 heavy side rises least.

@@ -1,6 +1,7 @@
-"""A soft sphere hits the floor hard. Left: flips are tolerated, as in the thesis. Right: flips recover.
+"""Two soft spheres hit the floor hard. Inverted tetrahedra recover only in the right sphere.
 
-Tolerated inverted tetrahedra are at rest in their mirrored shape, so the dent stays (section 6.6).
+The left sphere tolerates inverted tetrahedra, as in the thesis (section 6.6). Inverted tetrahedra are at rest
+in their mirrored shape, so the dent remains.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """A cloth falls over a ball that moves back and forth, and friction carries it along.
 
-It hangs in folds around the ball, and its corners keep swinging when the ball reverses.
+The cloth hangs in folds around the ball. Its corners keep swinging when the ball reverses.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ class Mover:
 
 
 def _place(time: float) -> NDArray[np.float64]:
-    """Return the position of the ball's centre [m]; its motion starts smoothly."""
+    """Return the position of the ball's centre at a time, (3,) [m]. The motion starts smoothly."""
     since = max(time - BEGIN, 0.0)
     sway = REACH * min(since / PERIOD, 1.0) * np.sin(2.0 * np.pi * since / PERIOD)
     return np.array([sway, 0.0, HEIGHT])

@@ -1,6 +1,6 @@
-"""Toy elephants fall down steps and flap their ears: an artist's textured mesh on tetrahedral cages.
+"""Toy elephants fall down steps and flap their ears. Tetrahedral cages move an artist's textured mesh.
 
-Ears and trunks keep swinging after the body has landed, and the texture follows the skin.
+Ears and trunks keep swinging after a body has landed. The texture follows the skin.
 """
 
 import numpy as np
@@ -18,12 +18,12 @@ from taichi_soft.render.film import Actor, Stage
 TOY = ASSETS / "elephant.glb"
 HEIGHT = 0.5  # height of the toy in its file [m]
 CELLS = 8  # cells of the cages along their longest side
-DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all toys: density [kg/m^3], Poisson's ratio, damping ratio
+DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # density [kg/m^3], Poisson's ratio, damping ratio
 STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # number of steps, and their height, depth and width [m]
 STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, lowest step first
 THICKNESS = 0.01  # contact thickness of the bodies [m]
 DRAG = 0.8  # damping rate [1/s]
-STILL = 0.3  # speed below which a toy counts as resting [m/s]; they land at about 4 m/s
+STILL = 0.3  # speed below which a toy counts as resting [m/s]; toys land at about 4 m/s
 STEP = FixedStep(dt=1 / 200)  # short, so that retries after strong compression are cheap
 
 HERD = (
@@ -38,9 +38,9 @@ HERD = (
 
 
 def toy(height: float, dye: str) -> trimesh.Scene:
-    """Load the toy with a height [m], and recolour its cloth.
+    """Load the toy, scale it to a height [m], and recolour its cloth.
 
-    Pixels with more blue than red get their channels in the order of `dye`, such as "brg".
+    The colour channels of pixels with more blue than red are reordered to `dye`, such as "brg".
     """
     scene = trimesh.load_scene(TOY, process=False)
     for mesh in scene.geometry.values():
@@ -80,7 +80,7 @@ def stage() -> Stage:
 
 
 def ear_span(body: Body) -> float:
-    """Return the distance between the tips of the ears over the rest distance."""
+    """Return the ratio of the distance between the tips of the ears to their distance at rest."""
     rest, now = body.mesh.vertices, body.positions()
     x = rest[:, 0]
     left, right = x < 0.85 * x.min(), x > 0.85 * x.max()
@@ -89,7 +89,7 @@ def ear_span(body: Body) -> float:
 
 
 def ground_below(places: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the height of the step or the floor below positions (n, 3), (n,) [m]."""
+    """Return the height (n,) of the step or the floor below each position in `places`, (n, 3) [m]."""
     x, y, _ = places.T
     is_over = (np.abs(x) < WIDTH / 2) & (y < 0.0) & (y > -STEPS * TREAD)
     return np.where(is_over, RISE * np.ceil(STEPS + y / TREAD), 0.0)

@@ -1,6 +1,6 @@
-"""Three puddings on a tray that is jerked: each has the requested sag, frequency and settling time.
+"""Three puddings wobble on a jerked tray. Each pudding has its requested sag, frequency and settling time.
 
-After the same jerk, the left pudding shivers briefly, and the right one sways for seconds.
+After the same jerk, the left pudding shivers briefly, and the right pudding sways for seconds.
 """
 
 import numpy as np
@@ -17,10 +17,11 @@ WISHES = (
     {"sag": 0.030, "wobble_hz": 7.0, "settle_s": 1.0},
     {"sag": 0.055, "wobble_hz": 4.0, "settle_s": 3.0},
 )
-"""Requests: sag over height, frequency in free flight [Hz], settling time [s]."""
+"""Requests for each pudding: sag as a fraction of the height, frequency in free flight [Hz], settling time
+[s]."""
 
 PROFILE = ((0.0, 0.0), (0.50, 0.0), (0.52, 0.05), (0.40, 0.45), (0.36, 0.52), (0.28, 0.55), (0.0, 0.55))
-"""Radius and height of the profile [m]."""
+"""Radius and height of each corner of a pudding's profile [m]."""
 
 CELLS, DENSITY, POISSON = 9, 300.0, 0.4
 SPACE = 1.5  # distance between the centres of puddings [m]
@@ -30,7 +31,7 @@ STEP = FixedStep(dt=1 / 100)
 
 
 def stage() -> Stage:
-    """Make the stage: puddings on the tray, each of a material found for its request."""
+    """Make the stage: puddings on the tray, each with a material that meets its request."""
     pudding = trimesh.creation.revolve(np.array(PROFILE), sections=64)
     plain = Material(1e5, POISSON, DENSITY)
     cage = SoftBodyAsset.from_surface(pudding, plain, cells=CELLS)
@@ -56,7 +57,7 @@ def stage() -> Stage:
 
 
 class Jerk:
-    """Moves the tray there and back, and stores the materials of the puddings."""
+    """Moves the tray forwards and back, and stores the materials of the puddings."""
 
     def __init__(self, tray: Collider, feels: list[Feel]) -> None:
         self.tray, self.feels = tray, feels

@@ -37,7 +37,7 @@ STEP = FixedStep(dt=1 / 50)
 
 
 class Hand:
-    """Reaches for a body, lifts it, swings it, and releases it when its velocity carries it into the
+    """Reaches for a body, lifts it and swings it. Releases the body when its velocity will carry it into the
     crate.
     """
 
@@ -85,7 +85,7 @@ def _smooth(share: float) -> float:
 
 
 def _flies_into_crate(body: Body) -> bool:
-    """True if the body, released now, would pass the crate's centre above its rim."""
+    """True if a body that is released now would fly over the rim and past the centre of the crate."""
     share = body.masses / body.masses.sum()
     place, velocity = share @ body.positions(), share @ body.velocities()
     root = np.sqrt(max(velocity[2] ** 2 + 2.0 * GRAVITY_EARTH * (place[2] - HEIGHT), 0.0))

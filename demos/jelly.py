@@ -1,7 +1,7 @@
-"""A ball drops onto a stack of jelly blocks: they compress, wobble, and carry it.
+"""A ball drops onto a stack of jelly blocks, which compress, wobble, and carry the ball.
 
-The top block deforms first, and bulges. The impact then travels down through the others, and they push the
-ball up again.
+The top block deforms first, and bulges. The impact then travels down through the lower blocks, and the stack
+pushes the ball up again.
 """
 
 import numpy as np
@@ -65,7 +65,7 @@ def stage() -> Stage:
 
 
 def proof(stage: Stage) -> float:
-    """Return the mean load on the floor in the last second, over the total weight."""
+    """Return the mean load on the floor in the last second, divided by the total weight."""
     scale = stage.act
     assert isinstance(scale, Scale)
     weight = sum(float(body.masses.sum()) for body in stage.world.bodies) * GRAVITY_EARTH

@@ -15,7 +15,7 @@ from taichi_soft.render.film import Actor, Stage
 
 CELLS = (10, 6, 4)  # cells along a ball in each level, finest first
 DISTANCES = (10.3, 13.8)  # distances from the camera above which the second and the third level are used [m]
-HYSTERESIS = 0.5  # additional approach before a finer level is used [m]
+HYSTERESIS = 0.5  # distance below a limit in DISTANCES at which a ball returns to the finer level [m]
 JELLY = Material(young=3.0e4, poisson=0.4, density=200.0)
 RADIUS, COUNT = 0.5, 5
 SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # slope [rad], length and width [m] of the chute
@@ -54,7 +54,7 @@ def stage() -> Stage:
 
 
 class Choice:
-    """Chooses a level for each ball before every step, and records the levels that it had."""
+    """Chooses a level for each ball before every step, and records all levels that the ball has used."""
 
     def __init__(self, eye: NDArray[np.float64]) -> None:
         self.eye = eye
@@ -67,7 +67,7 @@ class Choice:
 
 
 def level_of(body: Body, eye: NDArray[np.float64]) -> int:
-    """Return the level for the distance from the camera, with hysteresis."""
+    """Return the level of detail for a body's distance from the camera, with hysteresis."""
     apart = float(np.linalg.norm(body.center_of_mass() - eye))
     coarser = sum(apart > each for each in DISTANCES)
     finer = sum(apart > each - HYSTERESIS for each in DISTANCES)
@@ -75,12 +75,12 @@ def level_of(body: Body, eye: NDArray[np.float64]) -> int:
 
 
 def paint(body: Body) -> NDArray[np.float32]:
-    """Return the colour of the body's level for all its vertices."""
+    """Return the colour of the body's level for each vertex, (n, 3)."""
     return np.tile(np.array(COLORS[body.level], dtype=np.float32), (body.vertex_count, 1))
 
 
 def proof(stage: Stage) -> float:
-    """Return the number of balls that had every level."""
+    """Return the number of balls that have used all levels."""
     assert isinstance(stage.act, Choice)
     return float(sum(levels == set(range(len(CELLS))) for levels in stage.act.seen.values()))
 

@@ -1,6 +1,6 @@
-"""Sixty-four soft spheres rain down: bodies run in parallel, one per CPU core at a time.
+"""Sixty-four soft spheres rain down. Each CPU core steps one sphere at a time, in parallel.
 
-They land at different times, and each deforms and bounces independently.
+The spheres land at different times, and each sphere deforms and bounces independently.
 """
 
 from engine_adapter import FixedStep

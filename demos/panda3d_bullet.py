@@ -1,4 +1,4 @@
-"""A game in Panda3D: rigid crates of Bullet fall onto a soft block. With a file name, only write an image."""
+"""Drop rigid crates of Bullet onto a soft block in Panda3D. If a file name is passed, only write an image."""
 
 import sys
 
@@ -30,7 +30,9 @@ soft.build()
 
 
 def step_bullet(soft):
-    """Apply the impulses of the last soft step to the crates. Colliders follow (docs/coupling.md)."""
+    """Apply the impulses of the last soft step to the crates, step Bullet, and move the colliders to the
+    crates. See docs/coupling.md.
+    """
     now = np.array([(collider.impulse, collider.angular_impulse) for _, collider in crates])
     for (crate, _), (impulse, angular) in zip(crates, 1.5 * now - 0.5 * last, strict=True):
         crate.node().set_active(True)

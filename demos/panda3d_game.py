@@ -1,7 +1,7 @@
 """A small game in Panda3D: toys fall onto a moving platform, and Bullet's crates onto a soft block.
 
 Mouse: grab soft bodies. Space: drop a toy. Arrows: rotate the camera. R: restart. D: debug lines. Escape:
-quit. `--headless A.png B.png C.png` plays automatically without a window, and writes images.
+quit. With `--headless A.png B.png C.png` the game plays automatically without a window, and writes images.
 """
 
 import argparse
@@ -25,7 +25,7 @@ KEYS = "mouse: grab   space: drop a toy   arrows: rotate   R: restart   D: debug
 
 
 class Game(ShowBase):
-    """The level, its motion and its controls."""
+    """The game: its level, the motion of the platform, and the controls."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -100,7 +100,7 @@ class Game(ShowBase):
         return look
 
     def draw(self, node: core.NodePath) -> core.NodePath:
-        """Add a node to those drawn in every frame, and return it."""
+        """Draw a node in every frame from now on, and return the node."""
         node.reparent_to(self.render)
         self.task.nodes.append(node)
         return node
@@ -141,7 +141,11 @@ class Game(ShowBase):
         self.camera.look_at(0, 0, 0.5)
 
     def play(self, pictures: list[str]) -> None:
-        """Play 1 s before each image: a toy falls; it is pulled up while another one falls; debug lines."""
+        """Write up to three images, with 1 s of play before each.
+
+        Before the first image, a toy falls. Before the second image, the toy is pulled up while another toy
+        falls. The third image shows debug lines.
+        """
         clock, spot = core.ClockObject.get_global_clock(), core.LPoint2()
         clock.mode, clock.dt = core.ClockObject.M_non_real_time, DT
         for number, picture in enumerate(pictures):

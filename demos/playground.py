@@ -1,4 +1,4 @@
-"""Soft bodies tumble through a course of all kinds of colliders, some of them moving, and end in a hollow.
+"""Soft bodies tumble through fixed and moving colliders of all kinds, and end in a hollow.
 
 Bodies squeeze between rods, paddles and each other, and recover their shapes afterwards.
 """
@@ -70,20 +70,22 @@ class Course:
 
 
 def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
-    """Return a rotation first about x, then about y [rad]. The second turns the x axis towards -z."""
+    """Return the matrix (3, 3) that rotates first about x, then about y [rad]. The rotation about y turns the
+    x axis towards -z.
+    """
     c, s, k, w = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, k, -w], [0, w, k]])
 
 
 def _funnel() -> trimesh.Trimesh:
-    """Make a cone with a hole and a wall of 16 cm."""
+    """Make a conical funnel with a hole and a wall of 16 cm."""
     inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.85, 1.55)])
     outer = inner + np.array([0.13, -0.1])
     return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
 
 
 def _ground() -> NDArray[np.float64]:
-    """Return the heights of a ring-shaped wall around a hollow, on a square of 6.8 m."""
+    """Return heights on a square grid with a side of 6.8 m: a ring-shaped wall around a hollow."""
     x, y = np.meshgrid(*2 * [np.linspace(-3.4, 3.4, 35)], indexing="ij")
     away = (np.hypot(x, y) - RIM) / 0.6
     return np.asarray(0.03 + 1.0 * np.exp(-(away**2)))

@@ -1,7 +1,7 @@
-"""Two machines play one game: each receives the other's inputs late, rewinds and repeats the steps.
+"""Two machines play one game. Each receives the other's inputs late, rewinds and repeats the steps.
 
-Each side of the image shows one machine. After a key press, the two differ for a few frames and then agree
-again.
+Each side of the image shows one machine. After a key press, the two sides differ for a few frames and then
+agree again.
 """
 
 from dataclasses import dataclass, field
@@ -25,11 +25,11 @@ PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # acceleration of a pressed key [m/s^2],
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 Keys = tuple[float, float, float]
-"""Input of a player in a tick: direction (x, y), and 1 to jump or 0."""
+"""Input of a player in a tick: direction (x, y), and 1 to jump, else 0."""
 
 
 def make_world() -> World:
-    """Make an arena with the two players' bodies and four free ones."""
+    """Make an arena with the two players' bodies and four free bodies."""
     world = World(friction=0.3)
     reach = (ROOM + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -48,21 +48,21 @@ def make_world() -> World:
 
 @dataclass
 class Machine:
-    """One player's machine: its world, the known inputs, and predictions for unknown ones."""
+    """One player's machine: its world, the known inputs, and predictions of unknown inputs."""
 
     player: int
     world: World
     known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # known inputs, by tick and player
-    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # inputs of both players, by tick
+    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # inputs with which each tick was made
     names: dict[int, str] = field(default_factory=dict)  # state hash before each tick
     rewinds: int = 0
-    wrong: int = 0  # number of ticks that began in another state when repeated
+    wrong: int = 0  # number of repeated ticks that began in a different state than before
 
     def __post_init__(self) -> None:
         self.rollback = Rollback(self.world, LATE + 1)
 
     def press(self) -> None:
-        """Choose the player's input for this tick from the current state: a chase with occasional jumps."""
+        """Choose the player's input for this tick: chase another body, and jump occasionally."""
         tick, me = self.world.step_count, self.player
         x, y, _ = self._keys(tick, me)
         if tick % (17 + 6 * me) == 0:
@@ -75,7 +75,7 @@ class Machine:
         self.known[tick, me] = (x, y, float(tick % (61 + 12 * me) == 40))
 
     def receive(self, tick: int, keys: Keys) -> None:
-        """Receive an input of the other player. If its prediction was wrong, repeat the ticks since then."""
+        """Receive the other player's input for a tick. If it was not predicted, repeat from that tick on."""
         self.known[tick, 1 - self.player] = keys
         if self.used[tick][1 - self.player] == keys:
             return
@@ -101,7 +101,7 @@ class Machine:
                 body.apply_impulse((0.0, 0.0, mass * JUMP))
 
     def _keys(self, tick: int, player: int) -> Keys:
-        """Return the known input, or predict that the other player repeats the last known one."""
+        """Return the known input of a player, or predict that the player repeats the last direction."""
         if (tick, player) in self.known:
             return self.known[tick, player]
         x, y, _ = self.known.get((tick - 1, player)) or self.used.get(tick - 1, (_NONE, _NONE))[player]
@@ -112,7 +112,7 @@ _NONE: Keys = (0.0, 0.0, 0.0)
 
 
 class Match:
-    """Both machines and the slow connection between them."""
+    """Two machines and the slow connection between them."""
 
     def __init__(self, worlds: tuple[World, World]) -> None:
         """Start before the first tick."""

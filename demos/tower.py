@@ -1,6 +1,6 @@
 """A ball on a rope swings into a tower of soft blocks and knocks it over.
 
-The ball dents the blocks that it hits; then the tower breaks in two, and its upper half topples.
+The ball dents the blocks that it hits. The tower then breaks in two, and its upper half topples.
 """
 
 import numpy as np
@@ -72,7 +72,7 @@ def stage() -> Stage:
 
 
 def _pose(angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the position [m] and the axes of the ball and the rope."""
+    """Return the position [m] of the ball and the axes of ball and rope, for an angle of the rope [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     place = np.array([ROPE * s, 0.0, TOP - ROPE * c])
     return place, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])

@@ -1,6 +1,7 @@
 """Soft wheels with motors at their hubs climb steps and brake at the top.
 
-The softest wheel has a large contact area and folds around the edge of each step; the stiffest rolls over it.
+The softest wheel has a large contact area and folds around the edge of each step. The stiffest wheel rolls
+over the edges.
 """
 
 import numpy as np
@@ -19,7 +20,7 @@ RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # radius and width of the wheels; radius of 
 SPEED, TORQUE = 3.0, 1500.0  # speed [rad/s] and largest torque [N m] of the motors
 LANE, ASIDE = 1.4, 0.3  # distance between wheels, and additional width of the steps on each side [m]
 RISE, TREAD, STEPS = 0.14, 0.9, 3  # height and depth of the steps [m], and their number
-FOOT, TOP = 1.4, 2.8  # start of the first step, and length of the last one [m]
+FOOT, TOP = 1.4, 2.8  # start of the first step, and length of the last step [m]
 GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # position at which the motors brake [m]
 BEGIN = 0.4  # start time of the motors [s]
 DRAG = 2.0  # damping rate of a braking wheel, which would otherwise rock about its hub [1/s]

@@ -14,7 +14,7 @@ __all__ = ["BudgetStatus", "EngineAdapter", "FixedStep", "Rollback", "RollbackSe
 if not TYPE_CHECKING:
 
     def __getattr__(name):
-        """Provide `GivenUp`, the deprecated name of `BudgetStatus`."""
+        """Return `BudgetStatus` for its deprecated name `GivenUp`."""
         if name != "GivenUp":
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         warn_renamed("engine_adapter.GivenUp", "engine_adapter.BudgetStatus")

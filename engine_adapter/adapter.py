@@ -22,8 +22,8 @@ from taichi_soft.core.threads import one_thread
 class EngineAdapter:
     """Runs a built world in fixed steps at any frame rate, and interpolates the positions to draw.
 
-    While an adapter is in use, only the adapter must step and restore its world, because `alpha` and `time`
-    count its steps. Only one thread at a time can call it, as for a world.
+    While an adapter is in use, no other code must step or restore its world, because `alpha` and `time` count
+    the adapter's steps. Only one thread at a time can call an adapter, as for a world.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -33,13 +33,13 @@ class EngineAdapter:
     Args:
         world: a built world.
         fixed_step: length of a step, its substeps, and the largest number of steps per frame.
-        before_step: called with the world before every fixed step. Move colliders and frames, apply forces
-            and grab here, so that the result does not depend on the frame rate.
-        rewind_ticks: number of steps that `rewind` can go back; 0 stores none.
+        before_step: function that the adapter calls with the world before every fixed step. Move colliders
+            and frames, apply forces and grab here, so that the result does not depend on the frame rate.
+        rewind_ticks: largest number of steps that `rewind` can undo; 0 turns `rewind` off.
         budget_ms: time budget of a fixed step including changes of level [ms]. If steps take longer, bodies
-            with levels of detail get coarser, the farthest first (see `see_from`), and if that is not enough,
-            the farthest bodies skip steps. Both are reverted when there is time. See `budget_status`. None
-            turns the budget off.
+            with levels of detail get coarser, the farthest first (see `see_from`). If that is not enough, the
+            farthest bodies skip steps. When steps take less time again, the adapter reverts these changes.
+            See `budget_status`. None turns the budget off.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
     Example:
@@ -94,15 +94,15 @@ class EngineAdapter:
 
     @property
     def alpha(self) -> float:
-        """Interpolation factor between the previous step and the last one, at least 0 and below 1."""
+        """Interpolation factor between the states before (0) and after (1) the last step; always below 1."""
         return self._accumulator.alpha
 
     @property
     def time(self) -> float:
         """Simulated time of the interpolated positions [s].
 
-        This time is one step behind the sum of all frame times. Before the first step it is the time of the
-        world.
+        This time is one step behind the sum of all frame times. Before the first step, `time` is the time of
+        the world.
         """
         return self._world.time - (1.0 - self.alpha) * self._world.last_dt
 
@@ -151,10 +151,10 @@ class EngineAdapter:
 
         Args:
             frame_dt: time since the last frame [s], 0 or more.
-        Returns: number of steps made, at most `max_steps`. Time for further steps is dropped, with the
-            fraction of a step that is left (see `dropped_time`).
-        Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; errors of
-            `step`. The time of the steps that were not made then counts as dropped.
+        Returns: number of steps made, at most `max_steps`. If more steps are due, all remaining time is
+            dropped (see `dropped_time`).
+        Raises: OptionError if `frame_dt` is negative or not finite, with nothing changed; errors of `step`.
+            After an error of `step`, the time of the steps that were not made counts as dropped.
         """
         seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
         steps, dropped = self._accumulator.put(seconds)
@@ -180,8 +180,7 @@ class EngineAdapter:
 
     @property
     def budget_status(self) -> BudgetStatus:
-        """Status of the budget: bodies with reduced detail or skipped steps, and whether steps fit the
-        budget.
+        """Return the bodies with reduced detail or skipped steps, and whether steps fit the budget.
 
         Raises: StateError without `budget_ms`.
         """
@@ -201,13 +200,13 @@ class EngineAdapter:
 
     @one_thread
     def rewind(self, steps: int) -> None:
-        """Go back `steps` steps, to the state before the inputs of the first of them.
+        """Undo the last `steps` steps and their inputs.
 
-        `alpha` does not change: repeat the steps with `step` and the corrected inputs, and drawing continues
-        at the same time.
+        Then repeat the steps with `step` and the corrected inputs. `alpha` does not change, so that drawing
+        continues at the same time.
         Args:
             steps: number of fixed steps, from 1 to `rewind_ticks`.
-        Raises: OptionError for more steps than `rewind_ticks`, or than were made since the last `restore`;
+        Raises: OptionError if `steps` exceeds `rewind_ticks` or the number of steps since the last `restore`;
             StateError without `rewind_ticks`.
         """
         if self._rollback is None:
@@ -218,15 +217,15 @@ class EngineAdapter:
         self._rollback.rewind_to(self._world.step_count - back)
 
     def snapshot(self) -> bytes:
-        """Return a state as `World.snapshot` does. It does not contain `alpha`."""
+        """Return the state of the world, see `World.snapshot`. The snapshot does not contain `alpha`."""
         return self._world.snapshot()
 
     @one_thread
     def restore(self, data: bytes) -> None:
-        """Restore a state as `World.restore` does. `alpha` becomes 0, and `rewind` cannot go back further.
+        """Restore a state, see `World.restore`. `alpha` becomes 0, and `rewind` cannot undo earlier steps.
 
         Args:
-            data: result of `snapshot`, from this world or one that was built the same way.
+            data: result of `snapshot`, from this world or from another world that was built the same way.
         Raises: as `World.restore`, with nothing changed.
         """
         self._world.restore(data)
@@ -245,14 +244,14 @@ class EngineAdapter:
         return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-        """Read the positions of a body, interpolated between the previous step and the last one, float32
-        (n, 3) [m].
+        """Read the positions of a body, interpolated between the states before and after the last step,
+        float32 (n, 3) [m].
 
         Args:
             body: body of this adapter's world.
             out: C-contiguous float32 array to fill and return; None allocates a new one.
-        Raises: OptionError if `out` does not fit or the body belongs to another world; StateError if it was
-            removed.
+        Raises: OptionError if `out` has the wrong shape or type, or the body belongs to another world;
+            StateError if the body was removed.
         """
         return self._world.read_positions(body, self._accumulator.alpha, out)
 
@@ -262,8 +261,8 @@ class EngineAdapter:
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Read positions [m] and normals of a render mesh, interpolated between the previous step and the
-        last one, float32 (k, 3) each.
+        """Read positions [m] and normals of a render mesh, interpolated between the states before and after
+        the last step, float32 (k, 3) each.
 
         Args:
             mesh: render mesh of a body of this adapter's world, see `Body.render_mesh`; or a body, for the

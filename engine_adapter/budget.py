@@ -1,4 +1,4 @@
-"""Keep a time budget for the steps of a world, by levels of detail and skipped steps."""
+"""Keep the steps of a world within a time budget, by lowering levels of detail and skipping steps."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
-"""Fractions of the budget for the expected time of a long step. Above TIGHT, detail is reduced until the time
-is below FULL. Detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
+"""Limits for the expected time of a long step, as fractions of the budget. Above TIGHT, detail is reduced
+until the time is below FULL. Detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
 
 REMEMBERED = 8
 """Number of recent steps whose median gives the cost of a tetrahedron. The median ignores interrupted
 steps."""
 
 SPREAD, LONG, LEAST_LONG, MOST_LONG = 240, 0.97, 1.15, 1.5
-"""The expected time of a long step is the quantile LONG of the last SPREAD steps, as a multiple of the
-median, clamped to [LEAST_LONG, MOST_LONG]. Without the upper limit, other programs that interrupt many steps
-would reduce detail too far."""
+"""The expected time of a long step is the median time multiplied by a factor. The factor is the quantile LONG
+of time divided by median in the last SPREAD steps, clamped to [LEAST_LONG, MOST_LONG]. Without this limit,
+other programs that interrupt many steps would reduce detail too far."""
 
 PATIENCE = 30
 """Number of steps without a reduction before levels are raised: 0.5 s of a game."""
@@ -35,7 +35,8 @@ TRY_AGAIN = 8
 """Number of steps to wait after a search found no level to lower, because the search itself takes time."""
 
 CHANGING = 0.25
-"""Largest fraction of the budget that changes of level before a step can use. At least one change is made."""
+"""Fraction of the budget after which no further level is changed before a step. The first change is always
+made."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class BudgetStatus:
 
 @dataclass
 class _Decision:
-    """Levels to set and bodies that skip, for one step, by handle number."""
+    """Decision for one step: levels to set, and bodies that skip the step, by handle number."""
 
     levels: list[tuple[int, int]]
     skipping: list[int]
@@ -60,7 +61,8 @@ class Budget:
     """Keeps steps within a time budget.
 
     If steps take too long, the budget lowers the levels of the farthest bodies. If that is not enough or
-    takes effect too late, the farthest bodies skip steps. Both are reverted in reverse order."""
+    takes effect too late, the farthest bodies skip steps. If steps take less time again, the budget undoes
+    these changes in reverse order."""
 
     def __init__(self, world: World, milliseconds: float) -> None:
         """Set the budget [ms]. Raises: OptionError for a number that is not above 0."""
@@ -69,13 +71,13 @@ class Budget:
         self._viewer: NDArray[np.float64] | None = None
         self._costs: deque[float] = deque(maxlen=REMEMBERED)  # cost of a tetrahedron in recent steps [s]
         self._spread: deque[float] = deque(maxlen=SPREAD)  # ratio of each cost to the median before it
-        self._load = 0  # tetrahedra that move in the next step, or moved in the last one
+        self._load = 0  # number of tetrahedra that move in the next step, or moved in the last step
         self._calm = 0  # steps since a reduction or an attempt to raise levels
         self._waits = 0  # steps until the next attempt to lower levels
         self._skips = Skips(world, self._from_near)
-        self._decided: dict[int, _Decision] = {}  # choices, by step count
-        self._newest = -1  # newest step with a choice
-        self._before: bytes | None = None  # state before the current choice, to revert to
+        self._decided: dict[int, _Decision] = {}  # decisions, by step count
+        self._newest = -1  # newest step with a decision
+        self._before: bytes | None = None  # state before the current decision, which `revert` restores
 
     def see_from(self, viewer: ArrayLike) -> None:
         """Set the point from which distances are measured, (3,) [m]."""
@@ -99,10 +101,10 @@ class Budget:
             self._costs.append(cost)
 
     def prepare(self, ticks: int) -> None:
-        """Choose levels and skipped bodies for the next step, and store the choice for `ticks` steps.
+        """Choose levels and skipped bodies for the next step, and store the decision for `ticks` steps.
 
-        A step that is repeated after `rewind` gets the same choice again, so that the result does not depend
-        on the clock.
+        A step that is repeated after `rewind` gets the same decision again, so that the result does not
+        depend on the clock.
         """
         step, self._before = self._world.step_count, None
         if step <= self._newest:
@@ -120,7 +122,7 @@ class Budget:
             del self._decided[old]
 
     def revert(self) -> None:
-        """Undo the changes of the last `prepare`, because the step after them was refused."""
+        """Undo the changes of the last `prepare`, because the following step was refused."""
         if self._before is not None:
             undo(self._world, self._before)
         step = self._world.step_count
@@ -180,7 +182,7 @@ class Budget:
         return skipping
 
     def _changes(self, load: int, start: float) -> list[tuple[Body, int]]:
-        """Raise or lower levels if that is due, and return the changed bodies with their new levels."""
+        """Raise or lower levels if necessary, and return the changed bodies with their new levels."""
         if self._long(load) > (FULL if self._skips.slow else TIGHT) * self.seconds:
             return self._lowered(load, start)
         return self._raised(load, start) if self._calm >= PATIENCE else []
@@ -236,7 +238,7 @@ class Budget:
     def _has_changed(self, body: Body, level: int) -> bool:
         """Change the level of a body. Return False if the change is refused, see `Body.set_level`.
 
-        Held bodies are not made coarser, because a player may be holding them.
+        Levels of held bodies are not lowered, because a player may be holding the body.
         """
         if body.is_held and level > body.level:
             return False

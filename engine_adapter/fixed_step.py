@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from taichi_soft.core.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
-"""Tolerance for when a step is due [steps]. The sum of frame times is rounded: six frames of 1/60 s are not
-exactly 1/10 s. A billionth of a step covers the rounding of years of frames and is invisible."""
+"""A step is due if at most this fraction of its time is missing. The sum of frame times has rounding errors:
+six frames of 1/60 s are not exactly 1/10 s. A billionth of a step is larger than the rounding errors of years
+of frames, and invisible."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Accumulator:
 
     @property
     def alpha(self) -> float:
-        """Return `remainder` over dt, at least 0 and below 1."""
+        """Return `remainder` divided by dt, at least 0 and below 1."""
         return max(self.remainder / self._dt, 0.0)
 
     def put(self, frame_dt: float) -> tuple[int, float]:

@@ -10,7 +10,7 @@ class Rollback:
     """Snapshots of the last steps of a world.
 
     If other code calls `World.restore`, for example to load a game, the snapshots no longer lead to the
-    current state. `steps` is then empty, and `save` starts again.
+    current state. `steps` is then empty, and the next `save` starts a new history.
 
     Args:
         world: a built world.
@@ -32,11 +32,11 @@ class Rollback:
         self._world = world
         self._ticks = as_count(ticks, "ticks")
         self._snapshots: dict[int, bytes] = {}  # by step count, ascending
-        self._restore_count = world.restore_count  # the world's count when the snapshots were stored
+        self._restore_count = world.restore_count  # the value when the snapshots were stored
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """Step counts that `rewind_to` can restore, ascending."""
+        """Step counts that `rewind_to` can restore, in ascending order."""
         return tuple(self._snapshots) if self._is_past else ()
 
     @property
@@ -45,14 +45,14 @@ class Rollback:
         return self._restore_count == self._world.restore_count
 
     def save(self) -> None:
-        """Store the current state. Call this between a step and the inputs of the next one."""
+        """Store the current state. Call this between a step and the inputs of the next step."""
         if not self._is_past:
             self._snapshots.clear()
             self._restore_count = self._world.restore_count
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks + 1:  # the newest is the current state
+        while len(self._snapshots) > self._ticks + 1:  # the newest snapshot is of the current state
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:

@@ -49,14 +49,14 @@ class RollbackSession:
 
     Each machine runs the same world and has its own session. `advance` makes a tick with the input of the own
     player, and predicts that the other players repeat their last known inputs. `message` returns a datagram
-    for all other machines, and `receive` reads theirs. Datagrams can arrive late, twice, in any order or not
-    at all, because each one repeats all inputs that another machine has not acknowledged. Give all machines
+    for all other machines, and `receive` reads a datagram from one of them. Datagrams can arrive late, twice,
+    in any order or not at all, because each repeats all inputs that were not acknowledged. Give all machines
     the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
         world: world built by the same script on all machines, at the same step.
-        act: function that applies the inputs of all players, by player, before each step. It must depend only
-            on the inputs and the world, because a tick can be made several times.
+        act: function that receives the inputs of all players, in their order, and applies them before each
+            step. The function must depend only on the inputs and the world, because ticks can be repeated.
         player: number of the own player, from 0.
         players: number of players, 2 to 16.
         input_size: size of an input [bytes], 1 to 64. Before a player's first input, its input is zeros.
@@ -66,8 +66,8 @@ class RollbackSession:
         delay: ticks until an own input takes effect, 0 to `ticks`. A larger delay shortens rewinds and
             increases input latency.
         hash_every: ticks between comparisons of hashes, 1 to 10000.
-        patience: largest number of consecutive `advance` calls that wait for another player. Then `advance`
-            raises an error.
+        patience: number of consecutive `advance` calls that make no tick, after which `advance` raises an
+            error.
     Raises: OptionError for an argument out of range; StateError if the world is not built.
     Example:
         session = RollbackSession(world, lambda inputs: None, player=0, input_size=1)
@@ -110,13 +110,13 @@ class RollbackSession:
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
         self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
         self._heard = [first] * self._players  # per player, the first tick without a known input
-        self._acknowledged = [first] * self._players  # per player, first tick of our inputs it lacks
+        self._acknowledged = [first] * self._players  # per player, first own input not yet received there
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
         self._hashes: dict[int, int] = {}  # own hashes, by tick
         self._their_hashes: dict[tuple[int, int], int] = {}  # hashes still to compare, by tick and player
-        self._newest = [first] * self._players  # per player, tick of its newest message
+        self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
         self._waits = 0
         self._rollbacks = self._longest_rewind = 0
@@ -124,20 +124,18 @@ class RollbackSession:
 
     @property
     def tick(self) -> int:
-        """Number of the tick that `advance` makes next. It equals the step count of the world on the first
-        machine.
-        """
+        """Number of the tick that `advance` makes next. The number equals the step count of the world."""
         return self._tick
 
     @property
     def confirmed(self) -> int:
-        """First tick with an unknown input. No message can change what happened before it."""
+        """First tick with an unknown input. No message can change earlier ticks."""
         return min(self._heard)
 
     @property
     def ahead(self) -> float:
-        """Estimated number of ticks by which this machine is ahead of the slowest other one; negative if it
-        is behind.
+        """Estimated number of ticks by which this machine is ahead of the slowest other machine; negative if
+        this machine is behind.
 
         A game that occasionally skips a tick while this is above 1 avoids long rewinds on all machines.
         """
@@ -145,9 +143,7 @@ class RollbackSession:
 
     @property
     def desync(self) -> int | None:
-        """First compared tick at whose start the state differs on another machine; None if all states
-        agree.
-        """
+        """First tick at whose start the states of two machines differ; None if all compared states agree."""
         return self._desync
 
     @property
@@ -190,7 +186,7 @@ class RollbackSession:
         return True
 
     def settle(self) -> int:
-        """Repeat the ticks with wrong predictions. `advance` does this first.
+        """Repeat the ticks with wrong predictions. `advance` calls this method first.
 
         Returns: number of repeated ticks.
         Raises: SessionError if other code stepped the world; errors of `act` and `World.step`. The next call
@@ -212,8 +208,8 @@ class RollbackSession:
         return missing
 
     def message(self) -> bytes:
-        """Return a datagram for all other machines. Send one after each call of `advance`, even if it
-        returned False."""
+        """Return a datagram for all other machines. Send a datagram after each call of `advance`, even if the
+        call returned False."""
         first, end = min(self._acknowledged[each] for each in self._others), self._heard[self._player]
         own = [self._inputs[self._player][tick] for tick in range(first, end)]
         # Leave out hashes of states that a rewind or a late input can still change.
@@ -224,13 +220,13 @@ class RollbackSession:
         return HEAD.pack(*head) + struct.pack(f"<{self._players}I", *self._heard) + b"".join(own)
 
     def receive(self, data: bytes) -> None:
-        """Read a message from another machine. It can be late, repeated or out of order.
+        """Read a message from another machine. Messages can arrive late, repeatedly or out of order.
 
         The next call of `advance` or `settle` repeats the ticks that the message corrects.
         Args:
             data: result of `message` on the other machine.
         Raises: SessionError for a message that is damaged, belongs to another session, world or version, or
-            contradicts an earlier message of its player. The text says which. Nothing is changed.
+            contradicts an earlier message of its player. The error names the reason, and nothing is changed.
         """
         message = self._read(data)
         other = message.player

@@ -1,4 +1,4 @@
-"""Choose the bodies that skip a step if there is no time for all bodies. The farthest bodies skip in turn."""
+"""Choose the bodies that skip a step if there is no time for all. The farthest bodies take turns."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class _Island:
 
 
 class Skips:
-    """Chooses islands that skip a step. The farthest skip half of their steps, or more if that is not enough.
+    """Chooses the islands that skip a step.
 
-    The nearest island and islands with a held body never skip, see `Body.is_held`.
+    The farthest islands skip half of their steps, or more if that is not enough. The nearest island and
+    islands with a held body never skip, see `Body.is_held`.
     """
 
     def __init__(self, world: World, from_near: Callable[[list[Body]], list[Body]]) -> None:
@@ -47,7 +48,7 @@ class Skips:
         self._waited.clear()
 
     def choose(self, load: int, limit: float) -> list[Body]:
-        """Choose the bodies that skip the next step, so that about `limit` of `load` tetrahedra move."""
+        """Choose the bodies that skip the next step, so that only about `limit` of `load` tetrahedra move."""
         if load <= limit:
             self.restart()
             return []
@@ -55,7 +56,7 @@ class Skips:
         slow = self._slowed(load, limit)
         total, moving = sum(each.tets for each in slow), 0
         skipping: list[Body] = []
-        # Islands that have waited longest move first; among equals, the nearest does.
+        # Islands that have waited longest move first. Islands that waited equally long move nearest first.
         for island in sorted(reversed(slow), key=self._wait, reverse=True):
             if moving < LEAST * total or load - total + moving + island.tets <= limit:
                 moving += island.tets
@@ -81,7 +82,7 @@ class Skips:
         ]
 
     def _slowed(self, load: int, limit: float) -> list[_Island]:
-        """Return the farthest islands whose skipping of every second step meets `limit`."""
+        """Return the farthest islands, as many as must skip every second step to meet `limit`."""
         slow, mean = [], float(load)
         for island in self._islands:
             if mean <= limit:

@@ -1,8 +1,8 @@
 """Write the demo as a project for Godot 3 or 4: `python write_project.py 3 FOLDER`.
 
 The folder `demo` contains the nodes and the demo for Godot 4. `demo3` and `demo4` contain files for one
-version only. For Godot 3, the tables below replace expressions. Lines that differ in other respects are
-replaced by the lines after them that begin with `# Godot 3: `.
+version only. For Godot 3, the tables below replace expressions. If that is not enough, comments after a line
+that begin with `# Godot 3: ` contain the lines that replace it.
 """
 
 import re
@@ -41,7 +41,7 @@ WORDS: Pairs = [
     *((rf"\b{re.escape(of_4)}\b", of_3) for of_4, of_3 in NAMES.items()),
     (r"\b([A-Z]\w+)3D(s?)\b", r"\1\2"),
     (r"\bPacked(\w+Array)\b", r"Pool\1"),
-    (r"(?<!_path)\.is_empty\(\)", ".empty()"),  # a NodePath has `is_empty` in both
+    (r"(?<!_path)\.is_empty\(\)", ".empty()"),  # a NodePath has `is_empty` in both versions
 ]
 """Pairs of a regular expression and its replacement, for scripts and scenes."""
 

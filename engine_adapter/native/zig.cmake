@@ -1,9 +1,10 @@
-# Builds for other platforms with zig from PyPI (`pip install ziglang`), which includes compilers and C libraries:
+# Toolchain for other platforms with zig from PyPI (`pip install ziglang`), which includes compilers and C libraries:
 #
 #     cmake -S engine_adapter/native -B out/windows-x64 -DPLATFORM=windows-x64 \
 #           -DCMAKE_TOOLCHAIN_FILE=zig.cmake -DZIG=.venv/lib/python3.12/site-packages/ziglang/zig
 #
-# Tested with zig 0.17. The builds for linux-x64, linux-arm64 and windows-x64 were run, the one for macos-arm64 was not.
+# Tested with zig 0.17. The libraries for linux-x64, linux-arm64 and windows-x64 were run; the library for macos-arm64
+# was only built.
 set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES ZIG PLATFORM)
 if(PLATFORM STREQUAL "linux-x64")
   set(target x86_64-linux-gnu.2.28)

@@ -39,8 +39,8 @@ class _Rigid:
         """Apply to Bullet's body the impulses that its colliders received in the last step."""
         now = self._impulses()
         if self.is_pushed:
-            # Bullet receives impulses one step late. Adding half of the impulse now, and subtracting it in
-            # the next step, predicts the coming impulse; without it the coupled bodies gain energy.
+            # Bullet receives impulses one step late. To predict the next impulse, add half of the present
+            # impulse now and subtract it in the next step. Otherwise the coupled bodies would gain energy.
             linear, angular = 1.5 * now - 0.5 * self.last
             node = self.path.node()
             if linear.any() or angular.any():
@@ -75,7 +75,7 @@ class BulletCoupling:
 
     Args:
         world: world of the soft bodies.
-        bullet_world: a BulletWorld. No other code must step it.
+        bullet_world: a BulletWorld. No other code must step this world.
     Raises: OptionError for other arguments.
     """
 
@@ -100,8 +100,8 @@ class BulletCoupling:
         Args:
             path: NodePath of a BulletRigidBodyNode that is attached to the Bullet world.
             friction, restitution, thickness: see `add_colliders`.
-        Returns: the colliders of its shapes.
-        Raises: as `add_colliders`; OptionError for another node, or one that was already added.
+        Returns: the colliders of the body's shapes.
+        Raises: as `add_colliders`; OptionError if the node is of another type or was already added.
         """
         node = path.node()
         if not isinstance(node, bullet.BulletRigidBodyNode):
@@ -132,14 +132,14 @@ class BulletCoupling:
     def step(self, dt: float) -> None:
         """Step Bullet by `dt` [s]. Call this in `before_step`.
 
-        The method first applies the impulses that soft bodies exerted in the last step to the rigid bodies.
-        After Bullet's step, it moves the colliders with their bodies.
+        Before Bullet's step, the rigid bodies receive the impulses that soft bodies exerted on them in the
+        last soft step. After Bullet's step, the colliders move to the new poses of their rigid bodies.
         Args:
             dt: length of the step [s].
         """
         for each in self._rigid:
             each.push()
-        # No substeps: with them Bullet reports poses one step late, and late contacts gain energy.
+        # With substeps, Bullet would report poses one step late, and late contacts gain energy.
         self._bullet.do_physics(dt, 0)
         for each in self._rigid:
             for one in each.colliders:
@@ -163,7 +163,7 @@ class BulletCoupling:
 
         Args:
             state: result of `snapshot`.
-        Raises: OptionError if rigid bodies were added or removed since, with nothing changed.
+        Raises: OptionError if rigid bodies were added or removed since the snapshot, with nothing changed.
         """
         if [row[0] for row in state.rows] != [each.path for each in self._rigid]:
             raise OptionError(

@@ -23,9 +23,9 @@ _CROSS = 0.05
 class DebugNode(core.NodePath):  # type: ignore[misc]
     """A NodePath that shows the edges of all bodies and colliders, and the targets of grabs, as lines.
 
-    Moving bodies are white, sleeping ones blue, frozen ones red. Colliders are green, grabs are yellow
-    crosses. Bodies are drawn at interpolated positions, as in `SoftBodyNode`. Colliders are drawn at their
-    positions after the last step. A hidden node computes nothing.
+    Moving bodies are white, sleeping bodies blue, and frozen bodies red. Colliders are green, and grabs are
+    yellow crosses. Bodies are drawn at interpolated positions, as in `SoftBodyNode`. Colliders are drawn at
+    their positions after the last step. A hidden node computes nothing.
 
     Args:
         adapter: adapter that steps the world.
@@ -37,7 +37,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
             raise OptionError(f"adapter must be an EngineAdapter, got {type(adapter).__name__}")
         super().__init__(core.GeomNode("soft body debug"))
         self._adapter = adapter
-        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # with topology versions
+        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # (topology version, edges)
         self._shape_edges: dict[Shape, Floats] = {}
         self.set_light_off(1)
         self.set_texture_off(1)
@@ -57,7 +57,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
             self.node().add_geom(_lines(parts))
 
     def _of_body(self, body: Body) -> NDArray[Any]:
-        """Return the endpoints of the edges of a body's tetrahedra, or of a rope or cloth, (2 k, 3) [m]."""
+        """Return the endpoints of all edges of a body, (2 k, 3) [m]. Ropes and cloths have no tetrahedra."""
         version, edges = self._body_edges.get(body, (-1, np.zeros((0, 2), dtype=np.int32)))
         if version != body.topology_version:
             edges = _edges_of(body.tets) if len(body.tets) else body.mesh.edges

@@ -12,7 +12,7 @@ from panda3d import core
 _UNSET = np.full(3, 102 / 255)
 """Grey that trimesh assigns to a material without a colour."""
 
-_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material, for all bodies of an asset
+_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by id of the material
 
 
 def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
@@ -36,8 +36,8 @@ def vertex_colors(visual: Any, count: int) -> NDArray[np.float32] | None:
 
 
 def render_state(visual: Any, is_textured: bool) -> Any:
-    """Make a Panda3D RenderState with the texture and colour of a material; empty if the material has
-    neither.
+    """Make a Panda3D RenderState with the texture and colour of a material. The state is empty if the
+    material has no texture and no colour.
 
     To override the colour, set another colour with a priority: `node.set_color(red, 1)`.
     """
@@ -58,13 +58,13 @@ def render_state(visual: Any, is_textured: bool) -> Any:
 
 
 def _picture(material: Any) -> Any:
-    """Return the image of a material (Pillow), or None."""
+    """Return the image of a material (Pillow); None if the material has no image."""
     found = getattr(material, "baseColorTexture", None)
     return getattr(material, "image", None) if found is None else found
 
 
 def _texture(material: Any) -> Any:
-    """Return the core.Texture of a material. It is cached while the material exists."""
+    """Return the core.Texture of a material. The texture is cached while the material exists."""
     kept = _textures.get(id(material))
     if kept is not None and kept[0]() is material:
         return kept[1]

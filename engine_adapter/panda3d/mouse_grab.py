@@ -25,10 +25,11 @@ class MouseGrab:
     Args:
         base: the game's ShowBase.
         world: a built world.
-        button: event of the mouse button; with None the game calls `press`, `move` and `release` itself.
+        button: event of the mouse button. None if the game calls `press`, `move` and `release` itself.
         bodies: bodies that can be grabbed; None for all.
         frequency, max_force: strength of the grab, see `World.grab`.
-        sort: sort of the task that follows the mouse. The task must run before the step of the world.
+        sort: Panda3D's sort value of the task that follows the mouse. The task must run before the task that
+            steps the world.
     Raises: OptionError if `world` is not a World.
     """
 
@@ -102,7 +103,7 @@ class MouseGrab:
             self.grab.move(near + distance * along)
 
     def release(self) -> None:
-        """Release the current grab. Without one, do nothing."""
+        """Release the current grab, if there is one."""
         if self.grab is not None:
             self.grab.release()
         self._grab = None

@@ -26,7 +26,7 @@ class PlacedShape:
     """A shape in the coordinates of its node, without the node's scale.
 
     Args:
-        shape: shape of taichi-soft, scaled.
+        shape: shape of taichi-soft. Its size includes the node's scale.
         position: position of the shape's origin, (3,) [m].
         rotation: axes of the shape as columns, (3, 3).
     """
@@ -53,8 +53,8 @@ def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
     and BulletSphereShape, BulletBoxShape, BulletCapsuleShape and BulletPlaneShape, unscaled.
     Args:
         path: NodePath to the node.
-    Raises: OptionError that names an unsupported solid or node, a non-uniform scale, a shear, or a scaled
-        Bullet node.
+    Raises: OptionError for an unsupported solid or node, a non-uniform scale, a shear, or a scaled Bullet
+        node.
     """
     node = path.node()
     if isinstance(node, core.CollisionNode):
@@ -76,7 +76,7 @@ def pose_of(path: Any) -> tuple[Floats, Floats]:
 
 
 def _matrix(quaternion: Any) -> Floats:
-    """Return the rotation with the axes as columns, (3, 3), because Panda3D's rows are the axes."""
+    """Return the rotation matrix of a quaternion, (3, 3), whose columns are the axes. Panda3D uses rows."""
     rows = core.LMatrix3()
     quaternion.extract_to_matrix(rows)
     turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T
@@ -127,7 +127,7 @@ def _at(shape: Shape, position: Any, rotation: Floats | None = None) -> PlacedSh
 
 
 def _onto(axis: Floats) -> Floats:
-    """Return the rotation (3, 3) that turns z onto a unit vector (3,)."""
+    """Return a rotation (3, 3) that maps the z axis to a unit vector (3,)."""
     across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
     turn: Floats = np.array([across, np.cross(axis, across), axis]).T
@@ -168,8 +168,8 @@ def _bullet_box(shape: Any) -> PlacedShape:
 
 
 def _bullet_capsule(shape: Any) -> PlacedShape:
-    """Convert a capsule. Panda3D does not expose its axis, so this uses the axis with the smallest moment of
-    inertia.
+    """Convert a capsule. Panda3D does not expose the axis of a capsule, but its moment of inertia is smallest
+    about that axis.
     """
     probe = bullet.BulletRigidBodyNode()
     probe.add_shape(shape)
@@ -191,8 +191,8 @@ _SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
     core.CollisionCapsule: _capsule,
     core.CollisionPlane: _plane,
 }
-"""Converters by exact class: CollisionPolygon is a subclass of CollisionPlane but no plane, and hollow solids
-are subclasses of spheres."""
+"""Converters by exact class, because subclasses can be other shapes: CollisionPolygon is a subclass of
+CollisionPlane, and hollow solids are subclasses of spheres."""
 
 _BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
     bullet.BulletSphereShape: _bullet_sphere,

@@ -13,8 +13,8 @@ from engine_adapter.panda3d.looks import render_state, texture_places, vertex_co
 from taichi_soft import Body, OptionError, RenderMesh
 
 _POSITIONS, _NORMALS, _LOOK = range(3)
-"""Columns of a vertex buffer: arrays of positions, normals, and texture coordinates or colours. A kernel
-fills the first two in place."""
+"""Indices of the arrays in a vertex buffer: positions, normals, and texture coordinates or colours. A kernel
+fills positions and normals in place."""
 
 
 class SoftBodyNode(core.NodePath):  # type: ignore[misc]
@@ -25,10 +25,10 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
         ...  # each frame after adapter.advance, or use a SoftBodyTask
         node.draw()
 
-    A body with skins is drawn as the artist's meshes, with textures and texture coordinates; other bodies as
-    their surface. A kernel writes positions and normals directly into Panda3D's vertex buffers. The node
-    makes new buffers after a cut, a tear, a restore, or a change of level of detail. It does not draw a
-    removed body until `World.restore` restores it.
+    If a body has skins, the node draws the artist's meshes, with textures and texture coordinates. Otherwise
+    the node draws the body's surface. A kernel writes positions and normals directly into Panda3D's vertex
+    buffers. The node makes new buffers after a cut, a tear, a restore, or a change of level of detail. A
+    removed body is not drawn until `World.restore` restores it.
 
     Args:
         adapter: adapter that steps the body's world.
@@ -91,8 +91,8 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
 
 
 def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
-    """Return a NumPy view of an array of a GeomVertexData, float32 (n, width). Do not keep it: Panda3D may
-    move the array between frames."""
+    """Return a NumPy view of an array of a GeomVertexData, float32 (n, width). Do not keep the view, because
+    Panda3D can move the array between frames."""
     view = memoryview(data.modify_array(array)).cast("B")
     return np.frombuffer(view, dtype=np.float32).reshape(-1, width)
 
@@ -109,8 +109,8 @@ def _box_round(positions: NDArray[np.float32]) -> Any:
 
 
 def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
-    """Make buffers and triangles for a mesh. `look` has its texture coordinates (k, 2) or colours (k, 4), or
-    is None.
+    """Make a Geom with buffers and triangles for a mesh. `look` contains the texture coordinates (k, 2) or
+    the colours (k, 4) of the vertices, or is None.
     """
     width = 0 if look is None else look.shape[1]
     data = core.GeomVertexData("soft body", _vertex_format(width), core.Geom.UH_dynamic)
@@ -128,8 +128,8 @@ def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
 
 
 def _vertex_format(look: int) -> Any:
-    """Return the vertex format: positions, normals, and texture coordinates (`look` 2), colours (4) or
-    neither (0).
+    """Return a vertex format with positions and normals. `look` = 2 adds texture coordinates, `look` = 4
+    colours, and 0 nothing.
     """
     columns = [
         (core.InternalName.get_vertex(), 3, core.Geom.C_point),

@@ -30,7 +30,7 @@ class SoftBodyTask:
         base: the game's ShowBase.
         adapter: adapter that steps the world.
         nodes: nodes to draw, in this order.
-        sort: sort of the task, see `task_mgr.add`. Panda3D's own task that renders the frame has sort 50.
+        sort: sort value of the task, see `task_mgr.add`. Panda3D's rendering task has the value 50.
     Raises: OptionError if `adapter` is not an EngineAdapter.
 
     Attributes:

@@ -9,9 +9,9 @@ export class Rollback {
   rewindTo(step: number): void;
 }
 
-/** Give all machines the same options, except `player`, `delay` and `patience`. */
+/** Options of a session. All machines must use the same options, except `player`, `delay` and `patience`. */
 export interface SessionOptions {
-  /** Number of the own player, from 0. */
+  /** Number of this machine's player, from 0. */
   player: number;
   /** Number of players, 2 to 16. */
   players?: number;
@@ -23,11 +23,11 @@ export interface SessionOptions {
   substeps?: number;
   /** Largest number of ticks made on predictions. */
   ticks?: number;
-  /** Number of ticks until an own input takes effect. */
+  /** Number of ticks until an input of this machine takes effect. */
   delay?: number;
   /** Number of ticks between comparisons of hashes. */
   hashEvery?: number;
-  /** Largest number of consecutive `advance` calls that wait for another player. Then `advance` throws an error. */
+  /** Number of consecutive `advance` calls that make no tick, after which `advance` throws an error. */
   patience?: number;
 }
 

@@ -1,12 +1,12 @@
-// Rollback netcode, compatible with `Rollback` and `RollbackSession` in Python (engine_adapter/rollback.py,
-// engine_adapter/session.py): sessions in both languages can play together.
+// Rollback netcode that is compatible with `Rollback` and `RollbackSession` in Python (engine_adapter/rollback.py,
+// engine_adapter/session.py). Sessions in both languages can play together.
 
 const MARK = 0x31525354; // "TSR1"
 const NO_TICK = 0xffffffff;
 const HEAD_SIZE = 42;
 const LEAD_SMOOTHING = 0.1; // weight of the newest message in the estimate of how far ahead this machine is
 
-/** Thrown by refused calls of `Rollback` or `RollbackSession`. A refused call changes nothing. */
+/** Error of a refused call of `Rollback` or `RollbackSession`. A refused call changes nothing. */
 export class SessionError extends Error {
   constructor(text) {
     super(text);
@@ -19,12 +19,12 @@ function whole(value, name, low, high) {
   throw new SessionError(`${name} must be a whole number from ${low} to ${high}, got ${value}`);
 }
 
-/** Snapshots of the last steps of a world. Call `save` before each step, and `rewindTo` with one of `steps`. */
+/** Snapshots of the last steps of a world. Call `save` before each step. To go back, call `rewindTo`. */
 export class Rollback {
   #world;
   #ticks;
   #snapshots = new Map(); // by step count, ascending
-  #restoreCount; // the world's count when the snapshots were stored
+  #restoreCount; // `restoreCount` of the world when the snapshots were stored
 
   constructor(world, ticks) {
     this.#world = world;
@@ -32,7 +32,7 @@ export class Rollback {
     this.#restoreCount = world.restoreCount;
   }
 
-  /** Step counts that `rewindTo` can restore, ascending. */
+  /** Step counts that `rewindTo` can restore, in ascending order. */
   get steps() {
     return this.#isPast ? [...this.#snapshots.keys()] : [];
   }
@@ -42,7 +42,7 @@ export class Rollback {
     return this.#restoreCount === this.#world.restoreCount;
   }
 
-  /** Store the current state. Call this between a step and the inputs of the next one. */
+  /** Store the current state. Call this between a step and the inputs of the next step. */
   save() {
     if (!this.#isPast) {
       this.#snapshots.clear();
@@ -51,7 +51,7 @@ export class Rollback {
     const now = this.#world.clock.steps;
     this.#snapshots.delete(now);
     this.#snapshots.set(now, this.#world.snapshot());
-    // The newest snapshot is the current state.
+    // The newest snapshot is of the current state.
     while (this.#snapshots.size > this.#ticks + 1) this.#snapshots.delete(this.#snapshots.keys().next().value);
   }
 
@@ -81,9 +81,10 @@ function dropBefore(rows, tick) {
 }
 
 /**
- * The session of one machine. `advance` makes a tick with the own input and predicted inputs of the others. `message`
- * returns a datagram for all other machines. `receive` reads theirs, which can be late, repeated or out of order.
- * `act(inputs)` applies the inputs of all players, by player, before each step. A tick can be made several times.
+ * The session of one machine. `advance` makes a tick with this machine's input and predicted inputs of the other
+ * players. `message` returns a datagram for all other machines. `receive` reads a datagram from another machine;
+ * datagrams can arrive late, repeatedly or out of order. Before each step, the session calls `act(inputs)` to apply the
+ * inputs of all players. A tick can be made several times.
  */
 export class RollbackSession {
   #world;
@@ -96,11 +97,11 @@ export class RollbackSession {
   #inputs; // known inputs, by player and tick
   #used = new Map(); // inputs with which each tick was made
   #heard; // by player, the first tick without a known input
-  #acknowledged; // by player, the first tick of our inputs that it lacks
+  #acknowledged; // by player, the first own input that the player has not received
   #wrong = null; // first tick with a wrong prediction
   #hashes = new Map(); // own hashes, by tick
   #theirHashes; // hashes still to compare, by player and tick
-  #newest; // by player, tick of its newest message
+  #newest; // by player, the tick of the newest message
   #leads;
   #waits = 0;
   #rollbacks = 0;
@@ -153,17 +154,17 @@ export class RollbackSession {
     return this.#tick;
   }
 
-  /** First tick with an unknown input. No message can change what happened before it. */
+  /** First tick with an unknown input. No message can change earlier ticks. */
   get confirmed() {
     return Math.min(...this.#heard);
   }
 
-  /** Estimated number of ticks by which this machine is ahead of the slowest other one; negative if it is behind. */
+  /** Estimated number of ticks by which this machine is ahead of the slowest other machine; below 0 if it is behind. */
   get ahead() {
     return Math.max(...this.#others.map((each) => this.#leads[each]));
   }
 
-  /** First compared tick at whose start the state differs on another machine; null if all states agree. */
+  /** First tick at whose start the states of two machines differ; null if all compared states agree. */
   get desync() {
     return this.#desync;
   }
@@ -172,12 +173,12 @@ export class RollbackSession {
     return this.#rollbacks;
   }
 
-  /** Largest number of ticks that one rewind went back. */
+  /** Largest number of ticks of a single rewind. */
   get longestRewind() {
     return this.#longestRewind;
   }
 
-  /** Correct wrong predictions, then make a tick. Returns false if this machine must wait for another player. */
+  /** Correct wrong predictions, then make a tick. Return false if this machine must wait for another player. */
   advance(ownInput) {
     const { player, inputSize, ticks } = this.#settings;
     if (!(ownInput instanceof Uint8Array) || ownInput.length !== inputSize) {
@@ -190,7 +191,7 @@ export class RollbackSession {
     }
     this.#waits = 0;
     const tick = this.#heard[player];
-    this.#learn(player, Uint8Array.from(ownInput)); // a copy, even of a Buffer
+    this.#learn(player, Uint8Array.from(ownInput)); // copies the bytes, because the caller may reuse the array
     try {
       this.#makeTick();
     } catch (error) {
@@ -203,7 +204,7 @@ export class RollbackSession {
     return true;
   }
 
-  /** Repeat the ticks with wrong predictions. Returns their number. */
+  /** Repeat the ticks with wrong predictions. Return the number of repeated ticks. */
   settle() {
     if (this.#wrong !== null) {
       this.#rollback.rewindTo(this.#wrong);
@@ -220,7 +221,7 @@ export class RollbackSession {
     return missing;
   }
 
-  /** Return a datagram for all other machines. Send one after each call of `advance`, even if it returned false. */
+  /** Return a datagram for all other machines. Send it after each call of `advance`, even if that returned false. */
   message() {
     const { player, players, inputSize, ticks, hashEvery } = this.#settings;
     const first = Math.min(...this.#others.map((each) => this.#acknowledged[each]));
@@ -313,7 +314,7 @@ export class RollbackSession {
     return message;
   }
 
-  // Checks that a message agrees with earlier ones.
+  // Checks that a message agrees with earlier messages.
   #requireOrder({ player, tick, hashTick, first, heard, inputs }) {
     const who = `player ${player}`;
     const due = this.#heard[player];

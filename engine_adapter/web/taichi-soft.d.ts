@@ -16,14 +16,14 @@ export class SoftError extends Error {
 
 export type Kind = "body" | "asset" | "collider" | "frame" | "mesh" | "joint" | "motor";
 
-/** A world file, read by `loadScene`. All worlds of a scene use the same code. */
+/** A world file, read by `loadScene`. All worlds of a scene share the compiled code. */
 export class Scene {
   readonly counts: Record<Kind, number>;
-  /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
+  /** Return the name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor" with a number. */
   nameOf(kind: Kind, number: number): string;
-  /** Number of an object with a name. */
+  /** Return the number of the object with a name. */
   find(kind: Kind, name: string | number): number;
-  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
+  /** Return `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name: string | number): {
     number: number;
     vertexCount: number;
@@ -31,9 +31,9 @@ export class Scene {
     mass: number;
     levelCount: number;
   };
-  /** Create a world in its exported state. */
+  /** Create a world in the exported state. */
   createWorld(): World;
-  /** Free the scene after the last of its worlds is destroyed. */
+  /** Release the scene. Its memory is freed when the last of its worlds is destroyed. */
   unload(): void;
 }
 
@@ -77,16 +77,16 @@ export interface Shape {
   mask?: number;
 }
 
-/** A simulation of a scene. */
+/** A running instance of a scene. */
 export class World {
   readonly scene: Scene;
-  /** `stepsMade` by the last `advance`, `steps` in total, `time` [s], `alpha`, `dropped` time [s]. */
+  /** Clock: `stepsMade` by the last `advance`, total `steps`, `time` [s], `alpha`, total `dropped` time [s]. */
   readonly clock: Clock;
   /** All bodies, in the order of their slots. */
   readonly bodies: Body[];
-  /** Number of events dropped, because more than 10,000 were waiting, or more pairs touched than fit the table. */
+  /** Number of events dropped because more than 10,000 were waiting or more pairs touched than fit the table. */
   readonly droppedEvents: number;
-  /** Function that is called before each step of `advance`, to move colliders and frames and to apply forces. */
+  /** Function that `advance` calls before each step. Move colliders and frames and apply forces in it. */
   onStep: (() => void) | null;
   /** Free the world and its meshes. */
   destroy(): void;
@@ -106,7 +106,7 @@ export class World {
   setFriction(friction: number): void;
   /** Set the wind velocity [m/s] and the air density [kg/m^3]. */
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
-  /** Push all bodies away from a point, with an impulse from `impulse` [N s] at the point to 0 at `radius` [m]. */
+  /** Push all bodies away from a point. The impulse falls from `impulse` [N s] at the point to 0 at `radius` [m]. */
   radialImpulse(center: Vector, impulse: number, radius: number): void;
   /** Return a hash of the state, 16 hexadecimal digits, equal on every platform. */
   hash(): string;
@@ -114,13 +114,13 @@ export class World {
   snapshot(): Uint8Array;
   /** Restore the state of a snapshot from a world of the same export. */
   restore(bytes: Uint8Array | ArrayBuffer): void;
-  /** Number of `restore` calls. If it has changed, earlier stored states belong to another history. */
+  /** Number of `restore` calls. If this number has changed, states stored before belong to another history. */
   readonly restoreCount: number;
-  /** Record events of these kinds, a sum of `EVENTS`. By default all kinds are recorded, with 0 none. */
+  /** Record events of these kinds, a sum of `EVENTS`. By default, all kinds are recorded; with 0, no kind. */
   recordEvents(kinds?: number): void;
   /** Return the events since the last call. */
   events(): SoftEvent[];
-  /** Return the body in a slot, by number or name; null for an empty slot. */
+  /** Return the body in a slot with a number or name; null if the slot is empty. */
   body(name: string | number): Body | null;
   /** Spawn a body of an asset in a free slot, with a velocity [m/s] and an angular velocity `spin` [rad/s]. */
   spawn(
@@ -140,11 +140,11 @@ export class World {
   addCollider(shape: Shape, pose?: Pose): Collider;
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
-  /** Return a grab by its index, 0 to 15, or null. */
+  /** Return the grab with an index, 0 to 15; null if there is none. */
   grab(number: number): Grab | null;
-  /** Return a joint by name, or by index from 0 to 63; null if there is none. */
+  /** Return the joint with a name or an index, 0 to 63; null if there is none. */
   joint(name: string | number): Joint | null;
-  /** Return a motor by name, or by index from 0 to 63; null if there is none. */
+  /** Return the motor with a name or an index, 0 to 63; null if there is none. */
   motor(name: string | number): Motor | null;
 }
 
@@ -164,11 +164,14 @@ export class Body {
   readonly vertexCount: number;
   /** Remove the body from the world. */
   despawn(): void;
-  /** Change the level of detail. Fails if joints, motors or attachments cannot be kept, unless `release` is true. */
+  /**
+   * Change the level of detail. If joints, motors or attachments cannot be kept at the new level, they are released if
+   * `release` is true; otherwise the call fails.
+   */
   setLevel(level: number, how?: { release?: boolean }): void;
-  /** Copy the vertex positions [m], interpolated from the previous step (0) to the last one (1). */
+  /** Return the vertex positions [m], interpolated between before (alpha 0) and after (alpha 1) the last step. */
   positions(alpha?: number): Float32Array;
-  /** Return the first render mesh of the asset and level, or one by number or name. Call this only once. */
+  /** Return the mesh with a number or name, or the first mesh of the body's asset and level. Call this only once. */
   mesh(name?: string | number | null): Mesh;
   /** Set the velocity [m/s] of the centre of mass, and the angular velocity about it [rad/s]. */
   setVelocity(linear: Vector, spin?: Vector): void;
@@ -180,9 +183,9 @@ export class Body {
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
   /** Apply an impulse [N s] to the vertices within `radius` [m] of a point. */
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
-  /** Set the factor on gravity for this body. */
+  /** Set the factor by which gravity is multiplied for this body. */
   setGravityScale(scale: number): void;
-  /** Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. */
+  /** Set the Coulomb coefficient for contact with other bodies. The world must have soft contact. */
   setFriction(friction: number): void;
   /** Set the damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
@@ -200,7 +203,7 @@ export class Body {
   detach(vertices?: ArrayLike<number> | null): void;
   /** Return `force` [N] and `torque` [N m] that the body exerts on a frame. */
   load(frame: Frame): { force: number[]; torque: number[] };
-  /** Attach vertices to another body, at their current positions in it, or each to one of its vertices in `onto`. */
+  /** Attach vertices to the body `other`, at their current positions or, with `onto`, each to a vertex in `onto`. */
   join(vertices: ArrayLike<number>, other: Body, how?: { onto?: ArrayLike<number> | null }): Joint;
   addMotor(
     vertices: ArrayLike<number>,
@@ -220,7 +223,7 @@ export class Body {
   ): Grab;
 }
 
-/** `positions` and `normals` are views of the module's memory: read them again after each `update`. */
+/** A render mesh. `positions` and `normals` are views of the module's memory. Read them again after each `update`. */
 export class Mesh {
   readonly body: Body;
   readonly vertexCount: number;
@@ -228,7 +231,7 @@ export class Mesh {
   readonly normals: Float32Array;
   /** Vertex indices, three per triangle. */
   readonly triangles: Uint32Array;
-  /** Texture coordinates, two numbers per vertex, v upwards; null if there are none. */
+  /** Texture coordinates, two numbers per vertex; v points up. Null if there are none. */
   readonly uv: Float32Array | null;
   /** Update `positions` [m] and `normals`. */
   update(): void;
@@ -252,7 +255,7 @@ export class Joint {
   readonly handle: bigint;
   /** Force that the other body exerts [N], averaged over the last step. */
   readonly force: number[];
-  /** End the joint. */
+  /** Remove the joint. */
   release(): void;
 }
 
@@ -266,9 +269,9 @@ export class Motor {
   readonly effort: number;
   /** Set the target speed [rad/s] or [m/s]. */
   setSpeed(speed: number): void;
-  /** Set the largest torque [N m] or force [N]. With 0 the vertices move freely. */
+  /** Set the largest torque [N m] or force [N]. With 0 the vertices coast. */
   setLimit(limit: number): void;
-  /** End the motor. */
+  /** Remove the motor. */
   remove(): void;
 }
 
@@ -276,7 +279,7 @@ export class Motor {
 export class Collider {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
-  /** `impulse` [N s] of all bodies on the collider in the last step, and `moment` about its position. */
+  /** `impulse` [N s] of all bodies on the collider in the last step, and its `moment` about the collider's position. */
   readonly impulse: { impulse: number[]; moment: number[] };
   /** Move the collider to a pose over the next step. */
   moveTo(pose: Pose): void;
@@ -302,5 +305,5 @@ export class Frame {
 export function loadWorld(folder: string | URL): Promise<World>;
 /** Loads a folder that `taichi-soft export --for web` wrote. */
 export function loadScene(folder: string | URL): Promise<Scene>;
-/** Compiles the module of a world and reads its file, from the bytes of `kernels/web.wasm` and `world.tsw`. */
+/** Compiles a world's kernels and reads its world file, from the bytes of `kernels/web.wasm` and of `world.tsw`. */
 export function sceneOf(code: BufferSource, world: Uint8Array): Promise<Scene>;

@@ -1,4 +1,4 @@
-// Soft bodies in a browser or in Node.js: runs worlds from `taichi-soft export --for web`.
+// Runs worlds from `taichi-soft export --for web` in a browser or in Node.js.
 //
 //     const world = await loadWorld("game.softworld");
 //     const jelly = world.body("jelly").mesh();
@@ -7,7 +7,7 @@
 //       jelly.update(); // jelly.positions and jelly.normals are views of the module's memory
 //     }
 //
-// All quantities have the axes for which the world was exported, and SI units. Rotations are quaternions [x, y, z, w].
+// All quantities use SI units and the axes for which the world was exported. Rotations are quaternions [x, y, z, w].
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
 const STATUS = ["active", "frozen", "asleep"];
@@ -16,7 +16,7 @@ const SHAPES = ["plane", "sphere", "box", "capsule"];
 const ORIGIN = [0, 0, 0];
 const UPRIGHT = [0, 0, 0, 1];
 
-/** Kinds of events as bits. */
+/** Bits for the kinds of events. */
 export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16 };
 const EVENT_NAMES = Object.fromEntries(Object.entries(EVENTS).map(([name, bit]) => [bit, name]));
 
@@ -29,14 +29,15 @@ export class SoftError extends Error {
   }
 }
 
-// Returns the bytes of an array of any type.
+// Returns the bytes of an ArrayBuffer or of a typed array.
 function bytesIn(given, name) {
   if (given instanceof ArrayBuffer) return new Uint8Array(given);
   if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
   throw new SoftError(-1, `${name} is ${shown(given)}: give a typed array or an ArrayBuffer`);
 }
 
-// Returns the numbers of a vector: an array, a typed array, or a Vector3 or Quaternion of three.js.
+// Returns the numbers of a vector as an array. The vector can be an array, a typed array, or a Vector3 or Quaternion of
+// three.js.
 function vector(value, name, count = 3) {
   const found = typeof value?.[Symbol.iterator] === "function" ? Array.from(value, Number) : [];
   if (found.length === count) return found;
@@ -48,16 +49,16 @@ function shown(value) {
   return typeof value === "object" ? (value?.constructor?.name ?? "null") : String(value);
 }
 
-// Requires a 32-bit integer. WebAssembly would convert other values: text to 0, 2.7 to 2.
+// Requires a 32-bit integer. WebAssembly would convert other values, for example text to 0 and 2.7 to 2.
 function whole(value, name, way = "a 32-bit integer") {
   if (Number.isInteger(value) && value === (value | 0)) return value;
   throw new SoftError(-1, `${name} is ${shown(value)}: give ${way}`);
 }
 
-// Conversions to signed or unsigned 32-bit numbers.
+// Requires 32 bits, given as a signed or unsigned number.
 const bits = (value, name) => whole(value > 0x7fffffff && value <= 0xffffffff ? value - 2 ** 32 : value, name);
 
-// Requires an object of this world, because its number or handle does not identify the world.
+// Requires an object of this world, because the number or handle of an object does not identify its world.
 function ownOf(world, thing, Kind, name, way) {
   if (thing instanceof Kind && thing.world === world) return thing;
   const what = thing instanceof Kind ? "of another world" : shown(thing);
@@ -81,7 +82,7 @@ class Native {
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize();
     this.listeners = listeners;
-    this.small = this.allocate(1024); // for arguments and results of one call
+    this.small = this.allocate(1024); // memory for arguments and results of one call
   }
 
   get view() {
@@ -95,7 +96,7 @@ class Native {
     return at;
   }
 
-  // Calls a function. A refused call throws an exception; then the stack of the module is restored.
+  // Calls a function. If the call throws an exception, the stack of the module is restored.
   call(name, ...args) {
     if (!(name in this.exports)) {
       throw new SoftError(-5, `the world has no ${name}, because it is from another version of this package: export it again`);
@@ -180,7 +181,7 @@ class Block {
   }
 }
 
-/** A world file, read by `loadScene`. All worlds of a scene use the same code. */
+/** A world file, read by `loadScene`. All worlds of a scene share the compiled code. */
 export class Scene {
   constructor(module, bytes) {
     this.native = new Native(module);
@@ -190,7 +191,7 @@ export class Scene {
     this.native.view.setUint32(small, 24, true);
     this.native.call("ts_scene_get_info", this.handle, small);
     const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
-    // Read now, because worlds can outlive the scene.
+    // Read all names now, because worlds can outlive the scene.
     this.names = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, this.#names(kind)]));
     const [joints, motors] = [this.names.joint.length, this.names.motor.length];
     this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes, joint: joints, motor: motors };
@@ -236,14 +237,14 @@ export class Scene {
     return { number, asset, level: level < 0 ? null : level, vertexCount, triangles, uv };
   }
 
-  /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
+  /** Return the name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor" with a number. */
   nameOf(kind, number) {
     const found = this.#namesOf(kind)[number];
     if (found === undefined) throw new SoftError(-1, `${kind} ${number} does not exist (${this.names[kind].length} in all, numbered from 0)`);
     return found;
   }
 
-  /** Number of an object with a name. */
+  /** Return the number of the object with a name. */
   find(kind, name) {
     const names = this.#namesOf(kind);
     if (typeof name === "number") return whole(name, kind);
@@ -257,25 +258,25 @@ export class Scene {
     throw new SoftError(-1, `kind is ${kind}: give one of ${Object.keys(KINDS).join(", ")}`);
   }
 
-  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
+  /** Return `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const found = this.assets[this.find("asset", name)];
     if (!found) throw new SoftError(-1, `asset ${name} does not exist (${this.assets.length} in all, numbered from 0)`);
     return found;
   }
 
-  /** Create a world in its exported state. */
+  /** Create a world in the exported state. */
   createWorld() {
     return new World(this);
   }
 
-  /** Free the scene after the last of its worlds is destroyed. */
+  /** Release the scene. Its memory is freed when the last of its worlds is destroyed. */
   unload() {
     this.native.call("ts_scene_unload", this.handle);
   }
 }
 
-/** A simulation of a scene. */
+/** A running instance of a scene. */
 export class World {
   #listener = null;
   #restoreCount = 0;
@@ -336,11 +337,11 @@ export class World {
     try {
       this.#call("ts_web_end_frame");
     } catch {
-      // onStep destroyed the world: rethrow its exception
+      // onStep has destroyed the world, so there is no frame to end
     }
   }
 
-  /** `stepsMade` by the last `advance`, `steps` in total, `time` [s], `alpha`, `dropped` time [s]. */
+  /** Clock: `stepsMade` by the last `advance`, total `steps`, `time` [s], `alpha`, total `dropped` time [s]. */
   get clock() {
     this.native.view.setUint32(this.native.small, 40, true);
     this.#call("ts_world_get_clock", this.native.small);
@@ -353,7 +354,7 @@ export class World {
     return { stepsMade: view.getInt32(small + 4, true), steps: Number(view.getBigInt64(small + 8, true)), time, alpha, dropped };
   }
 
-  /** Function that is called before each step of `advance`, to move colliders and frames and to apply forces. */
+  /** Function that `advance` calls before each step. Move colliders and frames and apply forces in it. */
   set onStep(listener) {
     this.#listener = listener;
     if (listener) this.native.listeners.set(this.handle, listener);
@@ -417,12 +418,12 @@ export class World {
     this.#restoreCount += 1;
   }
 
-  /** Number of `restore` calls. If it has changed, earlier stored states belong to another history. */
+  /** Number of `restore` calls. If this number has changed, states stored before belong to another history. */
   get restoreCount() {
     return this.#restoreCount;
   }
 
-  /** Record events of these kinds, a sum of `EVENTS`. By default all kinds are recorded, with 0 none. */
+  /** Record events of these kinds, a sum of `EVENTS`. By default, all kinds are recorded; with 0, no kind. */
   recordEvents(kinds = 31) {
     this.#call("ts_world_record_events", whole(kinds, "kinds", "a sum of EVENTS"));
   }
@@ -464,7 +465,7 @@ export class World {
     return Number(this.native.view.getBigInt64(this.native.small, true));
   }
 
-  /** Return the body in a slot, by number or name; null for an empty slot. */
+  /** Return the body in a slot with a number or name; null if the slot is empty. */
   body(name) {
     const slot = this.scene.find("body", name);
     this.#call("ts_world_get_body", slot, this.native.small);
@@ -582,21 +583,21 @@ export class World {
     return new Frame(this, native.int(native.small + 64));
   }
 
-  /** Return a grab by its index, 0 to 15, or null. */
+  /** Return the grab with an index, 0 to 15; null if there is none. */
   grab(number) {
     this.#call("ts_world_get_grab", whole(number, "number"), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Grab(this, handle);
   }
 
-  /** Return a joint by name, or by index from 0 to 63; null if there is none. */
+  /** Return the joint with a name or an index, 0 to 63; null if there is none. */
   joint(name) {
     this.#call("ts_world_get_joint", this.scene.find("joint", name), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Joint(this, handle);
   }
 
-  /** Return a motor by name, or by index from 0 to 63; null if there is none. */
+  /** Return the motor with a name or an index, 0 to 63; null if there is none. */
   motor(name) {
     this.#call("ts_world_get_motor", this.scene.find("motor", name), this.native.small);
     const handle = this.native.handle(this.native.small);
@@ -650,8 +651,8 @@ export class Body {
   }
 
   /**
-   * Change the level of detail. Fails if joints, motors or attachments cannot be kept at that level, unless `release` is
-   * true.
+   * Change the level of detail. If joints, motors or attachments cannot be kept at the new level, they are released if
+   * `release` is true; otherwise the call fails.
    */
   setLevel(level, { release = false } = {}) {
     this.#call("ts_body_set_level", whole(level, "level"), Number(release));
@@ -663,7 +664,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** Copy the vertex positions [m], interpolated from the previous step (0) to the last one (1). */
+  /** Return the vertex positions [m], interpolated between before (alpha 0) and after (alpha 1) the last step. */
   positions(alpha = 1) {
     const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {
@@ -674,7 +675,7 @@ export class Body {
     }
   }
 
-  /** Return the first render mesh of the asset and level, or one by number or name. Call this only once. */
+  /** Return the mesh with a number or name, or the first mesh of the body's asset and level. Call this only once. */
   mesh(name = null) {
     const { asset, level } = this;
     const { scene } = this.world;
@@ -720,7 +721,7 @@ export class Body {
     this.#call("ts_body_set_gravity_scale", scale);
   }
 
-  /** Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. */
+  /** Set the Coulomb coefficient for contact with other bodies. The world must have soft contact. */
   setFriction(friction) {
     this.#call("ts_body_set_friction", friction);
   }
@@ -771,7 +772,7 @@ export class Body {
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
   }
 
-  /** Attach vertices to another body, at their current positions in it, or each to one of its vertices in `onto`. */
+  /** Attach vertices to the body `other`, at their current positions or, with `onto`, each to a vertex in `onto`. */
   join(vertices, other, { onto = null } = {}) {
     const { native } = this.world;
     ownOf(this.world, other, Body, "other", "a body, such as world.body(name)");
@@ -785,8 +786,9 @@ export class Body {
   }
 
   /**
-   * Rotate vertices about an axis with up to `maxTorque` [N m], or push them along it with up to `maxForce` [N], towards
-   * a speed [rad/s] or [m/s]. The axis rotates with them, or is fixed in space, optionally through a point.
+   * Add a motor. With `maxTorque` [N m], the motor rotates vertices about an axis towards a speed [rad/s]. With
+   * `maxForce` [N], the motor pushes vertices along the axis towards a speed [m/s]. The axis rotates with the vertices,
+   * or is fixed in space, optionally through a point.
    */
   addMotor(vertices, { axis, speed = 0, maxTorque = null, maxForce = null, isFixed = false, point = null }) {
     const { native } = this.world;
@@ -812,7 +814,7 @@ export class Body {
   }
 }
 
-/** A render mesh. `update` fills `positions` and `normals`. They are views: read them again after each call. */
+/** A render mesh. `positions` and `normals` are views of the module's memory. Read them again after each `update`. */
 export class Mesh {
   #blocks;
 
@@ -839,7 +841,7 @@ export class Mesh {
     return this.#there.triangles.view;
   }
 
-  /** Texture coordinates, two numbers per vertex, v upwards; null if there are none. */
+  /** Texture coordinates, two numbers per vertex; v points up. Null if there are none. */
   get uv() {
     return this.#there.uv?.view ?? null;
   }
@@ -934,7 +936,7 @@ export class Motor extends Numbered {
     this.call("ts_motor_set_speed", speed);
   }
 
-  /** Set the largest torque [N m] or force [N]. With 0 the vertices move freely. */
+  /** Set the largest torque [N m] or force [N]. With 0 the vertices coast. */
   setLimit(limit) {
     this.call("ts_motor_set_limit", limit);
   }
@@ -992,7 +994,7 @@ export class Collider extends Placed {
     this.call("teleport", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
 
-  /** `impulse` [N s] of all bodies on the collider in the last step, and `moment` about its position. */
+  /** `impulse` [N s] of all bodies on the collider in the last step, and its `moment` about the collider's position. */
   get impulse() {
     const { native } = this.world;
     this.call("get_impulse", native.small, native.small + 24);
@@ -1054,8 +1056,8 @@ function entryOf(view, wanted) {
   throw new RangeError(`no ${wanted}`);
 }
 
-// True if a module has the size and checksum in its world file. Also true for an invalid world file, which the
-// library then refuses with a reason.
+// True if a module has the size and checksum that the world file contains. For an invalid world file, the result is
+// also true, because the library then refuses the file with a reason.
 function isOf(world, code) {
   try {
     const view = new DataView(world.buffer, world.byteOffset, world.byteLength);
@@ -1069,7 +1071,7 @@ function isOf(world, code) {
   }
 }
 
-/** Compiles the module of a world and reads its file, from the bytes of `kernels/web.wasm` and `world.tsw`. */
+/** Compiles a world's kernels and reads its world file, from the bytes of `kernels/web.wasm` and of `world.tsw`. */
 export async function sceneOf(code, world) {
   if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
   const [module, file] = [bytesIn(code, "code"), bytesIn(world, "world")];
@@ -1077,7 +1079,7 @@ export async function sceneOf(code, world) {
     throw new SoftError(-4, "the code is not a WebAssembly module: is the folder from taichi-soft export --for web?");
   }
   const compiling = WebAssembly.compile(module); // runs on another thread
-  compiling.catch(() => {}); // awaited below, unless the module is refused
+  compiling.catch(() => {}); // a refused module is never awaited, so its errors are ignored
   if (!isOf(file, module)) {
     throw new SoftError(-4, "the kernels belong to another export, or are damaged: export the world again, and ship both");
   }

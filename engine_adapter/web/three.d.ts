@@ -9,7 +9,7 @@ export class SoftMesh<ThreeMesh = any> {
   update(): void;
   /** Grab the body where a `THREE.Raycaster` hits it; null if the ray hits nothing or another body. */
   grab(raycaster: any): { grab: Grab; distance: number } | null;
-  /** Move a grab of `grab` to the ray, at its initial distance from the ray's origin. */
+  /** Move the target of a grab to the ray, at the initial distance from the ray's origin. Pass a result of `grab`. */
   pull(held: { grab: Grab; distance: number }, raycaster: any): void;
   dispose(): void;
 }

@@ -13,14 +13,14 @@ export class SoftMesh {
     this.drawn = body.mesh(name);
     const geometry = new THREE.BufferGeometry();
     for (const [to, from] of [["position", "positions"], ["normal", "normals"]]) {
-      // A separate copy: views of the module's memory become invalid when it grows.
+      // Make a separate copy, because views of the module's memory become invalid when the memory grows.
       const attribute = new THREE.BufferAttribute(new Float32Array(this.drawn[from]), 3);
       geometry.setAttribute(to, attribute.setUsage(THREE.DynamicDrawUsage));
     }
     if (this.drawn.uv) geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array(this.drawn.uv), 2));
     geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(this.drawn.triangles), 1));
     this.mesh = new THREE.Mesh(geometry, material);
-    this.mesh.frustumCulled = false; // the bounding box changes in every frame
+    this.mesh.frustumCulled = false; // three.js would compute the bounds only once
   }
 
   /** Update the mesh with the current shape of the body. */
@@ -40,7 +40,7 @@ export class SoftMesh {
     return hit?.body.handle === handle ? { grab: hit.body.grab(hit), distance: hit.distance } : null;
   }
 
-  /** Move a grab of `grab` to the ray, at its initial distance from the ray's origin. */
+  /** Move the target of a grab to the ray, at the initial distance from the ray's origin. Pass a result of `grab`. */
   pull({ grab, distance }, raycaster) {
     const { origin, direction } = raycaster.ray;
     grab.moveTo(origin.clone().addScaledVector(direction, distance).toArray());

@@ -1,4 +1,4 @@
-"""The command line: demos, films, bakes, exports, profiles and device information."""
+"""Command line for demos, films, bakes, exports, profiles and device information."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from taichi_soft.core.extras import require_extra
 
 
 def main(*arguments: str) -> None:
-    """Run the command line. A TaichiSoftError is printed as one line, with exit code 1; a wrong option exits
-    with 2.
+    """Run the command line.
+
+    A TaichiSoftError is printed as one line, and the exit code is 1. For a wrong option, the exit code is 2.
 
     Args:
         arguments: command-line arguments; by default those of the process.

@@ -28,7 +28,7 @@ add_moved(app)
 
 
 def run(*arguments: str) -> None:
-    """Run the command line, see `cli.main`. This requires the extra `cli`."""
+    """Run the command line, see `cli.main`. The command line requires the extra `cli`."""
     run_app(app, *arguments)
 
 

@@ -36,7 +36,7 @@ def bake(
 ) -> None:
     """Simulate a scene and write its meshes and motion for Blender, a game engine or a web page."""
     make = function_of(scene, "which scene")
-    if threads is not None or arch != "auto":  # do not start Taichi, so that the scene can
+    if threads is not None or arch != "auto":  # otherwise the scene can still choose the device
         init(arch, threads)
     made = _scene_of(make(), scene)
     from taichi_soft.bake import bake as write

@@ -1,4 +1,4 @@
-"""Functions of all commands for terminal output, options and device information."""
+"""Terminal output, options and device information, shared by all commands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def progress_bar() -> Progress:
 
 @contextmanager
 def filming(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Show the progress of a film and of compilation: a bar on a terminal, one line elsewhere.
+    """Show the progress of a film and of compilation as a bar. Without a terminal, print only the name.
 
     Yields: a function to call with (frames made, total frames).
     """
@@ -53,7 +53,7 @@ def filming(name: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def device_facts(device: Device) -> dict[str, Any]:
-    """Describe the chosen device, as text and for JSON."""
+    """Return the chosen device, its thread count, its cores and the reason for the choice, by label."""
     facts = {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
     return {**facts, "bound to cores": list(device.cores)} if device.cores else facts
 

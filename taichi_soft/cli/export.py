@@ -39,11 +39,11 @@ def export(
         ),
     ] = False,
 ) -> None:
-    """Write a world and its kernels for the C library, which steps them in an engine without Python.
+    """Write a world and its kernels for the C library, which steps the world in an engine without Python.
 
-    Scripts need no changes. The state of the world when the script ends is exported; if necessary, the world
-    is built first. Bodies, assets, colliders, frames, joints and motors are named after the script's
-    variables.
+    Scripts need no changes. The command exports the state that the world has when the script ends. If the
+    script does not build the world, the command does. Bodies, assets, colliders, frames, joints and motors
+    are named after the script's variables.
     """
     init("cpu")
     world, names = _found_in(scene)
@@ -89,9 +89,7 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
 
 
 def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
-    """Name the parts of a world after the variables that contain them; for a part in a list, add the
-    index.
-    """
+    """Name each part of a world after the variable that contains it. Add an index for a part in a list."""
     from taichi_soft import Body, Collider, Frame, Joint, Motor, SoftBodyAsset
 
     found: dict[Any, str] = {}

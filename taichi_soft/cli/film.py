@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 MATERIAL = "gelatine"
 
 SMALLEST, LARGEST, LENGTH = 0.05, 5.0, 1.0
-"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]. Its file uses another
-unit, or its size would make it look rigid or limp."""
+"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]. At such sizes the file
+probably uses another unit, or the body would look rigid or limp."""
 
 SECONDS = 5.0
 """Default length of a film whose scene is not a Stage [s]."""
 
 DROP = 0.5
-"""Drop height, over the height of the mesh."""
+"""Drop height as a multiple of the height of the mesh."""
 
 
 def film(
@@ -108,7 +108,7 @@ def _stage_of(
     seconds: float | None,
     orbit: bool,
 ) -> Stage:
-    """Return the author's stage, or make a stage for a world, with a camera that sees all motion."""
+    """Return the stage that `find` returns. If `find` returns a world, make a stage that shows its motion."""
     from taichi_soft import World
     from taichi_soft.render.camera import Camera
     from taichi_soft.render.camera_moves import Orbit
@@ -142,7 +142,7 @@ def _stage_of(
 
 
 def _scene_of(scene: str) -> Callable[[], Any]:
-    """Return a function that makes a new world or stage with a script or function."""
+    """Return a function that runs a script or function, which makes a new world or stage."""
     if ":" not in scene and not scene.endswith(".py"):
         from taichi_soft.render.demos import demo_names
 

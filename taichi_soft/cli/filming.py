@@ -29,7 +29,7 @@ Stats = Annotated[
 
 
 def size_of(text: str) -> tuple[int, int]:
-    """Parse `1280x720` to width and height [pixels]. Raises: OptionError."""
+    """Parse text such as `1280x720`. Returns: width and height [pixels]. Raises: OptionError."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise OptionError(f"size must be width x height in pixels, such as 1280x720, got {text!r}")

@@ -7,7 +7,7 @@ import typer
 from taichi_soft.core.errors import OptionError
 
 MOVED = ("drop-test", "report")
-"""Commands that moved to `python -m lab` under the same name."""
+"""Commands that moved to `python -m lab` and kept their names."""
 
 
 def add_moved(app: typer.Typer) -> None:
@@ -22,5 +22,5 @@ def _refuse(context: typer.Context) -> None:
 
 
 def refuse_moved(old: str, new: str) -> None:
-    """Raise an OptionError that names the new command, which needs a source checkout."""
+    """Raise an OptionError that names the new command and says that it needs a source checkout."""
     raise OptionError(f"{old} needs a checkout of the sources: run python -m lab {new} there")

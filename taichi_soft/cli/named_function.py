@@ -1,4 +1,4 @@
-"""Find a script or a function that is named on the command line: `game.py:make_world`."""
+"""Find the script or the function that a command-line argument names, such as `game.py:make_world`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
     """Return the function that a text such as `game.py:make_world` names.
 
     Args:
-        what: purpose of the function for error messages, such as "which worlds".
+        what: first words of an error message, which name the purpose of the function: "which worlds".
     Raises: OptionError for malformed text, a failed import, or an unknown name.
     """
     place, _, name = text.rpartition(":")
@@ -34,9 +34,10 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
 
 
 def variables_of(script: str) -> dict[str, Any]:
-    """Run a script with its folder and the current one on the path. Returns: the script's variables, by name.
+    """Run a script, which can import modules from its own folder and from the current folder.
 
-    Raises: OptionError for a file that cannot be read, and every error of the script.
+    Returns: the script's variables, by name.
+    Raises: OptionError if the file cannot be read; errors of the script.
     """
     try:
         Path(script).read_bytes()

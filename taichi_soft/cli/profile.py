@@ -16,7 +16,7 @@ from taichi_soft.core.runtime import init
 GpuName: TypeAlias = Literal["cuda", "vulkan", "metal"]
 
 IN_TURN = 15
-"""Smallest number of steps with which a budget is measured."""
+"""Smallest number of steps for a measurement of a time budget."""
 
 
 def profile(
@@ -96,7 +96,7 @@ def profile(
     where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
     say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
     for title, table in profile_tables.tables(found):
-        say(f"\n[bold]{escape(title)}[/]")  # a table's own title would wrap at its width
+        say(f"\n[bold]{escape(title)}[/]")  # the title of a Table would wrap at the table's width
         console.print(table)
 
 

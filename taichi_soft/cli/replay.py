@@ -23,7 +23,7 @@ def replay(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Replay a recording bit by bit, print the first failure, and draw the final state."""
+    """Replay a recording bit-identically, print the first failure, and draw the final state."""
     init(arch, threads)
     from taichi_soft.render.replay import failure_line
     from taichi_soft.render.replay import replay as play_again

@@ -1,4 +1,4 @@
-"""Make and run a command line: summaries of commands, errors, warnings and signals."""
+"""Make a command line from functions, run it, and handle errors, warnings and signals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,12 @@ from taichi_soft.core.signals import INTERRUPTED, ended_by_signals
 
 
 def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
-    """Make a command from each function. The summary is the first paragraph of the function's docstring."""
+    """Make a command line with a command for each function.
+
+    Args:
+        summary: help text of the command line.
+        commands: functions. The first paragraph of a docstring is the summary of its command.
+    """
     app = typer.Typer(
         help=summary,
         no_args_is_help=True,
@@ -32,7 +37,9 @@ def make_app(summary: str, *commands: Callable[..., None]) -> typer.Typer:
 
 
 def run_app(app: typer.Typer, *arguments: str) -> None:
-    """Run a command. A TaichiSoftError is printed as one line, with exit code 1; a wrong option exits with 2.
+    """Run a command line.
+
+    A TaichiSoftError is printed as one line, and the exit code is 1. For a wrong option, the exit code is 2.
 
     Args:
         app: result of `make_app`.

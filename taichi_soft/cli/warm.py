@@ -34,7 +34,7 @@ def warm(
     make = function_of(worlds, "which worlds")
     if out is not None:
         os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(out.resolve())
-    if threads is not None or arch != "auto":  # do not start Taichi, so that the game can
+    if threads is not None or arch != "auto":  # otherwise the game can still choose the device
         init(arch, threads)
     start = time.perf_counter()
     with (

@@ -23,7 +23,7 @@ TYPES = {np.dtype(name): code for code, name in enumerate(("u1", "<i4", "<i8", "
 
 
 def written(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """Return the content of a file with these arrays, whose types must be in `TYPES`."""
+    """Return the bytes of a file that contains the arrays. Their types must be in `TYPES`."""
     parts = []
     for name, array in arrays.items():
         text, whole = name.encode(), np.ascontiguousarray(array)

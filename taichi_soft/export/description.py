@@ -1,4 +1,4 @@
-"""Describe a world as named arrays for its world file; kernels are separate."""
+"""Describe a world as named arrays for its world file, which does not contain kernels."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ from taichi_soft.solver.context import WorldContext
 Arrays = dict[str, NDArray[Any]]
 
 _ALWAYS, _OF_JOINTS, _OF_MOTORS = range(3)
-"""Codes for the rows of a field in a snapshot: all, of joints, or of motors. `scene.hpp` has the same."""
+"""Codes for the number of rows of a field in a snapshot: fixed, per row of joints, or per particle of motors.
+`scene.hpp` declares the same codes."""
 
 
 def description_of(
@@ -111,7 +112,8 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = row_counts(context, write_manifest(context)["slices"])
-    # All grabs and motors, because a game can add some. The last three count per row in use.
+    # Reserve rows for all grabs and motors, because a game can add some. The last three counts are per row in
+    # use.
     rows |= {USED_GRABS: MOST_GRABS, PATCHES: MOST_GRABS * PATCH_ROWS, ALL_MOTORS: MOST_MOTORS}
     rows |= {USED_MOTORS: MOST_MOTORS, MOTOR_PARTICLES: 1, USED_JOINT_ROWS: 1, JOINT_ENDS: ENDS}
     whose = {MOTOR_PARTICLES: _OF_MOTORS, USED_JOINT_ROWS: _OF_JOINTS, JOINT_ENDS: _OF_JOINTS}
@@ -157,7 +159,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
 
 
 def _held(context: WorldContext) -> Arrays:
-    """Return the pins of all bodies as vertices of the finest level, by slot: see `BodyRecord.held`."""
+    """Return the vertices of the finest level that pins represent, for all slots. See `BodyRecord.held`."""
     bodies = context.slots.slots
     held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
     rows = [np.zeros(0) if each is None else each for each in held]
@@ -196,7 +198,7 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
 
 
 def _target_of(row: ColliderRow) -> list[float]:
-    """Return 1 and the pose of a collider's target, or only zeros if it has no target."""
+    """Return 1 and the pose of a collider's target. If the collider has no target, all numbers are 0."""
     return [0.0] * 8 if row.target is None else [1.0, *np.concatenate(row.target).tolist()]
 
 
@@ -210,7 +212,9 @@ def _of_frames(context: WorldContext) -> Arrays:
 
 
 def _attached(context: WorldContext) -> Arrays:
-    """Return for each particle 1 if its load is recorded, and the number of its attachment from 1, or 0."""
+    """Return two arrays by name, with a number per particle: 1 if the load is recorded, else 0; and the
+    number of the attachment, from 1, or 0 if the particle is not attached.
+    """
     count = context.layout.particle_count
     feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)
     for body, held in context.of(Frames).attachments.items():

@@ -15,7 +15,8 @@ AXES = {
     "unity": ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
     "unreal": ((100, 0, 0), (0, -100, 0), (0, 0, 100)),
 }
-"""Matrices by name, from positions in this package [m] (z up, right-handed) to positions in the engine.
+"""Matrices by name. Each matrix converts positions in this package [m] (z up, right-handed) to positions in
+the engine.
 
 "z-up": unchanged, for Blender and Panda3D. "y-up": y up, right-handed, for Godot, glTF and three.js. "unity":
 y up, left-handed. "unreal": z up, left-handed, in centimetres.

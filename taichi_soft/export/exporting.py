@@ -1,4 +1,4 @@
-"""Write a built world as a folder for the native library. If this fails, no part of it remains."""
+"""Write a built world as a folder for the native library. A failed export leaves no files."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ def export_world(
         world: built world in the initial state of the game.
         path: path of the folder. An earlier export there is replaced.
         axes: axes of the engine, a name in `AXES`.
-        names: names for bodies, assets, colliders, frames, joints and motors in the game. Objects without a
-            name get one with their index, such as body3.
-        platforms: names in `PLATFORMS`; None: the platform of this machine.
+        names: names for bodies, assets, colliders, frames, joints and motors in the game. An object without a
+            name is named by its kind and index, such as body3.
+        platforms: names in `PLATFORMS`. None means the platform of this machine.
         static: True writes object files to link into the game, for systems that forbid loading code at run
-            time: see `ts_scene_load_linked`.
+            time. See `ts_scene_load_linked`.
     Raises: StateError for a world that is not built; OptionError for a path that is in use or cannot be
         written, for an unknown platform, for `static` with the platform "web", or for features that the
         native library does not support; MissingExtraError if llvmlite or zig is not installed.
@@ -90,7 +90,7 @@ def export_world(
 
 
 def _made_unique(names: list[str]) -> list[str]:
-    """Return the names with a number appended to repeated ones, so that they are unique."""
+    """Return unique names, by appending a number to each repeated name."""
     found: list[str] = []
     for i, name in enumerate(names):
         found.append(f"{name}#{i}" if name in found else name)

@@ -56,7 +56,7 @@ def place_of(field: Any) -> FieldPlace | None:
 
 
 def image_of(state: State) -> NDArray[np.uint8]:
-    """Return a copy of the memory of all fields."""
+    """Return a copy of the memory of all fields, as bytes."""
     found = np.zeros(1, dtype=np.uint64)
     read_root(state, found)
     place = place_of(state.particle_position)

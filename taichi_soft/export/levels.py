@@ -22,7 +22,13 @@ _ROWS = list(signature(write_body).parameters)[5:]
 
 
 def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arrays:
-    """Return the arrays to write into a slot when its body changes to this level of an asset, by name."""
+    """Return the arrays, by name, that are written into a slot when its body changes its level of detail.
+
+    Args:
+        context: context of the world.
+        number: index of the asset in the world.
+        asset: the level of an asset to which the body changes.
+    """
     state, arrays = context.built.state, asset.arrays
     found: Arrays = {f"slot/{name}": rows for name, rows in zip(_ROWS, body_rows(arrays), strict=True)}
     found["slot/kind"] = kind_numbers(state, asset)
@@ -46,7 +52,7 @@ def constant_names(context: WorldContext) -> list[str]:
 
 
 def passage_arrays(asset: SoftBodyAsset) -> Arrays:
-    """Return the arrays for the transition between each pair of an asset's levels, by name."""
+    """Return the arrays, by name, that map vertices between each two levels of an asset."""
     found: Arrays = {}
     levels = range(len(asset.levels))
     for source, target in ((i, j) for i in levels for j in levels if i != j):

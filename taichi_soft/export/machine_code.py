@@ -23,7 +23,8 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.export.web import for_web, web_sources
 
 TABLE = "taichi_soft_kernels"
-"""Symbol of a file's kernel table, whose rows are `ts_linked_kernel` of the C library: name and function."""
+"""Symbol of the kernel table in a file. Each row is a `ts_linked_kernel` of the C library, with a name and a
+function."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,10 @@ int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1
 
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
-    """Check names of platforms and return them without repeats; None: this machine's. Raises: OptionError."""
+    """Check names of platforms and return them without duplicates. None means the platform of this machine.
+
+    Raises: OptionError for an unknown name.
+    """
     if names is None:
         known = {"amd64": "x64", "x86_64": "x64", "aarch64": "arm64", "win32": "windows", "darwin": "macos"}
         system, machine = (known.get(each, each) for each in (sys.platform, platform.machine().lower()))
@@ -94,22 +98,22 @@ def platforms_of(names: Sequence[str] | None) -> list[str]:
 class CompiledKernels:
     """Files of machine code, and the stamp that identifies the world file to which they belong."""
 
-    stamp: str  # the library compares it with the stamp in the world file
+    stamp: str  # the library compares this stamp with the stamp in the world file
     files: list[Path]  # one or more per platform
 
 
 def compile_kernels(
     texts: Path, names: Sequence[str], platforms: Sequence[str], folder: Path, world: str | None
 ) -> CompiledKernels:
-    """Compile kernels for platforms.
+    """Compile kernels to machine code for one or more platforms.
 
     Args:
         texts: folder with the assembly of each kernel in a file NAME.ll.
         names: names of the kernels.
         platforms: names from `PLATFORMS`.
         folder: folder for the output.
-        world: None: write shared libraries. A name: write object files to link into a game; the name becomes
-            part of the table's symbol.
+        world: None writes shared libraries. A name writes object files to link into a game, and is part of
+            the table's symbol.
     """
     llvm = _llvm()
     sources = {name: _source_of(name, (texts / f"{name}.ll").read_text()) for name in names}
@@ -137,7 +141,9 @@ def _llvm() -> Any:
 
 
 def _source_of(name: str, text: str) -> str:
-    """Return a kernel's assembly without its platform, and with a function that runs its parts in order."""
+    """Return a kernel's assembly without its target platform. Add a function that runs the kernel's parts in
+    order.
+    """
     text = _PROCESSOR.sub("", _TARGET_LINES.sub("", text))
     parts = sorted((int(number), part, context) for part, number, context in _PART.findall(text))
     for number, part, _ in parts:
@@ -151,7 +157,7 @@ def _source_of(name: str, text: str) -> str:
 
 
 def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
-    """Return the kernel table as LLVM assembly: the stamp, rows of a name and a function, and a null row."""
+    """Return the kernel table as LLVM assembly. The stamp is in the first row, and the last row is null."""
     lines, rows = [], []
     for i, text in enumerate([stamp, *names]):
         kind = f"[{len(text) + 1} x i8]"
@@ -179,7 +185,7 @@ def _object_of(llvm: Any, sources: Mapping[str, str], table: str, target: Platfo
         module = llvm.parse_assembly(for_web(source) if target.is_web else source)
         module.triple, module.data_layout = whole.triple, whole.data_layout
         whole.link_in(module)
-    for name in sources:  # so that a game can link several worlds
+    for name in sources:  # internal, so that a game can link several worlds
         whole.get_function(_FUNCTION + name).linkage = "internal"
     return bytes(machine.emit_object(whole))
 

@@ -1,4 +1,4 @@
-"""Render meshes of an asset: its skins, or its surface."""
+"""Render meshes of an asset: its skins, or its surface if it has no skin."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class ExportedMesh:
 
 
 def meshes_of(number: int, asset: SoftBodyAsset, name: str) -> list[ExportedMesh]:
-    """Return the render meshes of an asset: its skins, or else the surfaces of its levels."""
+    """Return the render meshes of an asset: its skins, or the surfaces of its levels if it has no skin."""
     found = []
     for i, skin in enumerate(asset.skins):
         surface = skin.surface

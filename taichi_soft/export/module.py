@@ -1,4 +1,4 @@
-"""Kernels of a world file, with the arguments for which they are compiled."""
+"""Kernels that the native library calls, with the arguments for which they are compiled."""
 
 from __future__ import annotations
 

@@ -65,11 +65,13 @@ leave:
   ret void
 }}
 """
-"""Assembly of a function that runs one part of a loop: as in Taichi's runtime, but with other offsets."""
+"""Assembly of a function that runs one part of a loop. Only its struct offsets differ from Taichi's code."""
 
 
 def for_web(source: str) -> str:
-    """Return a kernel's assembly for 32-bit pointers; Taichi's loop runner has struct offsets for 64 bits."""
+    """Return a kernel's assembly for 32-bit pointers. Replace Taichi's loop runner, whose struct offsets are
+    for 64-bit pointers.
+    """
     if not _LOOP.search(source):
         return source
     (closure,), (context,) = set(_CLOSURE.findall(source)), set(_CONTEXT.findall(source))
@@ -80,7 +82,7 @@ def web_sources() -> list[str | Path]:
     """Return the compiler arguments for the native library, which is linked with a world's kernels."""
     native = _HERE / "native"
     return [
-        # Optimise the native library for size, but standard functions that kernels call for speed.
+        # Optimise the native library for size, and standard functions that kernels call for speed.
         *("-mexec-model=reactor", "-std=c++17", "-O2", "-Xclang", "-Os", "-msimd128", "-ffp-contract=off"),
         *(
             "-fno-exceptions",

@@ -1,4 +1,6 @@
-"""Manifest: the state of a world outside its fields, as plain data. It contains time, bodies and slices."""
+"""Manifest: the state of a world outside its fields, as plain data. A manifest contains time, bodies and
+slices.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +59,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
 
 @dataclass
 class BodyEntry:
-    """A body of a manifest, which will occupy a slot."""
+    """Entry of a manifest for a body that will occupy a slot."""
 
     serial: int
     first_step: int
@@ -72,7 +74,7 @@ class BodyEntry:
 
 @dataclass
 class Manifest:
-    """A manifest that was read and fully checked against a world."""
+    """Contents of a manifest, after all checks against the world."""
 
     steps: int
     time: float
@@ -85,7 +87,7 @@ class Manifest:
 
 
 def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]) -> dict[int, CutMesh]:
-    """Read the meshes of cut bodies. Return them by slot.
+    """Read the meshes of cut bodies. Returns: meshes by slot.
 
     Args:
         bodies: entries of bodies in the manifest.

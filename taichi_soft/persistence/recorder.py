@@ -38,7 +38,8 @@ MAX_CONTENT = 1 << 28
 times smaller: without this limit, a small file could fill the memory."""
 
 FieldAccelerations = list[tuple[int, NDArray[np.float32]]]
-"""Accelerations by a force field in one step: for each body, serial number and rows (n, 3) [m/s^2]."""
+"""Accelerations that the force field gave in one step. Each pair is a body's serial number and the
+accelerations of its vertices, (n, 3) [m/s^2]."""
 
 
 @dataclass
@@ -58,7 +59,7 @@ class _Segment:
         self.marks[name_of_sealed(snapshot)] = len(self.entries)
 
     def rewind(self, name: bytes) -> None:
-        """Remove the entries after the snapshot of a given name."""
+        """Remove the entries after the snapshot with this name."""
         end = self.marks[name]
         del self.entries[end:]
         self.marks = {name: at for name, at in self.marks.items() if at <= end}
@@ -81,12 +82,12 @@ class Recorder:
         self._present = _Segment(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
-        self.field_accelerations: FieldAccelerations = []  # by the force field in the next step
+        self.field_accelerations: FieldAccelerations = []  # accelerations in the next step
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call and record it, unless it raises or is nested in a recorded call. Return its result."""
+        """Make a call and return its result. Record the call, unless it raises or a recorded call made it."""
         if self._is_inside:
             return method(handle, *arguments, **options)
         copied = [
@@ -132,7 +133,7 @@ class Recorder:
     def rewind(self, context: WorldContext, snapshot: bytes) -> None:
         """Remove the entries that `World.restore` undid.
 
-        Restart the recording if the snapshot was taken before it or in another world.
+        Restart the recording if the snapshot was taken before the recording or in another world.
         """
         name = name_of_sealed(snapshot)
         self.field_accelerations = []
@@ -181,7 +182,7 @@ class Recorder:
 def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
     """Read a file of a recording. Raises: SnapshotError.
 
-    Returns: assets, options and entries; the snapshot before them.
+    Returns: assets, options and entries of the recording; and the snapshot before the entries.
     """
     file = as_path(path)
     try:
@@ -194,7 +195,11 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read a file that a web page saved: a recording, and entries of the visitor that replace its steps."""
+    """Read a file that a web page saved. Return content and snapshot as in `read_recording`.
+
+    The file contains a recording, and the visitor's entries. The visitor's entries replace all entries of the
+    recording from its first step on.
+    """
     try:
         played = json.loads(data)
         made_of, snapshot = _read_sealed(base64.b64decode(played["start"], validate=True))
@@ -209,7 +214,7 @@ def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read the bytes of `Recorder.content`. Return content and snapshot as `read_recording`."""
+    """Parse the result of `Recorder.content`. Return content and snapshot as in `read_recording`."""
     parts = unseal(data, MARK, VERSION, "recording")
     try:
         content, snapshot = parts
@@ -224,7 +229,7 @@ def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def _world_options(context: WorldContext) -> dict[str, Any]:
-    """Return the arguments of `World`, as plain data: a snapshot does not contain them."""
+    """Return the arguments of `World` as plain data, because a snapshot does not contain them."""
     chosen = context.settings
     names = (
         "restitution",

@@ -1,4 +1,6 @@
-"""Restore the bodies of a manifest: reuse the handles that callers have, and create the others."""
+"""Restore the bodies of a manifest. Handles that callers still have are valid again; other bodies get new
+handles.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ from taichi_soft.solver.state import State
 
 
 def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
-    """Set the time and bodies of a world from a manifest, but not its fields and slices. Cannot fail."""
+    """Set the time and the bodies of a world from a manifest, without fields and slices. Never raises."""
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings
@@ -31,7 +33,7 @@ def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
 
 
 def _restore_body(context: WorldContext, state: State, slot: int, entry: BodyEntry | None) -> None:
-    """Fill a slot with the body of an entry, or empty it for None."""
+    """Fill a slot with the body of `entry`. If `entry` is None, empty the slot."""
     present = context.slots.slots[slot]
     if present is not None and (entry is None or serial_of(present) != entry.serial):
         _remove(context, state, present)
@@ -74,7 +76,7 @@ def _remove(context: WorldContext, state: State, body: SoftBody) -> None:
 
 
 def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) -> SoftBody:
-    """Insert a body into a free slot. Return its handle: the one that a caller has, or a new one."""
+    """Insert a body into a free slot. Return its handle, which is new unless a caller still has one."""
     asset = context.slots.assets[slot]
     if entry.part is not None or context.layout.bodies[slot] is not asset.levels[entry.level].arrays:
         refill_slot(context, state, slot, entry.level, entry.arrays)
@@ -92,5 +94,5 @@ def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) ->
 
 
 def _description_in_slot(body: SoftBody, entry: BodyEntry) -> BodyDescription:
-    """Return the description of a body before its own material is applied."""
+    """Return the description of the data in a body's slot, before the material of `entry` is applied."""
     return present_asset(body).description if entry.part is None else entry.description

@@ -1,10 +1,10 @@
 """Convert the state of a world between two steps to bytes and back.
 
-A snapshot has four parts. The *structure* describes how the world was built; a world with another structure
-rejects the snapshot. The *manifest* contains the state outside the fields: time, gravity, the body in each
-slot, and the entries of each slice (colliders, frames, joints ...). The *words* contain exact copies of the
-fields (see `persistence.kernels.packing`) and the meshes of cut bodies (see `bodies.cut_mesh`). The last part
-is the state of the events (see `events.event_state`).
+A snapshot has four parts. The *structure* describes how the world was built; a world with a different
+structure rejects the snapshot. The *manifest* contains the state outside the fields: time, gravity, the body
+in each slot, and the entries of each slice (colliders, frames, joints ...). The *words* contain exact copies
+of the fields (see `persistence.kernels.packing`) and the meshes of cut bodies (see `bodies.cut_mesh`). The
+last part is the state of the events (see `events.event_state`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-// Substeps of the virial law, of springs and of volume springs with edge damping in plain C++: one thread, array of
-// structures, no intrinsics.
-// A careful straightforward implementation; the reference of `taichi-soft profile --baseline`.
+// Substeps of the virial law, of springs and of volume springs with edge damping, in plain C++. The code uses one
+// thread, arrays of structures and no intrinsics. `taichi-soft profile --baseline` compares Taichi with it.
 
 #include <cmath>
 

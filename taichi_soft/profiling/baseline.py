@@ -1,5 +1,5 @@
-"""Run the C++ reference, compiled on this machine, on the same arrays in the same order as the Taichi
-kernels.
+"""Compile the C++ reference on this machine, and run it on the same arrays as the Taichi kernels, in the same
+order.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ RELAXED = (
     *("-fno-math-errno", "-fno-signed-zeros", "-fno-trapping-math", "-fassociative-math"),
     *("-freciprocal-math", "-ffinite-math-only"),
 )
-"""The flags that -ffast-math implies. They are listed because with -ffast-math itself, GCC also turns on
-flush-to-zero in the thread that loads the library, and scipy's trees then crash the process."""
+"""Flags that -ffast-math implies. With -ffast-math itself, GCC would also turn on flush-to-zero in the
+thread that loads the library, and scipy's trees would then crash the process."""
 
 FLAGS = ("-O3", "-march=native", *RELAXED, "-shared", "-fPIC", "-std=c++17")
-"""Options like those with which Taichi compiles its kernels: for this processor, with relaxed rounding."""
+"""Compiler options. Like Taichi's kernels, the code is for this processor and uses relaxed rounding."""
 
 NO_FLOOR = -1.0e9
 
@@ -48,7 +48,7 @@ def compile_baseline() -> ctypes.CDLL:
     compiler = find_compiler()
     if compiler is None:
         raise DeviceError("no C++ compiler found: install g++ or clang++, or name one in CXX")
-    # A loaded library no longer needs its file, but Windows locks the file.
+    # The file can be deleted once the library is loaded, except on Windows, which locks it.
     with tempfile.TemporaryDirectory(prefix="taichi-soft-", ignore_cleanup_errors=True) as folder:
         library = Path(folder) / "baseline.so"
         command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
@@ -63,8 +63,8 @@ class Baseline:
     """A body that the C++ reference steps."""
 
     def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
-        """Copy the arrays of `body`, in the order of the kernels. The law is virial, springs or volume
-        springs.
+        """Copy the arrays of `body`, in the order of the kernels. The law of `body` must be virial, springs
+        or volume springs.
         """
         self._run = library.run_substeps if body.bonds is None else library.run_spring_substeps
         self._run.restype = None

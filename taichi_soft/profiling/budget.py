@@ -1,4 +1,4 @@
-"""Estimate the number of bodies for which a frame has time."""
+"""Estimate the number of bodies that can be stepped and read within a frame."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ FRAME_RATES = (60, 120)  # [Hz]
 
 @dataclass(frozen=True)
 class Budget:
-    """Number of spheres for which the 99th percentile of stepping and reading fits a frame."""
+    """Number of spheres that can be stepped and read within a frame in 99 % of all frames."""
 
     rate: int  # frames per second [Hz]
     substeps: int
     bodies: int
     tets: int
-    measured: Phases  # measurement from which this is scaled
+    measured: Phases  # measurement of fewer or more spheres, from which `bodies` is scaled
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each frame rate, and scale the result to a full frame with its fixed cost.
+    """Measure `count` spheres at each frame rate, and scale their number until the frame time is used up.
 
-    The material determines the substep, so a frame of half the length needs half as many substeps.
+    The fixed cost of a frame is scaled too. The material determines the substep, so a frame of half the
+    length needs half as many substeps.
     """
     found = []
     for rate in FRAME_RATES:

@@ -1,4 +1,4 @@
-"""Compare the time per element and substep with plain C++, alternating within one run."""
+"""Compare the times of Taichi and plain C++ per element and substep, in alternating runs of one process."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
-"""Number of cells of a box, by approximate number of tetrahedra. The largest is first, because the others
-reuse its kernels."""
+"""Number of cells of a box, by approximate number of tetrahedra. The largest box is first, because the
+smaller boxes reuse its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
-SUBSTEP = 1.0e-5  # [s], far below every stable step: the bodies only fall
+SUBSTEP = 1.0e-5  # substep, far shorter than the longest stable one [s]
 PUSHED_APART = 0.02  # initial stretch of the body, so that elastic forces act
 
 
@@ -38,10 +38,10 @@ class Comparison:
     law: LawName
     element: str  # "tetrahedron" or "edge"
     tets: int
-    taichi: Spread  # [ns per element and substep], including Python
+    taichi: Spread  # time in Taichi, including Python [ns per element and substep]
     native: Spread
-    ratio: Spread  # time in Taichi over time in C++, pair by pair
-    deviation: float  # largest difference of positions after the same steps, over the size of the body
+    ratio: Spread  # time in Taichi over time in C++, for each pair of runs
+    deviation: float  # largest difference of positions after equal steps, divided by the body's size
 
 
 def compare_with_baseline(
@@ -50,7 +50,7 @@ def compare_with_baseline(
     sizes: dict[int, tuple[int, int, int]] = SIZES,
     laws: tuple[LawName, ...] = NATIVE_LAWS,
 ) -> list[Comparison]:
-    """Measure every law and size against `library`, the result of `compile_baseline`."""
+    """Compare every law and size with `library`, the result of `compile_baseline`."""
     return [_compare(library, repeats, cells, law) for law in laws for cells in sizes.values()]
 
 

@@ -1,4 +1,4 @@
-"""Find the size of a body from which several threads should compute it together."""
+"""Find the number of tetrahedra above which several threads step a body faster than one thread."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Crossover:
     tets: int
     flat: Spread
     per_body: Spread
-    ratio: Spread  # time of flat over time of per_body, pair by pair
+    ratio: Spread  # time with "flat" over time with "per_body", for each pair of runs
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:
-    """Time bodies of increasing size under both schedules, alternating."""
+    """Time bodies of increasing size under both schedules, in alternating runs."""
     found = []
     for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))

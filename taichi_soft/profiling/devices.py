@@ -18,8 +18,8 @@ from taichi_soft.profiling.spread import Spread, time_calls
 
 SUBSTEPS = 8
 SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
-"""Number of bodies, and of cells along each side of a box; 0 is a sphere of 1,280 tetrahedra. The bodies do
-not touch."""
+"""Number of bodies in each scene, and number of cells along each side of a box. With 0 cells, the body is a
+sphere of 1,280 tetrahedra. The bodies do not touch."""
 
 STEPS_PER_TURN = 3
 
@@ -42,7 +42,7 @@ class DeviceGain:
     tets: int
     cpu: Spread
     gpu: Spread
-    gain: Spread  # time of the CPU over time of the GPU, pair by pair
+    gain: Spread  # time of the CPU over time of the GPU, for each pair of runs
 
 
 class Frames:
@@ -79,12 +79,15 @@ def measure_devices(
     repeats: int,
     scenes: tuple[tuple[int, int], ...] = SCENES,
 ) -> list[DeviceGain]:
-    """Time the CPU's `threads` and a GPU, alternating.
+    """Time frames on CPU threads and on a GPU, in alternating runs.
 
     Args:
         gpu: "cuda", "vulkan" or "metal".
-        cores: cores to which the threads are bound; empty for none.
-    Raises: DeviceError if a process fails, for example without such a GPU.
+        threads: number of CPU threads.
+        cores: cores to which the threads are bound; if empty, threads are not bound.
+        repeats: number of pairs of runs.
+        scenes: see `SCENES`.
+    Raises: DeviceError if a process fails, for example because the machine has no such GPU.
     """
     with _start("cpu", threads, cores) as one, _start(gpu, None, None) as other:
         return [_compare(one, other, *scene, repeats) for scene in scenes]

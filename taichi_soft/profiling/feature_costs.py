@@ -1,5 +1,5 @@
-"""Measure the cost of a game's features: unused, used, and in a heap. Each measurement alternates with bodies
-without the feature.
+"""Measure the cost of features, both unused and used, and of contact in a heap of bodies. Each measurement
+alternates with bodies without the feature.
 """
 
 from __future__ import annotations
@@ -30,16 +30,18 @@ DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as for the sphere of the t
 COUNT = 16
 SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
 SETTLING = 180
-"""Number of frames until a heap has settled, or bodies on the floor sleep."""
+"""Number of frames after which bodies on the floor or in a heap have come to rest."""
 
 UNUSED_FACTOR = 25
-"""Factor on the number of pairs of steps for unused features, because only the median of about 300 pairs
-separates 1.01 from 1.03."""
+"""Unused features are measured with this many times as many pairs of steps. Only the median of about 300
+pairs can distinguish a ratio of 1.01 from 1.03."""
 
 
 @dataclass(frozen=True)
 class FeatureCost:
-    """Time of a fixed step with a feature over the time of the same step without it, pair by pair."""
+    """Ratio of the time of a fixed step with a feature to the time of a step without it, for each pair of
+    steps.
+    """
 
     name: str
     is_used: bool
@@ -54,9 +56,9 @@ class Heap:
     bodies: int
     tets: int
     threads: int
-    step: Spread  # [ms], consecutive steps
-    real_time: float  # simulated time over step time, median
-    ratio: Spread  # step time over the step time of the same number of free bodies, pair by pair
+    step: Spread  # times of consecutive steps [ms]
+    real_time: float  # simulated time divided by median step time
+    ratio: Spread  # step time divided by the step time of as many free bodies, for each pair of steps
     stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 
@@ -64,7 +66,7 @@ class Heap:
 class Moments:
     """Cost of an action that does not happen in every step."""
 
-    name: str  # name with the unit
+    name: str  # name of the action, with the unit of `cost`
     cost: Spread
 
 
@@ -79,7 +81,7 @@ def _spheres(
     damping_ratio: float = 0.0,
     **options: Any,
 ) -> World:
-    """Make spheres in a row, with centres at `height` [m]."""
+    """Make a grid of spheres with centres at `height` [m]."""
     world = bare_world(**options)
     material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
@@ -172,8 +174,8 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
     """Drop 32 spheres into a pit and time their steps at rest.
 
-    The steps are timed first alone, as in a game with one world, and then alternating with the same number of
-    free spheres, which evict the heap from the CPU's caches."""
+    First, only steps of the heap are timed, as in a game with one world. Then steps of the heap alternate
+    with steps of as many free spheres, which evict the heap from the CPU's caches."""
     world = bare_world(collider_room=8, soft_contact=True)
     free = bare_world(floor=None)
     for side in (-1, 1):

@@ -1,5 +1,5 @@
-"""Measure the speed-up of implicit Euler over leapfrog for CMPM (thesis 4.2) and a stiff bar, and over
-scipy.
+"""Measure the speed-up of implicit Euler over leapfrog, for CMPM (thesis 4.2) and for a stiff bar, and over
+an implementation with scipy.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 GROWTH = 100
-"""Ratio of the steps in the thesis: 1e-2 s over about 1e-4 s."""
+"""Step of implicit Euler divided by the step of leapfrog in the thesis: 1e-2 s divided by about 1e-4 s."""
 
 CMPM_MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""Leapfrog needs steps of about 1e-4 s for this stiffness. Without damping, this law gains energy at any
-step."""
+"""Leapfrog needs steps of about 1e-4 s for this stiffness. Without damping, CMPM gains energy at any step
+length."""
 
 BAR_CELLS = (20, 10, 5)  # 5,000 tetrahedra
 BAR_MATERIAL = Material(young=1.0e6, poisson=0.3, density=1000.0, damping=20.0, damping_ratio=0.0)
@@ -31,20 +31,20 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ImplicitGain:
-    """Time to simulate one second with each of two methods, alternating."""
+    """Time to simulate one second with implicit Euler and with another method, in alternating runs."""
 
     name: str
     step: float  # step of implicit Euler [s]
     other_step: float  # step of the other method [s]
-    implicit: Spread  # [ms per simulated second]
+    implicit: Spread  # time of implicit Euler [ms per simulated second]
     other: Spread
-    gain: Spread  # time of the other method over that of implicit Euler, pair by pair
-    deviation: float | None  # of positions, over the body's size; None if the systems differ
+    gain: Spread  # time of the other method divided by the time of implicit Euler, for each pair
+    deviation: float | None  # largest difference of positions, relative to the body's size; None if unknown
     is_sound: bool  # True if the body was valid at the end
 
 
 def measure_implicit(repeats: int = 5) -> list[ImplicitGain]:
-    """Measure the speed-up over all three. Raises: OptionError without scipy."""
+    """Measure the speed-up in all three comparisons. Raises: OptionError if scipy is not installed."""
     few = max(3, repeats // 2)
     return [_cmpm_against_leapfrog(repeats), _bar_against_leapfrog(few), _bar_against_scipy(few)]
 
@@ -79,7 +79,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
 
 
 def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
-    """Measure the bar with gradients of tetrahedra, which the thesis does not use (section 6.5)."""
+    """Measure the bar with the virial law, whose force gradients the thesis does not use (section 6.5)."""
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}

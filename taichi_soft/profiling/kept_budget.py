@@ -1,4 +1,4 @@
-"""Measure whether bodies that take twice the time budget are reduced until they keep it."""
+"""Measure whether bodies that need twice the time budget are reduced in detail until their steps fit it."""
 
 from __future__ import annotations
 
@@ -26,50 +26,52 @@ ROWS = 5
 """Number of rows of bodies."""
 
 SPACING = 1.6
-"""Distance between bodies of at most 1 m [m]. They do not touch, see docs/speed.md."""
+"""Distance between the centres of bodies [m]. The bodies are at most 1 m wide and do not touch, see
+docs/speed.md."""
 
 SETTLING = 60
 """Number of frames until the bodies have landed."""
 
 SHARE = 0.5
-"""Budget over the median step without a budget."""
+"""Budget as a fraction of the median step time without a budget."""
 
 EYE = (-8.0, 0.0, 2.0)  # [m]
 
 IN_TURN = 10
-"""A budget counts as met if the first and the median of this many steps fit it."""
+"""The budget is met from the first step that fits it, if the median of this many steps from there also
+fits."""
 
 
 @dataclass(frozen=True)
 class KeptBudget:
-    """Times of the same bodies, without a budget or with one."""
+    """Times of one of the runs, see `measure_kept_budget`."""
 
-    budget: float  # budget [ms]; in a run without one, only for comparison
+    budget: float  # budget [ms]; in a run without a budget, only for comparison
     is_kept: bool  # True if the run had a budget
     is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
     step: Spread  # time of `World.step` [ms]
     work: Spread  # CPU time of a step [ms], without waiting for other programs
-    settled: Spread  # time of the steps after the budget was met, or of all steps [ms]
+    settled: Spread  # time of the steps after the budget was met; of all steps if it was never met [ms]
     frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
-    late_settled: float  # the same after the budget was met; of all steps if it was never met
+    late_settled: float  # fraction of late steps in `settled`
     met_after: int | None  # steps until the budget was met; None if it was never met
     deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
     changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any
     frames_with_changes: int
-    skipped: float  # skipped steps over all steps of all bodies
+    skipped: float  # fraction of steps that bodies skipped
     levels: dict[int, int]  # number of bodies by final level
-    levels_in_order: tuple[int, ...]  # level of each body
+    levels_in_order: tuple[int, ...]  # final level of each body
     tets: int  # number of tetrahedra at the end
-    frozen: int  # bodies that became non-finite
+    frozen: int  # number of bodies that became non-finite
     stolen: float | None  # fraction of the CPU time that the host gave to other machines
 
 
 def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
-    """Measure bodies without a budget, with a budget of half their median step, and at the final levels of
-    that run.
+    """Make three runs: without a budget, with a budget of half the median step, and at the final levels of
+    the second run.
 
-    The third run has no budget: longer steps in it are caused by other programs on the machine. The runs are
+    The third run has no budget, so its long steps are caused by other programs on the machine. The runs are
     consecutive, because a game has one world. Sleep is off, so that there is work to reduce.
     """
     kinds = _kinds()

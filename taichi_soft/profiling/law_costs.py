@@ -18,23 +18,28 @@ TETS, EDGES = len(MESH.tets), len(MESH.edges)
 MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 WOODEN = AnisotropicMaterial(Stiffness.isotropic(1.0e5, 0.3), density=1000.0, damping=0.1)
 SUBSTEPS = 40
-SUBSTEP = 1.0e-5  # [s], far below every stable step: the bodies only fall
+SUBSTEP = 1.0e-5  # substep, far shorter than the longest stable one [s]
 
 
 @dataclass(frozen=True)
 class LawCost:
-    """Cost of a law with one strain and one kind of material. `strain` is None if the law has no choice."""
+    """Cost of a law with one strain and one kind of material. `strain` is None if the law has no choice of
+    strain.
+    """
 
     law: LawName
     strain: StrainName | None
     is_anisotropic: bool
     element: str  # "tetrahedron" or "edge"
     cost: Spread  # time of a substep, including edge damping [ns per element]
-    ratio: Spread  # cost over the cost of "virial" with the linear strain, in alternating runs
+    ratio: Spread  # cost divided by that of "virial" with the linear strain, in alternating runs
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
-    """Return each law with each strain (None if it has no choice), and once with anisotropic material."""
+    """Return the combinations to measure, as (law, strain, True if the material is anisotropic).
+
+    The strain is None if the law offers no choice. Anisotropic material is combined with the default strain.
+    """
     found: list[tuple[Law, StrainName | None, bool]] = []
     for law in laws:
         strains: list[StrainName | None] = [strain.value for strain in law.strains] or [None]
@@ -44,8 +49,9 @@ def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
 
 
 def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
-    """Measure the given laws with every strain and material, on one body and thus one thread. Raises:
-    OptionError.
+    """Measure the laws in `names` with every strain and material, on one body and thus one thread.
+
+    Raises: OptionError for an unknown name.
     """
     laws = [element_model(name).law for name in names]
     usual = _falling("virial", None, MATERIAL)

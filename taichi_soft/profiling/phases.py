@@ -18,7 +18,7 @@ from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
-TINY_H = 1.0e-6  # substep so short that phases that run separately move nothing [s]
+TINY_H = 1.0e-6  # substep [s], so short that nothing moves while phases are timed separately
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Phases:
     phases: dict[str, Spread]  # times on one thread, summed over the substeps [ms]
     frame: Spread  # time to advance and read all positions, on all threads [ms]
     read: Spread  # time to read all positions, a part of `frame` [ms]
-    python: Spread  # time to advance and read a single tetrahedron: the overhead [ms]
+    python: Spread  # overhead: time to advance and read a world of one tetrahedron [ms]
 
 
 def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = None) -> World:

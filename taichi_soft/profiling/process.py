@@ -1,4 +1,4 @@
-"""Measure in separate Python processes, because the device and threads of Taichi are fixed for a process."""
+"""Measure in separate Python processes, because a process cannot change the device and threads of Taichi."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ WARM_TURNS = 2
 
 
 class Process:
-    """A process that answers each line with a time [s]."""
+    """A child process that reads lines and answers each line with a time [s]."""
 
     def __init__(self, program: str, name: str, advice: str) -> None:
         """Start the process.
@@ -52,9 +52,9 @@ class Process:
 
 
 def compare_processes(one: Process, other: Process, line: str, repeats: int) -> tuple[Spread, Spread, Spread]:
-    """Ask two processes alternately, after a warm-up. A temporary slowdown of the machine affects both.
+    """Ask two processes alternately, after a warm-up. A slowdown of the machine then affects both processes.
 
-    Returns: times of each process [ms], and times of `one` over those of `other`, pair by pair.
+    Returns: times of `one` [ms], times of `other` [ms], and their ratio, `one` over `other`, for each pair.
     """
     pairs = [(one.ask(line), other.ask(line)) for _ in range(WARM_TURNS + repeats)][WARM_TURNS:]
     ones, others = ([pair[i] for pair in pairs] for i in (0, 1))

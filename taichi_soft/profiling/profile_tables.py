@@ -18,8 +18,10 @@ from taichi_soft.profiling.spread import Spread
 
 
 def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """Yield title and table of each measurement in `found`. Its keys are those of `taichi-soft profile
-    --json`.
+    """Yield the title and the table of each measurement.
+
+    Args:
+        found: measurements, with the keys of `taichi-soft profile --json`.
     """
     if "budget" in found:
         measured = found["budget"][0].measured
@@ -164,9 +166,7 @@ def _budget_table(budgets: list[Budget]) -> Table:
 
 
 def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
-    """Yield the tables of a budget. Columns: runs without a budget, with a budget, and at the final
-    levels.
-    """
+    """Yield titles and tables of a budget. The columns are the three runs of `measure_kept_budget`."""
     names = ("with a budget" if run.is_kept else "its levels" if run.is_fixed else "without" for run in runs)
     table = _table("", *names)
     for name, attribute in (

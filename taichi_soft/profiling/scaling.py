@@ -1,4 +1,6 @@
-"""Measure the speed-up of many bodies by several threads, in separate processes with fixed thread counts."""
+"""Measure how much faster several threads step many bodies than one thread, with one process per thread
+count.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,8 @@ from taichi_soft.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
-"""Substeps per step: the number that this body needs at 60 Hz, and the thesis's number, 700 per second at
-50 Hz."""
+"""Substeps per step. 4 is the number that the spheres need at 60 Hz; 14 is that of the thesis, which makes
+700 substeps per second at 50 Hz."""
 
 STEPS_PER_TURN = 5
 
@@ -29,20 +31,20 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Scaling:
-    """Time of a step of 64 spheres, on one thread and on several [ms]."""
+    """Time of a step of 64 spheres, on one thread and on several threads [ms]."""
 
     substeps: int
     threads: int
     single: Spread
     parallel: Spread
-    speedup: Spread  # time on one thread over time on several, pair by pair
+    speedup: Spread  # time on one thread over time on several threads, for each pair of runs
 
 
 def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
-    """Time one thread and `threads` threads, alternating.
+    """Time steps on one thread and on `threads` threads, in alternating runs.
 
     Args:
-        cores: cores to which the threads are bound; empty for none.
+        cores: cores to which the threads are bound; if empty, threads are not bound.
     Raises: DeviceError if a process fails.
     """
     with _start(1) as single, _start(threads, cores) as parallel:

@@ -1,7 +1,8 @@
 """Implicit Euler with scipy, for comparison: sparse assembly of all tetrahedra, and conjugate gradients.
 
-This supports only the virial law with the linear strain, normal or inverted, in free fall. It is written in
-numpy from the equations in `laws.force_gradients` and `kernels.rigid_rotation`, independently of the kernels.
+Only the virial law with the linear strain is supported, for normal and inverted tetrahedra in free fall. The
+code is written in numpy from the equations in `laws.force_gradients` and `kernels.rigid_rotation`,
+independently of the kernels.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def require_scipy() -> Any:
 
 
 class SparseBody:
-    """One body as matrices of scipy, in float64."""
+    """One body in float64, whose steps use sparse matrices of scipy."""
 
     def __init__(self, mesh: TetMesh, material: Material) -> None:
         self._sparse = require_scipy()
@@ -78,7 +79,7 @@ class SparseBody:
         self.positions += h * self.velocities
 
     def _rotation_splits(self, h: float) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-        """Return functions for the products with P = 1 - W J W^T M and with P^T, see
+        """Return two functions that multiply a vector by P = 1 - W J W^T M and by P^T. See
         `kernels.rigid_rotation`.
         """
         mass, total = np.repeat(self._masses, 3), self._masses.sum()
@@ -94,7 +95,9 @@ class SparseBody:
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._inverse)
 
     def _forces(self) -> Floats:
-        """Return the forces f_i = -V0 P g_i, with P = sigma cof F, negated for inverted tetrahedra."""
+        """Return the elastic forces on the vertices, f_i = -V0 P g_i with P = sigma cof F. P is negated for
+        inverted tetrahedra.
+        """
         F = self._deformations()
         strain = 0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3))
         lame_lambda, lame_mu = (value[:, None, None] for value in self._lame)

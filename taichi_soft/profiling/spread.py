@@ -27,7 +27,7 @@ class Spread:
         )
 
     def scaled(self, factor: float) -> Spread:
-        """Return the numbers times `factor`, to convert them to another unit."""
+        """Return all four numbers multiplied by `factor`, for example to convert the unit."""
         return Spread(self.least * factor, self.median * factor, self.p99 * factor, self.most * factor)
 
 
@@ -47,8 +47,8 @@ def compare(
     """Time two calls alternately, after two warm-up rounds.
 
     A temporary slowdown of the machine then affects both calls, so that their ratio stays valid.
-    Returns: times of each call, in seconds times `unit`, and times of `one` over those of `other`, pair by
-        pair.
+    Returns: times of `one` and times of `other`, in seconds times `unit`, and their ratio, `one` over
+        `other`, for each pair of calls.
     """
     pairs = [(time_calls(one, 1)[0], time_calls(other, 1)[0]) for _ in range(repeats + 2)][2:]
     ones, others = ([pair[i] for pair in pairs] for i in (0, 1))

@@ -1,4 +1,4 @@
-"""Time the start of a process until its game can begin, with an empty and with a full kernel cache."""
+"""Time the start of a process until its game can begin, with an empty kernel cache and with a full one."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
 """,
 }
-"""Code of each world, by name: a body and a floor; soft contact, a pool and a collider; a body that can be
-cut."""
+"""Code that makes each world, by name. The worlds contain a body and a floor; soft contact, a pool and a
+collider; a body that can be cut."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ class Startup:
 
     world: str  # key of `WORLDS`
     cache: str  # "empty", or "full" after an earlier run of the same program
-    first_frame: float  # [s]
-    warm: float  # [s], until the end of `World.warm_up`
+    first_frame: float  # time until the first frame [s]
+    warm: float  # time until the end of `World.warm_up` [s]
 
 
 def measure_startup(
@@ -67,7 +67,7 @@ def measure_startup(
     Python's bytecode is precompiled, as after an installation.
 
     Args:
-        cores: cores to which the threads are bound; empty for none.
+        cores: cores to which the threads are bound; if empty, threads are not bound.
         worlds: keys of `WORLDS`.
     Raises: DeviceError if a process fails.
     """
@@ -84,7 +84,7 @@ def measure_startup(
 
 
 def _times_of(program: str, environment: dict[str, str]) -> tuple[float, float]:
-    """Return the times that a program prints, measured from its start [s]."""
+    """Run a program and return the two times that it prints, relative to its start [s]."""
     start = time.time()
     first_frame, warm = (float(line) - start for line in _run(program, environment).split())
     return first_frame, warm

@@ -26,8 +26,8 @@ def processor_ticks() -> Ticks | None:
 
 
 def stolen_since(before: Ticks | None) -> float | None:
-    """Return the stolen fraction of the requested CPU time since `before`; None if the system does not report
-    it.
+    """Return the stolen fraction of the requested CPU time since `before`. Return None if the system does not
+    report steal time.
     """
     now = processor_ticks()
     if before is None or now is None:

@@ -1,10 +1,10 @@
-# Looks of the demo, an elephant more at each press of space, and a hand: the mouse pulls soft bodies about.
+# Sets the materials of the demo, drops an elephant when space is pressed, and lets the mouse drag soft bodies.
 extends Node3D
 
 const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
 
-var _hand := 0  # a grab
-var _depth := 0.0  # how far in front of the camera it was taken
+var _hand := 0  # the current grab, or 0
+var _depth := 0.0  # distance of the grab in front of the camera [m]
 var _plush := _colored(Color(0.72, 0.72, 0.78))
 var _dropped := 0
 
@@ -25,7 +25,7 @@ func _unhandled_key_input(event: InputEvent) -> void:
 # Godot 3: func _unhandled_key_input(event: InputEventKey) -> void:
     var key := event as InputEventKey
     if key != null and key.pressed and not key.echo and key.keycode == KEY_SPACE:
-        # Beside the one before: it may still be there.
+        # Next to the previous elephant, which may not have moved away.
         if drop(Transform3D(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
             _dropped += 1
 
@@ -39,10 +39,10 @@ func _unhandled_input(event: InputEvent) -> void:
             let_go()
     elif event is InputEventMouseMotion and _hand != 0:
         if not $World.move_grab(_hand, $Camera.project_position(event.position, _depth)):
-            _hand = 0  # the body was taken out
+            _hand = 0  # the body was removed
 
 
-# Of the soft body that is seen at a place of the window.
+# Grab the soft body that is visible at a point of the window.
 func take_hold(place: Vector2) -> void:
     let_go()
     var camera: Camera3D = $Camera
@@ -60,7 +60,7 @@ func let_go() -> void:
     _hand = 0
 
 
-# One elephant more, while there is room; returns what draws it, or null.
+# Spawn an elephant. Return the node that draws it; null if the world has no free slot.
 func drop(place: Transform3D) -> TaichiSoftBody:
     var body: int = $World.spawn("elephant", place)
     if body == 0:
@@ -78,7 +78,7 @@ func _colored(color: Color) -> StandardMaterial3D:
     return material
 
 
-# The first picture in a .glb: that has a head of 12 bytes, a part in JSON, and one with the bytes.
+# Load the first image in a .glb file. The file has a header of 12 bytes, a chunk in JSON, and a chunk of binary data.
 func _texture_of(path: String) -> ImageTexture:
     var file := FileAccess.open(path, FileAccess.READ)
     # Godot 3: var file := File.new()

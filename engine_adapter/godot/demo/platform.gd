@@ -1,4 +1,4 @@
-# A platform that goes to and fro.
+# A platform that moves back and forth.
 extends AnimatableBody3D
 
 @export var reach := 0.6  # [m]

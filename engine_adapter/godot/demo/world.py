@@ -2,7 +2,8 @@
 
     taichi-soft export world.py --axes y-up --out demo.softworld
 
-In Python z is up; in Godot y is up, and Python's y is -z. Ground, platform and crate are nodes of Godot.
+In Python z is up. In Godot y is up, and -z corresponds to y in Python. Ground, platform and crate are nodes
+of Godot.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-# Measures the cost of drawing the demo's elephant: godot3-server --path FOLDER --fixed-fps 60 -s cost.gd
+# Measures the time to read and draw the demo's elephant: godot3-server --path FOLDER --fixed-fps 60 -s cost.gd
 extends SceneTree
 
 const TIMES := 200

@@ -58,7 +58,7 @@ ts_pose Arguments::pose(int which) const {
   if (!(std::fabs(determinant - 1.0) < 1e-3)) throw Refused(here + " that mirrors, shears or is not finite");
   ts_pose pose;
   std::copy(numbers + 9, numbers + 12, pose.position);
-  // Compute the largest component of the quaternion first, because the others are divided by it.
+  // Compute the largest component of the quaternion first, because the other components are divided by it.
   const double trace = m[0][0] + m[1][1] + m[2][2];
   double* q = pose.rotation;
   if (trace > 0.0) {

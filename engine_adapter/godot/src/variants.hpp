@@ -1,4 +1,4 @@
-// Converts values of Godot to those of the library and back. Throws Refused for invalid values.
+// Converts values between Godot's types and the library's types. Throws Refused for invalid values.
 //
 // world_native.cpp uses Godot only through this file. The type Variant and the functions below the line are implemented
 // for each version in src/godot3 and src/godot4.

@@ -44,7 +44,7 @@ Variant load(Self self, In in) {
   check(ts_scene_load(in.text(0).c_str(), &self.scene));
   const ts_result created = ts_world_create(self.scene, &self.world);
   if (created != TS_OK) {
-    const taichi_soft::Error error(created);  // before `clear`, whose calls may replace the last error
+    const taichi_soft::Error error(created);  // copied before `clear`, whose calls may replace the last error
     self.clear();
     throw error;
   }
@@ -76,7 +76,8 @@ Variant name_of(Self self, In in) {
   return of(std::string(name));
 }
 
-// Returns asset, vertices, triangles, has texture coordinates, and level of detail (-1 for a skin).
+// Returns the asset, the numbers of vertices and triangles, true if there are texture coordinates, and the level of
+// detail (-1 for a skin).
 Variant mesh_info(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
   int32_t level = 0;
@@ -258,8 +259,8 @@ Variant record_events(Self self, In in) {
   return of(true);
 }
 
-// Returns all waiting events, eight consecutive values each: kind, body, other body, collider, impulse, duration, step,
-// time.
+// Returns all waiting events. Each event has eight consecutive values: kind, body, other body, collider, impulse,
+// duration, step, time.
 Variant drain_events(Self self, In) {
   constexpr size_t kAtOnce = 256;
   size_t count = 0, got = kAtOnce;
@@ -347,7 +348,7 @@ Variant grab(Self self, In in) {
   return of(int64_t(made));
 }
 
-// Grab by its index, 0 to 15.
+// Returns the grab with an index, 0 to 15; 0 if there is none.
 Variant grab_of(Self self, In in) {
   ts_grab found = 0;
   check(ts_world_get_grab(self.world, in.small(0), &found));
@@ -407,7 +408,7 @@ Variant join(Self self, In in) {
   return of(int64_t(made));
 }
 
-// Joint by its index, 0 to 63.
+// Returns the joint with an index, 0 to 63; 0 if there is none.
 Variant joint_of(Self self, In in) {
   ts_joint found = 0;
   check(ts_world_get_joint(self.world, in.small(0), &found));
@@ -454,7 +455,7 @@ Variant set_motor_limit(Self self, In in) {
   return of(true);
 }
 
-// Returns its speed, and its torque or force.
+// Returns the speed of a motor, and its torque or force.
 Variant motor_state(Self self, In in) {
   double speed = 0.0, effort = 0.0;
   check(ts_motor_get_speed(self.world, ts_motor(in.whole(0)), &speed));
@@ -557,7 +558,7 @@ Variant detach(Self self, In in) {
   return of(true);
 }
 
-// Named frame_load because `load` reads the world file.
+// Returns force and torque of a body on a frame. The name is not `load`, because that method reads the world file.
 Variant frame_load(Self self, In in) {
   double force[3], torque[3];
   check(ts_body_get_load(self.world, body_of(in), in.small(1), force, torque));

@@ -13,7 +13,7 @@ struct WorldNative {
   ts_world world = 0;
   std::string last_error;
   std::vector<float> positions, normals;  // reused between frames to avoid allocations
-  std::vector<ts_event> events;           // likewise
+  std::vector<ts_event> events;           // reused between frames to avoid allocations
 
   WorldNative() = default;
   WorldNative(const WorldNative&) = delete;
@@ -30,7 +30,8 @@ struct Method {
 
 extern const std::vector<Method> methods;
 
-// A refused call returns null, prints its text to Godot's error output, and stores it for `last_error`.
+// Calls a method. A refused call returns null, prints an error text to Godot's error output, and stores the text for
+// `last_error`.
 Variant call(WorldNative& self, const Method& method, int count, const Variant* const* values);
 
 }  // namespace taichi_soft_godot

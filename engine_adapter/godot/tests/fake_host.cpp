@@ -1,15 +1,15 @@
-// A stand-in for Godot 4: loads the library as Godot does, and calls its class as the input says.
+// A stand-in for Godot 4. It loads the library as Godot does, and calls methods that are listed on standard input.
 //
 //     fake_host libtaichi_soft_godot4.so [--without NAME] [--double] [--old]
 //
-// It implements only the functions that the library uses, with the signatures of Godot's header; other names return
-// null. It tests how the library uses Godot's interface, not Godot. It is strict: it reports values that are read as
-// another type, used after destruction or never destroyed.
+// The program implements only the functions that the library uses, with the signatures of Godot's header. For other
+// names it returns null. The program tests how the library uses Godot's interface; it does not test Godot. It reports
+// values that are read as another type, used after destruction or never destroyed.
 //
 // Lines of the input; each value begins with a letter for its type:
 //
-//     new                      an instance; its number is printed
-//     call 0 status i12345     a method as scripts call it; `ptrcall` as other libraries may
+//     new                      makes an instance, and prints its number
+//     call 0 status i12345     calls a method as scripts do; `ptrcall` calls it as other libraries do
 //     free 0
 //     end                      unloads the library, and prints the number of remaining values
 #include <dlfcn.h>
@@ -66,7 +66,7 @@ static_assert(sizeof(Value) == 24);
 
 constexpr uint32_t kAlive = 0x600dca5e, kDead = 0xdeadbeef;
 
-// Shared content of strings, arrays and Transforms and their copies.
+// Content of a string, an array or a Transform, which copies of the value share.
 struct Shared {
   uint32_t state;
   int holders;
@@ -118,7 +118,7 @@ size_t size_of_one(Type type) {
   }
 }
 
-// Strings and Arrays are a pointer; packed arrays are a pointer after another word.
+// Returns the pointer to a value's content. In packed arrays the pointer is the second word, in other types the first.
 Shared*& held(Type type, const void* memory) {
   const size_t offset = type >= kBytes ? sizeof(void*) : 0;
   return *reinterpret_cast<Shared**>(static_cast<char*>(const_cast<void*>(memory)) + offset);
@@ -228,7 +228,7 @@ GDExtensionPtrDestructor variant_get_ptr_destructor(Type type) {
   return nullptr;
 }
 
-// Copy on write for packed arrays; an Array is shared.
+// Returns content that can be changed. Packed arrays copy shared content first; Arrays do not.
 Shared* own(Type type, void* memory) {
   Shared*& shared = held(type, memory);
   if (looked_at(shared, type)->holders > 1 && type != kArray) {

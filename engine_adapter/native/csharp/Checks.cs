@@ -15,7 +15,7 @@ namespace TaichiSoft
             if (!isTrue) throw new Exception(text);
         }
 
-        // Prints code and text of the exception of a call.
+        // Makes a call, and prints the code and the text of its exception.
         private static void Refused(string what, Action call)
         {
             try
@@ -94,7 +94,7 @@ namespace TaichiSoft
                 Console.WriteLine("callback: " + exception.Message);
             }
             world.BeforeStep = null;
-            world.Advance(Frame); // continues
+            world.Advance(Frame); // the world still works
 
             world.BeforeStep = each =>
             {
@@ -104,7 +104,7 @@ namespace TaichiSoft
             Refused("world destroyed in a step", () => world.Advance(2 * Frame));
             Refused("world after Dispose", () => world.Step(Frame));
             Refused("body after Dispose", () => ball.GetCenter());
-            world.Dispose(); // a second one is harmless
+            world.Dispose(); // a second call does nothing
             scene.Dispose();
             scene.Dispose();
             Refused("scene after Dispose", () => new World(scene));
@@ -128,7 +128,7 @@ namespace TaichiSoft
                 Grab held = world.GetBody(1).Grab(new Pull(0, new Vector3d(1, 0, 0), origin));
                 world.GetBody(5).Attach(some, hand, feels: true);
                 world.RecordEvents(EventKinds.All);
-                var state = new byte[world.SnapshotSize() + 10000]; // recorded contacts need space
+                var state = new byte[world.SnapshotSize() + 10000]; // more space, because contacts are recorded later
                 int calls = 0, frame = 0;
                 var none = new Vector3d();
                 world.SetFixedStep(Frame);
@@ -194,7 +194,7 @@ namespace TaichiSoft
             return new WeakReference(new Scene(folder));
         }
 
-        // Collects garbage without references from the old stack.
+        // Collects garbage on a thread whose stack has no old references.
         private static void Collect()
         {
             for (int i = 0; i < 3; ++i)
@@ -208,7 +208,7 @@ namespace TaichiSoft
         {
             using (var scene = new Scene(folder))
             {
-                // Each in a separate thread, because Mono scans stacks conservatively.
+                // Use a separate thread for each, because Mono treats old numbers on a stack as references.
                 ulong first = 0;
                 long before = 0;
                 for (int i = 0; i < 100; ++i)
@@ -228,14 +228,14 @@ namespace TaichiSoft
                 second.Advance(Frame);
                 Require(second.Hash() == first, "a world beside another differs");
                 scene.Dispose();
-                world.Advance(Frame); // continues without its scene
+                world.Advance(Frame); // the world still works without its scene
                 Require(world.Hash() == first, "a world without its scene differs");
             }
             var forgetting = new Thread(() => ForgottenScene(folder));
             forgetting.Start();
             forgetting.Join();
             Collect();
-            Console.WriteLine("done: yes"); // worlds without Dispose end with the process
+            Console.WriteLine("done: yes"); // worlds that were not disposed are freed with the process
         }
 
         private static void Threads(string folder)

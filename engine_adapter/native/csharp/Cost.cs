@@ -1,4 +1,4 @@
-// Measures the cost of calls from C#: Cost FOLDER. Uses the world's first body, after one second.
+// Measures the time of calls from C#, with the world's first body after one second: Cost FOLDER
 using System;
 using System.Diagnostics;
 

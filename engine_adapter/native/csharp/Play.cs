@@ -14,7 +14,7 @@ namespace TaichiSoft
         private static int at;
         private static byte[] kept;
         private static Body[] bodies;
-        private static readonly SoftEvent[] events = new SoftEvent[10000]; // the library's limit
+        private static readonly SoftEvent[] events = new SoftEvent[10000]; // more events cannot wait
         private static TextWriter output;
 
         private static double Number()

@@ -27,7 +27,7 @@ namespace TaichiSoft
             public readonly Mesh Mesh;
             private readonly int number;
             private readonly Vector3[] vertices, normals;
-            private GCHandle vertexMemory, normalMemory; // pinned: the library writes to it directly
+            private GCHandle vertexMemory, normalMemory; // pinned, because the library writes to it directly
 
             public Drawing(Scene scene, int number, string name)
             {
@@ -85,7 +85,7 @@ namespace TaichiSoft
         }
 
         private int slot;
-        // By level of detail, so that a change of level allocates nothing. A skin is used for all levels.
+        // Drawings by level of detail, so that a change of level allocates nothing. A skin is used for all levels.
         private Drawing[] drawings = new Drawing[0];
         private Drawing shown;
         private MeshFilter filter;
@@ -112,7 +112,7 @@ namespace TaichiSoft
             }
             filter = GetComponent<MeshFilter>();
             Show(drawings[0]);
-            // The library uses world coordinates, a mesh those of its game object.
+            // The library writes world coordinates, so the transform must be the identity.
             transform.SetPositionAndRotation(Vector3.zero, Quaternion.identity);
         }
 
@@ -148,7 +148,7 @@ namespace TaichiSoft
             throw new SoftException(ErrorCode.Argument, "there is no mesh of " + body);
         }
 
-        // After SoftWorldBehaviour.Update, which sets alpha.
+        // Runs after SoftWorldBehaviour.Update, which sets alpha.
         private void LateUpdate()
         {
             if (shown == null || world.World == null) return;

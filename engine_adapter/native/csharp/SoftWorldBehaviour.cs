@@ -16,7 +16,7 @@ namespace TaichiSoft
         [Serializable]
         public struct Follower
         {
-            /// <summary>Name in the world file.</summary>
+            /// <summary>Name of the collider or frame in the world file.</summary>
             public string name;
             /// <summary>Transform to follow.</summary>
             public Transform target;
@@ -31,12 +31,12 @@ namespace TaichiSoft
         [SerializeField, Tooltip("Frames that follow game objects")]
         private Follower[] frames = new Follower[0];
 
-        private readonly SoftEvent[] events = new SoftEvent[64]; // events from `toldCount` on are not delivered yet
+        private readonly SoftEvent[] events = new SoftEvent[64]; // the first `toldCount` events have been delivered
         private EventKinds recorded;
         private int eventCount, toldCount;
         private int[] colliderNumbers, frameNumbers;
         private float fixedStep;
-        private double ahead; // time after the last step that Update has added [s]
+        private double ahead; // time that Update has added since the last step [s]
 
         /// <summary>The world file. Null before Awake and after OnDestroy.</summary>
         public Scene Scene { get; private set; }
@@ -48,10 +48,10 @@ namespace TaichiSoft
         public Clock Clock { get; private set; }
 
         /// <summary>A body touches a collider or another body. All events are delivered in Update.</summary>
-        /// <remarks>Kinds without listeners are not recorded: subscribe in Start, before the first step.</remarks>
+        /// <remarks>Kinds without listeners are not recorded. Subscribe in Start, before the first step.</remarks>
         public event Action<SoftEvent> ContactBegan;
 
-        /// <summary>A contact ended. Impulse and Duration are those of the whole contact.</summary>
+        /// <summary>A contact ended. Impulse and Duration refer to the whole contact.</summary>
         public event Action<SoftEvent> ContactEnded;
 
         /// <summary>A body fell asleep and costs no time.</summary>
@@ -78,14 +78,15 @@ namespace TaichiSoft
             return numbers;
         }
 
-        // Unity calls FixedUpdate once per step and Update once per frame. Update adds the time since the last step,
-        // and FixedUpdate adds the rest. So each FixedUpdate makes one step, and alpha is correct.
+        // Unity calls FixedUpdate once per step and Update once per frame. Update advances the world by the time since
+        // the last step, and FixedUpdate by the rest of the step. So each FixedUpdate makes one step, and alpha is
+        // correct.
         private void FixedUpdate()
         {
             if (fixedStep != Time.fixedDeltaTime)
             {
                 fixedStep = Time.fixedDeltaTime;
-                World.SetFixedStep(fixedStep); // discards the time that Update has added
+                World.SetFixedStep(fixedStep); // also discards the time that Update has added
                 ahead = 0;
             }
             Record();
@@ -122,19 +123,19 @@ namespace TaichiSoft
             if (Woke != null) wanted |= EventKinds.Woke;
             if (Froze != null) wanted |= EventKinds.Froze;
             if (wanted == recorded) return;
-            recorded = wanted; // set first: an exception below is thrown only once
+            recorded = wanted; // set first, so that an exception below is thrown only once
             World.RecordEvents(wanted);
         }
 
         // If a listener throws, the remaining events are delivered in the next frame.
         private void TellEvents()
         {
-            while (World != null) // a listener can destroy it
+            while (World != null) // a listener can destroy the world
             {
                 if (toldCount == eventCount)
                 {
                     toldCount = 0;
-                    eventCount = 0; // if the next line throws
+                    eventCount = 0; // even if the next line throws
                     eventCount = World.DrainEvents(events);
                     if (eventCount == 0) return;
                 }

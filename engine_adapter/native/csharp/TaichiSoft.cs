@@ -12,11 +12,11 @@
 //     }
 //
 // A refused call throws a SoftException with the library's code and text. Only one thread at a time can call a world.
-// After loading, only methods that return an array or a string, and exceptions, allocate memory. All quantities use
-// the axes and the unit of length for which the world was exported.
+// After loading, memory is allocated only for exceptions and by methods that return an array or a string. All
+// quantities use the axes and the unit of length for which the world was exported.
 //
-// One file of C# 7 without unsafe code, for .NET, Mono and Unity. Structs are passed by value, because Mono's compiler
-// passes zeros for an `in` parameter that is forwarded to the library.
+// This file is C# 7 without unsafe code, for .NET, Mono and Unity. Structs are passed by value, because Mono's compiler
+// passes zeros if a method forwards an `in` parameter to the library.
 using System;
 using System.Runtime.CompilerServices;
 using System.Runtime.ExceptionServices;
@@ -34,7 +34,7 @@ namespace TaichiSoft
         Handle = -2,
         /// <summary>Another thread is in a call of this world.</summary>
         Busy = -3,
-        /// <summary>A world file that is missing, incomplete or damaged.</summary>
+        /// <summary>A missing, incomplete or damaged world file.</summary>
         File = -4,
         /// <summary>A world file or a library of another version.</summary>
         Version = -5,
@@ -81,7 +81,7 @@ namespace TaichiSoft
     /// <summary>Exception of a refused call, with the library's code and text.</summary>
     public sealed class SoftException : Exception
     {
-        /// <summary>Reason.</summary>
+        /// <summary>Reason for refusing the call.</summary>
         public ErrorCode Code { get; private set; }
 
         /// <summary>Creates an exception with a code and a text.</summary>
@@ -91,7 +91,7 @@ namespace TaichiSoft
         }
     }
 
-    /// <summary>A vector: position [unit of length], velocity [/s], impulse [kg, /s] or spin [rad/s].</summary>
+    /// <summary>A vector: position, velocity or impulse, in the unit of length, kg and s; or spin [rad/s].</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Vector3d
     {
@@ -111,7 +111,7 @@ namespace TaichiSoft
     [StructLayout(LayoutKind.Sequential)]
     public struct Quaterniond
     {
-        /// <summary>Axis times sine, and cosine, of half the angle.</summary>
+        /// <summary>X, Y, Z: unit axis times the sine of half the angle. W: cosine of half the angle.</summary>
         public double X, Y, Z, W;
 
         /// <summary>Creates a quaternion from its components.</summary>
@@ -127,13 +127,13 @@ namespace TaichiSoft
         public static readonly Quaterniond Identity = new Quaterniond(0, 0, 0, 1);
     }
 
-    /// <summary>Pose of a collider or a frame. UnityEngine also has a Pose: write TaichiSoft.Pose.</summary>
+    /// <summary>Pose of a collider or a frame. In Unity, write TaichiSoft.Pose: UnityEngine has a Pose, too.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Pose
     {
-        /// <summary>[unit of length]</summary>
+        /// <summary>Position [unit of length].</summary>
         public Vector3d Position;
-        /// <summary>Of length 1.</summary>
+        /// <summary>Rotation, a unit quaternion.</summary>
         public Quaterniond Rotation;
 
         /// <summary>Creates a pose from a position and a rotation.</summary>
@@ -152,11 +152,11 @@ namespace TaichiSoft
         private readonly int reserved;
         /// <summary>Position of the mesh's origin [unit of length].</summary>
         public Vector3d Position;
-        /// <summary>Of length 1.</summary>
+        /// <summary>Rotation, a unit quaternion.</summary>
         public Quaterniond Rotation;
         /// <summary>Velocity of the centre of mass [unit of length/s].</summary>
         public Vector3d Velocity;
-        /// <summary>[rad/s]</summary>
+        /// <summary>Angular velocity [rad/s].</summary>
         public Vector3d Spin;
 
         /// <summary>Creates a placement at rest.</summary>
@@ -170,13 +170,13 @@ namespace TaichiSoft
     /// <summary>Kinds of shapes of colliders.</summary>
     public enum ShapeKind
     {
-        /// <summary>Solid below a plane.</summary>
+        /// <summary>The solid below a plane. Size is not used.</summary>
         Plane = 0,
-        /// <summary>Size.X is the radius.</summary>
+        /// <summary>A sphere. Size.X is the radius.</summary>
         Sphere = 1,
-        /// <summary>Size has the edges.</summary>
+        /// <summary>A box. Size contains the lengths of the edges.</summary>
         Box = 2,
-        /// <summary>Along the up axis: Size.X is the radius, Size.Y the length between the centres.</summary>
+        /// <summary>A capsule along the up axis. Size.X is the radius, Size.Y the length between the centres.</summary>
         Capsule = 3
     }
 
@@ -187,17 +187,17 @@ namespace TaichiSoft
         internal uint structSize;
         /// <summary>Kind, which defines the meaning of Size.</summary>
         public ShapeKind Kind;
-        /// <summary>[unit of length]</summary>
+        /// <summary>Size [unit of length], see ShapeKind.</summary>
         public Vector3d Size;
         /// <summary>Coulomb coefficient.</summary>
         public double Friction;
-        /// <summary>0 to 1; below 0 uses that of the bodies.</summary>
+        /// <summary>Restitution, 0 to 1. Below 0, the restitution of the bodies is used.</summary>
         public double Restitution;
         /// <summary>Distance outside the shape at which contact begins [unit of length].</summary>
         public double Thickness;
-        /// <summary>Bits: two objects collide if the mask of each has a bit of the other's group.</summary>
+        /// <summary>Bits. Two objects collide if the mask of each contains a bit of the other's group.</summary>
         public int Group;
-        /// <summary>See Group.</summary>
+        /// <summary>Bits of the groups with which the collider can collide, see Group.</summary>
         public int Mask;
 
         /// <summary>Creates a shape with default friction and restitution.</summary>
@@ -220,19 +220,19 @@ namespace TaichiSoft
         /// <summary>Triangle of the body's surface, not of a mesh; -1 for a body without triangles.</summary>
         public readonly int Triangle;
         internal readonly ulong body;
-        /// <summary>[unit of length]</summary>
+        /// <summary>Distance from the start of the ray, or from the given point [unit of length].</summary>
         public readonly double Distance;
         /// <summary>Weights of the three vertices, with sum 1.</summary>
         public readonly Vector3d Weights;
-        /// <summary>[unit of length]</summary>
+        /// <summary>Position of the hit [unit of length].</summary>
         public readonly Vector3d Point;
         /// <summary>Outward unit normal.</summary>
         public readonly Vector3d Normal;
-        /// <summary>Corners of the triangle.</summary>
+        /// <summary>Vertices of the triangle.</summary>
         public readonly int Vertex0, Vertex1, Vertex2;
         private readonly int isInside;
 
-        /// <summary>For Closest: true if the given point is inside the body.</summary>
+        /// <summary>True if the point that was given to Closest is inside the body.</summary>
         public bool IsInside
         {
             get { return isInside != 0; }
@@ -246,13 +246,13 @@ namespace TaichiSoft
         internal uint structSize;
         /// <summary>Triangle of the body's surface, as in Hit.</summary>
         public int Triangle;
-        /// <summary>Weights of its vertices; 0 or more, with sum 1.</summary>
+        /// <summary>Weights of the triangle's vertices; 0 or more, with sum 1.</summary>
         public Vector3d Weights;
         /// <summary>Initial target [unit of length].</summary>
         public Vector3d Point;
         /// <summary>Frequency of the spring [Hz]; 5 feels like a hand.</summary>
         public double Frequency;
-        /// <summary>Largest force; below 0 means ten times the body's weight on Earth.</summary>
+        /// <summary>Largest force. A number below 0 means ten times the body's weight on Earth.</summary>
         public double MaxForce;
 
         /// <summary>Creates a default grab at a point of a triangle.</summary>
@@ -283,7 +283,7 @@ namespace TaichiSoft
         private Vector3d point;
         /// <summary>Target speed [rad/s], or [unit of length/s] for Push.</summary>
         public double Speed;
-        /// <summary>Limit of the torque, or of the force for Push.</summary>
+        /// <summary>Largest torque, or largest force for Push.</summary>
         public double Limit;
 
         private Drive(bool turns, Vector3d axis, double speed, double limit) : this()
@@ -294,19 +294,19 @@ namespace TaichiSoft
             Limit = limit;
         }
 
-        /// <summary>Rotates vertices about an axis through their centre that rotates with them.</summary>
+        /// <summary>Rotates vertices about an axis through their centre. The axis rotates with the vertices.</summary>
         public static Drive Turn(Vector3d axis, double speed, double maxTorque)
         {
             return new Drive(true, axis, speed, maxTorque);
         }
 
-        /// <summary>Pushes vertices along an axis that rotates with them.</summary>
+        /// <summary>Pushes vertices along an axis. The axis rotates with the vertices.</summary>
         public static Drive Push(Vector3d axis, double speed, double maxForce)
         {
             return new Drive(false, axis, speed, maxForce);
         }
 
-        /// <summary>The same with an axis that is fixed in space.</summary>
+        /// <summary>Returns a copy whose axis is fixed in space.</summary>
         public Drive Fixed()
         {
             Drive found = this;
@@ -314,7 +314,7 @@ namespace TaichiSoft
             return found;
         }
 
-        /// <summary>The same with an axis that is fixed in space and passes through a point.</summary>
+        /// <summary>Returns a copy whose axis is fixed in space and passes through a point.</summary>
         public Drive Through(Vector3d place)
         {
             Drive found = Fixed();
@@ -330,7 +330,7 @@ namespace TaichiSoft
     {
         /// <summary>A body touches a collider or another body.</summary>
         ContactBegan = 1,
-        /// <summary>They have not touched for 0.05 s, or one of them was removed.</summary>
+        /// <summary>Two objects have not touched for 0.05 s, or one of them was removed.</summary>
         ContactEnded = 2,
         /// <summary>A body fell asleep.</summary>
         FellAsleep = 4,
@@ -338,7 +338,7 @@ namespace TaichiSoft
         Woke = 8,
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
-        /// <summary>All of them.</summary>
+        /// <summary>All kinds of events.</summary>
         All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
     }
 
@@ -351,13 +351,13 @@ namespace TaichiSoft
         public readonly int Collider;
         /// <summary>Step of the world, from 0.</summary>
         public readonly long Step;
-        /// <summary>Time at the end of that step [s].</summary>
+        /// <summary>Simulated time at the end of the step [s].</summary>
         public readonly double Time;
-        /// <summary>Body of the event. It may have been removed: check IsAlive.</summary>
+        /// <summary>Body of the event. Check IsAlive, because the body may have been removed.</summary>
         public readonly Body Body;
-        /// <summary>Body that it touches, in the higher slot; IsSomebody is false if there is none.</summary>
+        /// <summary>Body in a higher slot that Body touches; IsSomebody is false if there is none.</summary>
         public readonly Body Other;
-        /// <summary>Impulse that Body exerted: in that step, or during the whole contact if it ended.</summary>
+        /// <summary>Impulse that Body exerted in the step, or in the whole contact if the contact ended.</summary>
         public readonly Vector3d Impulse;
         /// <summary>Duration of a contact that ended [s].</summary>
         public readonly double Duration;
@@ -375,7 +375,7 @@ namespace TaichiSoft
         }
     }
 
-    // Memory layout of the library.
+    // An event in the memory layout of the library.
     [StructLayout(LayoutKind.Sequential)]
     internal struct PlainEvent
     {
@@ -395,7 +395,7 @@ namespace TaichiSoft
         internal uint structSize;
         /// <summary>Largest number of bodies.</summary>
         public int SlotCount;
-        /// <summary>Counts of objects, whose numbers start at 0.</summary>
+        /// <summary>Number of objects of each kind. The numbers of objects start at 0.</summary>
         public int AssetCount, ColliderCount, FrameCount, MeshCount;
     }
 
@@ -404,9 +404,9 @@ namespace TaichiSoft
     public struct AssetInfo
     {
         internal uint structSize;
-        /// <summary>Vertices of a body.</summary>
+        /// <summary>Number of vertices of a body.</summary>
         public int VertexCount;
-        /// <summary>Largest number of its bodies.</summary>
+        /// <summary>Largest number of bodies of this asset.</summary>
         public int SlotCount;
         /// <summary>Mass of a body [kg].</summary>
         public float Mass;
@@ -417,13 +417,13 @@ namespace TaichiSoft
     public struct MeshInfo
     {
         internal uint structSize;
-        /// <summary>Number of its asset.</summary>
+        /// <summary>Number of the mesh's asset.</summary>
         public int Asset;
-        /// <summary>Numbers of vertices and triangles.</summary>
+        /// <summary>Number of vertices, and number of triangles.</summary>
         public int VertexCount, TriangleCount;
         private readonly int hasUv;
 
-        /// <summary>True if it has texture coordinates.</summary>
+        /// <summary>True if the mesh has texture coordinates.</summary>
         public bool HasUv
         {
             get { return hasUv != 0; }
@@ -435,15 +435,15 @@ namespace TaichiSoft
     public struct Clock
     {
         internal uint structSize;
-        /// <summary>Steps of the last Advance.</summary>
+        /// <summary>Number of steps that the last Advance made.</summary>
         public int StepsMade;
         /// <summary>Total number of steps.</summary>
         public long Steps;
         /// <summary>Simulated time [s].</summary>
         public double Time;
-        /// <summary>Interpolation between the previous step and the last one, 0 to 1.</summary>
+        /// <summary>Interpolation factor between the states before (0) and after (1) the last step.</summary>
         public double Alpha;
-        /// <summary>Total time dropped because frames were too long [s].</summary>
+        /// <summary>Total time that was dropped because frames were too long [s].</summary>
         public double Dropped;
     }
 
@@ -457,8 +457,8 @@ namespace TaichiSoft
     }
 
     /// <summary>A world file in memory, with its kernels loaded.</summary>
-    // No SafeHandle: it holds a pointer, and the library's handles are 64-bit numbers on every machine. It is not
-    // needed either, because the library refuses invalid handles and does not reuse them.
+    // This class uses no SafeHandle, which contains a pointer, because handles are 64-bit numbers on every machine. A
+    // SafeHandle is not necessary, because the library refuses invalid handles and does not reuse handles.
     public sealed class Scene : IDisposable
     {
         private readonly ulong handle;
@@ -501,7 +501,7 @@ namespace TaichiSoft
             get { return handle; }
         }
 
-        /// <summary>Returns the numbers of objects.</summary>
+        /// <summary>Returns the number of objects of each kind.</summary>
         public SceneInfo GetInfo()
         {
             var info = new SceneInfo { structSize = Size<SceneInfo>.Bytes };
@@ -509,7 +509,7 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>Returns the number of an object by its name; for a body, its slot.</summary>
+        /// <summary>Returns the number of the object with a name. The number of a body is its slot.</summary>
         public int Find(NameKind kind, string name)
         {
             int number;
@@ -539,7 +539,7 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>Returns the number of levels of detail; AssetInfo describes the finest.</summary>
+        /// <summary>Returns the number of levels of detail. AssetInfo describes the finest level.</summary>
         public int GetLevelCount(int asset)
         {
             int count;
@@ -547,7 +547,7 @@ namespace TaichiSoft
             return count;
         }
 
-        /// <summary>Returns the level of detail of a mesh; -1 for a skin, which fits all levels.</summary>
+        /// <summary>Returns the level of detail of a mesh; -1 for a skin, which is drawn at all levels.</summary>
         public int GetMeshLevel(int mesh)
         {
             int level;
@@ -563,13 +563,13 @@ namespace TaichiSoft
             return info;
         }
 
-        /// <summary>Reads triangles, 3 numbers each; clockwise seen from outside in Unity's axes.</summary>
+        /// <summary>Reads triangles, 3 vertex numbers each. In Unity's axes they are clockwise from outside.</summary>
         public void GetTriangles(int mesh, int[] indices)
         {
             Native.Check(Native.ts_mesh_get_triangles(handle, mesh, indices, Native.Length(indices)), this);
         }
 
-        /// <summary>Reads texture coordinates, 2 numbers each, v upwards.</summary>
+        /// <summary>Reads texture coordinates, 2 numbers per vertex; v points up.</summary>
         public void GetUv(int mesh, float[] uv)
         {
             Native.Check(Native.ts_mesh_get_uv(handle, mesh, uv, Native.Length(uv)), this);
@@ -579,18 +579,18 @@ namespace TaichiSoft
     /// <summary>A running instance of a scene.</summary>
     public sealed class World : IDisposable
     {
-        // The library calls a static method, because Unity's IL2CPP supports only those. The field keeps the delegate
-        // from being collected. A weak handle refers to the world, so that the world can be collected.
+        // The library calls a static method, because Unity's IL2CPP supports only static callbacks. The field keeps the
+        // delegate from being collected. A weak handle refers to the world, so that the world can be collected.
         private static readonly Native.BeforeStep onStep = OnStep;
 
         private readonly ulong handle;
         private readonly PlainEvent[] drained = new PlainEvent[64];
-        private readonly ulong[] found; // buffer for all bodies
+        private readonly ulong[] found; // buffer for the handles of all bodies
         private GCHandle self;
         private bool isDisposed;
         private ExceptionDispatchInfo thrown;
 
-        /// <summary>Creates a world in its exported state.</summary>
+        /// <summary>Creates a world in the exported state.</summary>
         public World(Scene scene)
         {
             found = new ulong[scene.GetInfo().SlotCount];
@@ -605,7 +605,7 @@ namespace TaichiSoft
             Release();
         }
 
-        /// <summary>Destroys the world. If called in BeforeStep, Advance then throws.</summary>
+        /// <summary>Destroys the world. If BeforeStep calls this method, Advance throws an exception.</summary>
         public void Dispose()
         {
             Native.Check(Release(), this);
@@ -622,8 +622,10 @@ namespace TaichiSoft
             return 0;
         }
 
-        /// <summary>Called before each step of Advance. Move colliders and frames and apply forces here.</summary>
-        /// <remarks>If it throws, Advance makes its remaining steps without it and then throws the exception.</remarks>
+        /// <summary>Function called before each step of Advance, to move colliders and frames and to apply forces.
+        /// </summary>
+        /// <remarks>If the function throws, Advance makes the remaining steps without calling it, and then throws the
+        /// same exception.</remarks>
         public Action<World> BeforeStep { get; set; }
 
         [MonoPInvokeCallback(typeof(Native.BeforeStep))]
@@ -641,8 +643,8 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Sets the steps of Advance: dt [s], substeps (0 chooses a stable number), and the largest number of
-        /// steps per call; further time is dropped.</summary>
+        /// <summary>Sets the length of a step [s], the number of substeps (0 chooses a stable number), and the largest
+        /// number of steps per call of Advance. Further time is dropped.</summary>
         public void SetFixedStep(double dt, int substeps = 0, int maxSteps = 8)
         {
             var step = new FixedStep
@@ -652,14 +654,14 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_set_fixed_step(handle, ref step), this);
         }
 
-        /// <summary>Sets the number of threads for a step, including the calling one: 1 to 256, by default the number
-        /// of CPU threads. Results do not depend on it.</summary>
+        /// <summary>Sets the number of threads for a step, including the calling thread: 1 to 256, by default the
+        /// number of CPU threads. Results do not depend on the number of threads.</summary>
         public void SetThreads(int count)
         {
             Native.Check(Native.ts_world_set_threads(handle, count), this);
         }
 
-        /// <summary>Makes one step of dt [s] with equal substeps; 0 chooses a stable number.</summary>
+        /// <summary>Makes one step of dt [s] with equal substeps. With 0 substeps, a stable number is chosen.</summary>
         public void Step(double dt, int substeps = 0)
         {
             Native.Check(Native.ts_world_step(handle, dt, substeps), this);
@@ -680,7 +682,7 @@ namespace TaichiSoft
             return clock;
         }
 
-        /// <summary>Returns the clock; StepsMade is 0.</summary>
+        /// <summary>Returns the clock. Its StepsMade is 0.</summary>
         public Clock GetClock()
         {
             var clock = new Clock { structSize = Size<Clock>.Bytes };
@@ -688,7 +690,7 @@ namespace TaichiSoft
             return clock;
         }
 
-        /// <summary>Returns the current stable number of substeps for a step of dt [s].</summary>
+        /// <summary>Returns the number of substeps that a step of dt [s] currently needs to be stable.</summary>
         public int StableSubsteps(double dt)
         {
             int substeps;
@@ -726,7 +728,7 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_radial_impulse(handle, ref center, impulse, radius), this);
         }
 
-        /// <summary>Returns the hash of the state, equal to that of Python's world in the same state.</summary>
+        /// <summary>Returns a hash of the state. A world of Python in the same state has the same hash.</summary>
         public ulong Hash()
         {
             ulong hash;
@@ -742,7 +744,7 @@ namespace TaichiSoft
             return checked((int)size.ToUInt64());
         }
 
-        /// <summary>Writes the state to a buffer of at least SnapshotSize bytes. Returns: the bytes used.</summary>
+        /// <summary>Writes the state to a buffer of at least SnapshotSize bytes. Returns: bytes written.</summary>
         public int Snapshot(byte[] buffer)
         {
             UIntPtr size;
@@ -772,14 +774,15 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_restore(handle, buffer, new UIntPtr((uint)size)), this);
         }
 
-        /// <summary>Records only events of these kinds from the next step on; 0 for none.</summary>
-        /// <remarks>Existing contacts count as beginning in that step.</remarks>
+        /// <summary>Records only events of these kinds from the next step on; 0 records none.</summary>
+        /// <remarks>Existing contacts count as beginning in the next step.</remarks>
         public void RecordEvents(EventKinds kinds)
         {
             Native.Check(Native.ts_world_record_events(handle, (int)kinds), this);
         }
 
-        /// <summary>Removes the oldest waiting events, as many as fit the array. Returns: their number.</summary>
+        /// <summary>Removes the oldest waiting events and writes them to an array, as many as fit. Returns: number of
+        /// events.</summary>
         public int DrainEvents(SoftEvent[] events)
         {
             if (events == null) throw new ArgumentNullException("events");
@@ -825,7 +828,7 @@ namespace TaichiSoft
             return new Body(this, body);
         }
 
-        /// <summary>Finds the first surface on a ray, without back faces. Returns: false if there is none.</summary>
+        /// <summary>Finds the first surface that a ray hits from outside. Returns: false if there is none.</summary>
         public bool Raycast(Vector3d origin, Vector3d direction, double maxDistance, out Hit hit, out Body body)
         {
             hit = new Hit { structSize = Size<Hit>.Bytes };
@@ -834,7 +837,8 @@ namespace TaichiSoft
             return hit.body != 0;
         }
 
-        /// <summary>Finds the closest point of all surfaces. Returns: false if none is in range.</summary>
+        /// <summary>Finds the point of all surfaces that is closest to a point. Returns: false if there is none within
+        /// maxDistance.</summary>
         public bool Closest(Vector3d point, double maxDistance, out Hit hit, out Body body)
         {
             hit = new Hit { structSize = Size<Hit>.Bytes };
@@ -843,7 +847,8 @@ namespace TaichiSoft
             return hit.body != 0;
         }
 
-        /// <summary>Finds the bodies that touch or enclose a sphere, by slot. Returns: their number.</summary>
+        /// <summary>Finds the bodies that touch or enclose a sphere, in the order of slots. Returns: number of bodies.
+        /// </summary>
         /// <remarks>An array of SlotCount bodies is always large enough.</remarks>
         public int OverlapSphere(Vector3d center, double radius, Body[] bodies)
         {
@@ -853,7 +858,7 @@ namespace TaichiSoft
             return Copy(count, bodies);
         }
 
-        /// <summary>The same for a box with edges of `size`.</summary>
+        /// <summary>Finds the bodies that touch or enclose a box with edges of `size`, see OverlapSphere.</summary>
         public int OverlapBox(Pose pose, Vector3d size, Body[] bodies)
         {
             UIntPtr count;
@@ -875,8 +880,8 @@ namespace TaichiSoft
             return count;
         }
 
-        /// <summary>Returns a grab by its index, 0 to 15; IsThere is false if there is none.</summary>
-        /// <remarks>This includes grabs of the exported world.</remarks>
+        /// <summary>Returns the grab with an index, 0 to 15; IsThere is false if there is none.</summary>
+        /// <remarks>The exported world can also contain grabs.</remarks>
         public Grab GetGrab(int number)
         {
             ulong grab;
@@ -884,7 +889,7 @@ namespace TaichiSoft
             return new Grab(this, grab);
         }
 
-        /// <summary>Returns a joint by its index, 0 to 63; IsThere is false if there is none.</summary>
+        /// <summary>Returns the joint with an index, 0 to 63; IsThere is false if there is none.</summary>
         public Joint GetJoint(int number)
         {
             ulong joint;
@@ -892,7 +897,7 @@ namespace TaichiSoft
             return new Joint(this, joint);
         }
 
-        /// <summary>Returns a motor by its index, 0 to 63; IsThere is false if there is none.</summary>
+        /// <summary>Returns the motor with an index, 0 to 63; IsThere is false if there is none.</summary>
         public Motor GetMotor(int number)
         {
             ulong motor;
@@ -900,7 +905,8 @@ namespace TaichiSoft
             return new Motor(this, motor);
         }
 
-        /// <summary>Adds a collider, if the world has room: World(collider_room=...). Returns: its number.</summary>
+        /// <summary>Adds a collider. Returns: number of the collider.</summary>
+        /// <remarks>The world must have space for another collider, see World(collider_room=...) in Python.</remarks>
         public int AddCollider(Shape shape, Pose pose)
         {
             int collider;
@@ -915,13 +921,13 @@ namespace TaichiSoft
             Native.Check(Native.ts_collider_remove(handle, collider), this);
         }
 
-        /// <summary>Moves a collider to a pose over the next step, pushing bodies on the way.</summary>
+        /// <summary>Moves a collider to a pose over the next step. The collider pushes bodies in its path.</summary>
         public void MoveCollider(int collider, Pose pose)
         {
             Native.Check(Native.ts_collider_move_to(handle, collider, ref pose), this);
         }
 
-        /// <summary>Sets a constant velocity and spin [rad/s].</summary>
+        /// <summary>Moves a collider at a constant velocity and angular velocity [rad/s].</summary>
         public void SetColliderVelocity(int collider, Vector3d linear, Vector3d spin)
         {
             Native.Check(Native.ts_collider_set_velocity(handle, collider, ref linear, ref spin), this);
@@ -947,14 +953,15 @@ namespace TaichiSoft
             return pose;
         }
 
-        /// <summary>Returns the impulse of bodies on a collider in the last step, and its moment about the collider's
-        /// position.</summary>
+        /// <summary>Returns the impulse of all bodies on a collider in the last step, and the angular impulse about the
+        /// collider's position.</summary>
         public void GetColliderImpulse(int collider, out Vector3d impulse, out Vector3d moment)
         {
             Native.Check(Native.ts_collider_get_impulse(handle, collider, out impulse, out moment), this);
         }
 
-        /// <summary>Adds a frame, a pose that the game moves: a bone, a vehicle, a hand. Returns: its number.</summary>
+        /// <summary>Adds a frame, a pose that the game moves: a bone, a vehicle, a hand. Returns: number of the frame.
+        /// </summary>
         public int AddFrame(Pose pose)
         {
             int frame;
@@ -1002,7 +1009,7 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>True if the slot had a body.</summary>
+        /// <summary>True if there was a body in the slot.</summary>
         public bool IsSomebody
         {
             get { return Id != 0; }
@@ -1043,7 +1050,7 @@ namespace TaichiSoft
             Check(Native.ts_world_despawn(World.Handle, Id));
         }
 
-        /// <summary>Returns the number of its asset.</summary>
+        /// <summary>Returns the number of the body's asset.</summary>
         public int GetAsset()
         {
             int asset;
@@ -1051,7 +1058,7 @@ namespace TaichiSoft
             return asset;
         }
 
-        /// <summary>Returns its status.</summary>
+        /// <summary>Returns the status of the body.</summary>
         public BodyStatus GetStatus()
         {
             int status;
@@ -1070,7 +1077,7 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Number of vertices at its level.</summary>
+        /// <summary>Number of vertices at the current level of detail.</summary>
         public int VertexCount
         {
             get
@@ -1081,15 +1088,16 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Changes the level of detail, and with it vertices and triangles.</summary>
-        /// <remarks>Fails if joints, motors or attachments cannot be kept, unless `release` is true.</remarks>
+        /// <summary>Changes the level of detail. The vertices and triangles of the body then change.</summary>
+        /// <remarks>If joints, motors or attachments cannot be kept, they are released if `release` is true; otherwise
+        /// the call fails.</remarks>
         public void SetLevel(int level, bool release = false)
         {
             Check(Native.ts_body_set_level(World.Handle, Id, level, release ? 1 : 0));
         }
 
-        /// <summary>Reads the positions of its vertices, 3 numbers each, interpolated from the previous step (0) to the
-        /// last one (1).</summary>
+        /// <summary>Reads the positions of all vertices, 3 numbers each, interpolated between the states before (alpha
+        /// 0) and after (alpha 1) the last step.</summary>
         public void ReadPositions(double alpha, float[] positions)
         {
             Check(Native.ts_body_positions(World.Handle, Id, alpha, positions, Native.Length(positions)));
@@ -1108,15 +1116,15 @@ namespace TaichiSoft
             Check(Native.ts_body_mesh(World.Handle, Id, mesh, positions, normals, Native.Length(positions)));
         }
 
-        /// <summary>The same for pinned memory, such as a pinned Vector3[] of an engine.</summary>
-        /// <remarks>Both pointers must have room for `count` numbers; `normals` can be IntPtr.Zero.</remarks>
+        /// <summary>Reads positions and normals into pinned memory, such as a pinned Vector3[] of an engine.</summary>
+        /// <remarks>Both buffers must have space for `count` numbers; `normals` can be IntPtr.Zero.</remarks>
         public void ReadMesh(int mesh, IntPtr positions, IntPtr normals, int count)
         {
             if (count < 0) throw new ArgumentOutOfRangeException("count");
             Check(Native.ts_body_mesh(World.Handle, Id, mesh, positions, normals, new UIntPtr((uint)count)));
         }
 
-        /// <summary>Returns its centre of mass.</summary>
+        /// <summary>Returns the centre of mass.</summary>
         public Vector3d GetCenter()
         {
             Vector3d center;
@@ -1130,20 +1138,20 @@ namespace TaichiSoft
             Check(Native.ts_body_set_velocity(World.Handle, Id, ref linear, ref spin));
         }
 
-        /// <summary>Moves the centre of mass to a position and rotates the body about it, with its velocity or at
-        /// rest.</summary>
+        /// <summary>Moves the centre of mass to a position and rotates the current shape by `turn`. The body keeps its
+        /// velocity if `keepsVelocity` is true; otherwise it is at rest.</summary>
         public void Teleport(Vector3d center, Quaterniond turn, bool keepsVelocity = false)
         {
             Check(Native.ts_body_teleport(World.Handle, Id, ref center, ref turn, keepsVelocity ? 1 : 0));
         }
 
-        /// <summary>Applies an impulse to a list of vertices; null means all.</summary>
+        /// <summary>Applies an impulse to a list of vertices; null means all vertices.</summary>
         public void ApplyImpulse(Vector3d impulse, int[] vertices = null)
         {
             Check(Native.ts_body_apply_impulse(World.Handle, Id, ref impulse, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Applies a force during the next step to a list of vertices; null means all.</summary>
+        /// <summary>Applies a force during the next step to a list of vertices; null means all vertices.</summary>
         public void ApplyForce(Vector3d force, int[] vertices = null)
         {
             Check(Native.ts_body_apply_force(World.Handle, Id, ref force, vertices, Native.Count(vertices)));
@@ -1155,19 +1163,19 @@ namespace TaichiSoft
             Check(Native.ts_body_impulse_at(World.Handle, Id, ref impulse, ref point, radius));
         }
 
-        /// <summary>Scales gravity: 1 is the world's gravity, 0 none.</summary>
+        /// <summary>Sets the factor by which the world's gravity is multiplied for this body.</summary>
         public void SetGravityScale(double scale)
         {
             Check(Native.ts_body_set_gravity_scale(World.Handle, Id, scale));
         }
 
-        /// <summary>Sets the Coulomb coefficient against other bodies, in worlds with soft contact.</summary>
+        /// <summary>Sets the Coulomb coefficient for contact with other bodies, in worlds with soft contact.</summary>
         public void SetFriction(double friction)
         {
             Check(Native.ts_body_set_friction(World.Handle, Id, friction));
         }
 
-        /// <summary>Sets the damping rate of its velocity [1/s].</summary>
+        /// <summary>Sets the damping rate of the body's velocity [1/s].</summary>
         public void SetDamping(double rate)
         {
             Check(Native.ts_body_set_damping(World.Handle, Id, rate));
@@ -1185,7 +1193,7 @@ namespace TaichiSoft
             Check(Native.ts_body_pin(World.Handle, Id, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Releases pinned vertices; null means all.</summary>
+        /// <summary>Releases pinned vertices; null means all pinned vertices.</summary>
         public void Unpin(int[] vertices = null)
         {
             Check(Native.ts_body_unpin(World.Handle, Id, vertices, Native.Count(vertices)));
@@ -1210,13 +1218,14 @@ namespace TaichiSoft
             Check(Native.ts_body_attach(World.Handle, Id, vertices, Native.Count(vertices), frame, feels ? 1 : 0));
         }
 
-        /// <summary>Detaches vertices from frames; they keep their velocity. Null means all.</summary>
+        /// <summary>Detaches vertices from frames; null means all. The vertices keep their velocity.</summary>
         public void Detach(int[] vertices = null)
         {
             Check(Native.ts_body_detach(World.Handle, Id, vertices, Native.Count(vertices)));
         }
 
-        /// <summary>Attaches vertices to another body, at their current positions or each to one of its vertices.</summary>
+        /// <summary>Attaches vertices to the body `other` at their current positions or, if `onto` is not null, each to
+        /// a vertex in `onto`.</summary>
         public Joint Join(int[] vertices, Body other, int[] onto = null)
         {
             if (onto != null && (vertices == null || onto.Length != vertices.Length))
@@ -1238,13 +1247,14 @@ namespace TaichiSoft
             return new Motor(World, motor);
         }
 
-        /// <summary>Returns the force on a frame, mean over the last step, and its torque about the origin.</summary>
+        /// <summary>Returns the mean force on a frame in the last step, and the mean torque about the frame's origin.
+        /// </summary>
         public void GetLoad(int frame, out Vector3d force, out Vector3d torque)
         {
             Check(Native.ts_body_get_load(World.Handle, Id, frame, out force, out torque));
         }
 
-        /// <summary>Grabs its surface. A world has at most 16 grabs.</summary>
+        /// <summary>Grabs the surface of the body. A world has at most 16 grabs.</summary>
         public Grab Grab(Pull pull)
         {
             ulong grab;
@@ -1268,13 +1278,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>True if the index had a grab.</summary>
+        /// <summary>True if there was a grab at the index.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Its world.</summary>
+        /// <summary>World of the grab.</summary>
         public World World
         {
             get
@@ -1295,13 +1305,13 @@ namespace TaichiSoft
             Check(Native.ts_grab_move(World.Handle, Id, ref point));
         }
 
-        /// <summary>Releases it.</summary>
+        /// <summary>Releases the grab.</summary>
         public void Release()
         {
             Check(Native.ts_grab_release(World.Handle, Id));
         }
 
-        /// <summary>Returns its force in the last substep.</summary>
+        /// <summary>Returns the force of the grab in the last substep.</summary>
         public Vector3d GetForce()
         {
             Vector3d force;
@@ -1324,13 +1334,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>True if the index was in use.</summary>
+        /// <summary>True if the index was in use when the handle was read.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Its world.</summary>
+        /// <summary>World of the joint.</summary>
         public World World
         {
             get
@@ -1340,13 +1350,13 @@ namespace TaichiSoft
             }
         }
 
-        /// <summary>Releases it.</summary>
+        /// <summary>Releases the joint.</summary>
         public void Release()
         {
             Native.Check(Native.ts_joint_release(World.Handle, Id), world);
         }
 
-        /// <summary>Returns the force of the other body, mean over the last step.</summary>
+        /// <summary>Returns the mean force of the other body in the last step.</summary>
         public Vector3d GetForce()
         {
             Vector3d force;
@@ -1369,13 +1379,13 @@ namespace TaichiSoft
             Id = id;
         }
 
-        /// <summary>True if the index was in use.</summary>
+        /// <summary>True if the index was in use when the handle was read.</summary>
         public bool IsThere
         {
             get { return Id != 0; }
         }
 
-        /// <summary>Its world.</summary>
+        /// <summary>World of the motor.</summary>
         public World World
         {
             get
@@ -1391,13 +1401,13 @@ namespace TaichiSoft
             Native.Check(Native.ts_motor_set_speed(World.Handle, Id, speed), world);
         }
 
-        /// <summary>Sets the limit of the torque or force; with 0 the vertices coast.</summary>
+        /// <summary>Sets the largest torque or force. With 0 the vertices coast.</summary>
         public void SetLimit(double limit)
         {
             Native.Check(Native.ts_motor_set_limit(World.Handle, Id, limit), world);
         }
 
-        /// <summary>Returns the speed of its vertices.</summary>
+        /// <summary>Returns the speed of the driven vertices after the last step.</summary>
         public double GetSpeed()
         {
             double speed;
@@ -1405,7 +1415,7 @@ namespace TaichiSoft
             return speed;
         }
 
-        /// <summary>Returns its torque or force, mean over the last step.</summary>
+        /// <summary>Returns the mean torque or force of the motor in the last step.</summary>
         public double GetEffort()
         {
             double effort;
@@ -1420,7 +1430,7 @@ namespace TaichiSoft
         }
     }
 
-    // Unity's IL2CPP finds this attribute by its name, so it need not be Unity's.
+    // Unity's IL2CPP finds this attribute by its name, so Unity's own attribute is not required.
     [AttributeUsage(AttributeTargets.Method)]
     internal sealed class MonoPInvokeCallbackAttribute : Attribute
     {
@@ -1434,8 +1444,8 @@ namespace TaichiSoft
         internal static readonly uint Bytes = (uint)Marshal.SizeOf(typeof(T));
     }
 
-    // The functions of taichi_soft.h. Bytes converts strings to zero-terminated UTF-8, because .NET's conversion
-    // depends on the system.
+    // The functions of taichi_soft.h. The method Bytes converts strings to zero-terminated UTF-8, because .NET's
+    // conversion depends on the system.
     internal static class Native
     {
         internal const uint Version = 1;
@@ -1457,7 +1467,7 @@ namespace TaichiSoft
             return array == null ? UIntPtr.Zero : new UIntPtr((uint)array.Length);
         }
 
-        // Length of a list of vertices. An empty list is refused, because the library would take it for all vertices.
+        // Length of a list of vertices. An empty list is refused, because for the library it means all vertices.
         internal static UIntPtr Count(int[] vertices)
         {
             if (vertices != null && vertices.Length == 0)
@@ -1467,7 +1477,7 @@ namespace TaichiSoft
             return Length(vertices);
         }
 
-        // The parameter keeps the owner from being finalised during the call.
+        // The parameter `owner` keeps the owner from being finalised during the call.
         [MethodImpl(MethodImplOptions.NoInlining)]
         internal static void Check(int result, object owner)
         {

@@ -1,5 +1,5 @@
-// taichi_soft.h for C++17: handles with RAII, and errors as exceptions. For functions that are missing here, call the C
-// function with `handle()`.
+// taichi_soft.h for C++17: handles with RAII, and errors as exceptions. To call a C function that has no method here,
+// pass `handle()`.
 //
 //     auto scene = taichi_soft::Scene("game.softworld");
 //     auto world = scene.create();
@@ -53,13 +53,13 @@ struct Pose {
   }
 };
 
-// A body of a world; a small value that can be copied. Calls with a removed body are refused.
+// A body of a world: a small value that can be copied. Calls with a removed body are refused.
 struct Body {
   ts_body handle = 0;
   explicit operator bool() const { return handle != 0; }
 };
 
-// A joint between two bodies, and a motor on a part of a body; small values that can be copied.
+// Joint between two bodies, and motor on a part of a body: small values that can be copied.
 struct Joint {
   ts_joint handle = 0;
   explicit operator bool() const { return handle != 0; }
@@ -69,8 +69,9 @@ struct Motor {
   explicit operator bool() const { return handle != 0; }
 };
 
-// A grab, from `World::grab`. The destructor releases it. It can be moved, but not copied. After a `World::restore` to
-// a time before the grab, its handle can be reused: destroy it, or call `forget`, before making new grabs.
+// A grab, from `World::grab`, which the destructor releases. A Grab can be moved, but not copied. After a
+// `World::restore` to a time before the grab, a new grab can get the same handle. So first destroy the Grab or call
+// `forget`.
 class Grab {
  public:
   Grab() = default;
@@ -79,7 +80,7 @@ class Grab {
   Grab(Grab&& other) noexcept { swap(other); }
   Grab& operator=(Grab&& other) noexcept {
     if (this == &other) return *this;
-    // After a restore, the new grab can have the same handle as the old one, which must not be released then.
+    // After a restore, the new grab can have the same handle. Do not release this handle.
     if (handle_ != other.handle_ || world_ != other.world_) end();
     forget();
     swap(other);
@@ -104,7 +105,7 @@ class Grab {
     check(ts_grab_release(world_, handle_));
     handle_ = 0;
   }
-  // Keeps the grab and gives up ownership.
+  // Gives up ownership, without releasing the grab.
   void forget() { handle_ = 0; }
 
  private:
@@ -120,7 +121,7 @@ class Grab {
   ts_grab handle_ = 0;
 };
 
-// An instance of a scene. It can be moved, but not copied.
+// A running instance of a scene. A World can be moved, but not copied.
 class World {
  public:
   explicit World(ts_scene scene) {
@@ -153,22 +154,22 @@ class World {
     const ts_fixed_step step{sizeof(ts_fixed_step), substeps, max_steps, dt};
     check(ts_world_set_fixed_step(handle_, &step));
   }
-  // Number of threads for a step, including the calling one.
+  // Sets the number of threads for a step, including the calling thread.
   void set_threads(int32_t count) { check(ts_world_set_threads(handle_, count)); }
-  // Sets a function that `advance` calls before each step. It must not throw or call `on_step`.
+  // Sets a function that `advance` calls before each step. The function must not throw or call `on_step`.
   void on_step(std::function<void()> function) {
     auto next = std::make_unique<std::function<void()>>(std::move(function));
     const ts_before_step call = [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); };
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
-    before_ = std::move(next);  // only after the library no longer refers to the old one
+    before_ = std::move(next);  // after the library has stopped using the old function
   }
-  // Friction of the floor, of a body against other bodies, of a collider.
+  // Set the friction of the floor, of a body in contact with other bodies, or of a collider.
   void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
   void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
   void set_collider_friction(int32_t collider, double friction) {
     check(ts_collider_set_friction(handle_, collider, friction));
   }
-  // Gravity [m/s^2].
+  // Sets gravity [m/s^2].
   void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {
     uint64_t found = 0;
@@ -184,9 +185,9 @@ class World {
   }
   void restore(const std::vector<char>& bytes) { check(ts_world_restore(handle_, bytes.data(), bytes.size())); }
 
-  // Records events of these kinds, bits such as TS_CONTACT_BEGAN, from the next step on; 0 for none.
+  // Records events of these kinds from the next step on. `kinds` is a sum of bits such as TS_CONTACT_BEGAN; 0 is none.
   void record_events(int32_t kinds) { check(ts_world_record_events(handle_, kinds)); }
-  // Replaces `events` by all waiting events. Reuse the vector between frames to avoid allocations.
+  // Replaces the contents of `events` by all waiting events. Reuse the vector between frames to avoid allocations.
   void drain_events(std::vector<ts_event>& events) {
     std::array<ts_event, 64> some;
     size_t count = some.size();
@@ -246,7 +247,7 @@ class World {
     check(ts_body_get_vertex_count(handle_, body.handle, &found));
     return found;
   }
-  // Positions, 3 numbers per vertex.
+  // Reads the positions of all vertices, 3 numbers each.
   void positions(Body body, std::vector<float>& out, double alpha = 1.0) const {
     check(ts_body_positions(handle_, body.handle, alpha, out.data(), out.size()));
   }
@@ -257,7 +258,7 @@ class World {
   void set_velocity(Body body, const Vector& linear, const Vector& spin = {}) {
     check(ts_body_set_velocity(handle_, body.handle, linear.data(), spin.data()));
   }
-  // Applies an impulse to all vertices, or to those in a list.
+  // Applies an impulse to the vertices in a list; an empty list means all vertices.
   void apply_impulse(Body body, const Vector& impulse, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_apply_impulse(handle_, body.handle, impulse.data(), vertices.data(), vertices.size()));
   }
@@ -269,17 +270,17 @@ class World {
   void attach(Body body, const std::vector<int32_t>& vertices, int32_t frame, bool feels = false) {
     check(ts_body_attach(handle_, body.handle, vertices.data(), vertices.size(), frame, feels ? 1 : 0));
   }
-  // Detaches all attached vertices, or those in a list.
+  // Detaches the vertices in a list; an empty list means all attached vertices.
   void detach(Body body, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_detach(handle_, body.handle, vertices.data(), vertices.size()));
   }
-  // Force on a frame, mean over the last step [N], and torque about the frame's origin.
+  // Mean force on a frame in the last step [N], and mean torque about the frame's origin.
   std::pair<Vector, Vector> load(Body body, int32_t frame) const {
     std::pair<Vector, Vector> found;
     check(ts_body_get_load(handle_, body.handle, frame, found.first.data(), found.second.data()));
     return found;
   }
-  // Grabs a body where a ray hit it. A `max_force` below 0 means ten times the body's weight on Earth.
+  // Grabs a body at the point that a ray hit. A `max_force` below 0 means ten times the body's weight on Earth.
   Grab grab(const ts_hit& hit, double frequency = 5.0, double max_force = -1.0) {
     ts_pull pull{};
     pull.struct_size = sizeof pull;
@@ -295,7 +296,7 @@ class World {
     return Grab(handle_, found);
   }
 
-  // Attaches vertices to another body: at their current positions in it, or each to one of its vertices in `onto`.
+  // Attaches vertices to `other` at their current positions or, if `onto` is not empty, each to a vertex in `onto`.
   Joint join(Body body, const std::vector<int32_t>& vertices, Body other, const std::vector<int32_t>& onto = {}) {
     if (!onto.empty() && onto.size() != vertices.size()) throw std::invalid_argument("onto differs in size");
     Joint found;
@@ -304,7 +305,7 @@ class World {
     return found;
   }
   void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
-  // Force of the other body, mean over the last step [N].
+  // Mean force of the other body in the last step [N].
   Vector force(Joint joint) const {
     Vector found;
     check(ts_joint_get_force(handle_, joint.handle, found.data()));
@@ -320,7 +321,7 @@ class World {
   void set_limit(Motor motor, double limit) { check(ts_motor_set_limit(handle_, motor.handle, limit)); }
   void remove(Motor motor) { check(ts_motor_remove(handle_, motor.handle)); }
 
-  // The hit's body is 0 if nothing is hit.
+  // First surface that a ray hits from outside. The hit's body is 0 if the ray hits nothing.
   ts_hit raycast(const Vector& origin, const Vector& direction, double max_distance = HUGE_VAL) const {
     ts_hit found{};
     found.struct_size = sizeof found;
@@ -334,7 +335,7 @@ class World {
     return found;
   }
 
-  // Bodies that touch or enclose a sphere, or a box with edges of `size`, by slot.
+  // Bodies that touch or enclose a sphere, or a box with edges of `size`, in the order of slots.
   std::vector<Body> overlap_sphere(const Vector& center, double radius) const {
     return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
       return ts_world_overlap_sphere(handle_, center.data(), radius, bodies, capacity, count);
@@ -351,13 +352,13 @@ class World {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
   }
-  // Impulse of bodies on a collider in the last step, and its moment about the collider's position.
+  // Impulse of all bodies on a collider in the last step, and angular impulse about the collider's position.
   std::pair<Vector, Vector> collider_impulse(int32_t collider) const {
     std::pair<Vector, Vector> found;
     check(ts_collider_get_impulse(handle_, collider, found.first.data(), found.second.data()));
     return found;
   }
-  // Adds a pose that the game moves. Returns: its number.
+  // Adds a frame, a pose that the game moves. Returns: number of the frame.
   int32_t add_frame(const Pose& pose) {
     const ts_pose plain = pose.plain();
     int32_t found = 0;
@@ -415,7 +416,7 @@ class Scene {
   ts_scene handle() const { return handle_; }
   World create() const { return World(handle_); }
 
-  // Number of the object with a name; kinds are TS_BODY and so on.
+  // Number of the object with a name. `kind` is TS_BODY, TS_ASSET or another kind of named objects.
   int32_t find(int32_t kind, const std::string& name) const {
     int32_t found = 0;
     check(ts_scene_find(handle_, kind, name.c_str(), &found));

@@ -1,4 +1,4 @@
-// A game loop: balls fall onto a lift, one per second. game FOLDER [SECONDS]
+// Sample of a game loop in which a ball falls onto a lift every second: game FOLDER [SECONDS]
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -24,18 +24,18 @@ int main(int count, char** arguments) {
     int touches = 0;
     int64_t step = 0;
     std::vector<Body> balls = {world.body(scene.find(TS_BODY, "first"))};
-    world.on_step([&] {  // at the same times for any frame rate
+    world.on_step([&] {  // called once per step, independent of the frame rate
       const double time = double(step++) / 60.0;
       world.move_collider(lift, {{0.0, 0.0, 0.4 - 0.3 * std::cos(time)}, {0.0, 0.0, 0.0, 1.0}});
       if (step % 60 == 0 && balls.size() < 6) balls.push_back(world.spawn(ball, {{0.05, 0.0, 2.0}, {0, 0, 0, 1}}));
     });
 
-    const double frame = 1.0 / 50.0;  // your renderer's
+    const double frame = 1.0 / 50.0;  // in a game, the time since the last frame
     for (int i = 0; i * frame < seconds; ++i) {
       const ts_clock clock = world.advance(frame);
       for (Body each : balls) world.mesh(each, skin, vertices, normals);  // draw them with index_buffer
       world.drain_events(events);
-      for (const ts_event& each : events) touches += each.collider == lift;  // a sound, as loud as each.impulse
+      for (const ts_event& each : events) touches += each.collider == lift;  // or play a sound, as loud as each.impulse
       if (i % 50 != 0) continue;
       const auto [impulse, moment] = world.collider_impulse(lift);
       std::printf("%.2f s: %zu ball%s of %zu triangles, the first at %.3f m; the lift feels %.1f N, touched %d times\n",

@@ -1,4 +1,4 @@
-// The functions of taichi_soft.h. Each checks its arguments, locks the world and catches all exceptions.
+// The functions of taichi_soft.h. Each function checks its arguments, locks the world and catches all exceptions.
 
 #include <algorithm>
 #include <cstring>
@@ -15,7 +15,7 @@ using namespace taichi_soft;
 namespace {
 
 Handles<Scene>& scenes() {
-  static auto* found = new Handles<Scene>("scene", 1);  // never destroyed: threads may outlive main
+  static auto* found = new Handles<Scene>("scene", 1);  // never destroyed, because threads may outlive main
   return *found;
 }
 
@@ -35,7 +35,7 @@ template <typename Function>
 ts_result guarded(Function function) noexcept {
   const WithUsualFloats floats;
 #if defined(__wasm__)
-  function();  // see `fail`
+  function();  // throws no C++ exceptions, see `fail`
   return TS_OK;
 #else
   try {
@@ -55,7 +55,7 @@ ts_result guarded(Function function) noexcept {
 #endif
 }
 
-// Lists valid names, as many as fit into the text of an error.
+// Lists valid names for an error text, as many as fit.
 std::string choice(const std::vector<std::string>& names) {
   if (names.empty()) return "the world file has none of that kind";
   std::string found = "give one of ";
@@ -83,8 +83,8 @@ class Turn {
   Attempt lock_;
 };
 
-// Makes the steps of one frame. Between steps, the world is unlocked for the same thread only, whose callback can
-// move colliders. If a step fails, the time of the remaining steps is dropped.
+// Makes the steps of one frame. Between steps, only the same thread can call the world, so that its callback can move
+// colliders. If a step fails, the time of the remaining steps is dropped.
 class Frame {
  public:
   Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
@@ -147,7 +147,7 @@ Vector place(const Turn& world, const double* host, const char* name) {
   return found;
 }
 
-// Converts a velocity or an impulse. Both have the axes and the unit of positions.
+// Converts a velocity or an impulse, which use the same axes and unit of length as positions.
 Vector vector(const Turn& world, const double* host, const char* name) {
   const Vector found = world.axes().place_in(finite(host, 3, name));
   for (double each : found) {
@@ -172,7 +172,7 @@ Quaternion rotation(const Turn& world, const double* host, const char* name) {
 
 Pose pose(const Turn& world, const ts_pose* host) {
   given(host, "pose");
-  // The same conversion as in Python, which also accepts matrices.
+  // Convert through a matrix, as Python does because it also accepts matrices.
   const Quaternion turn = quaternion_of(matrix_of(rotation(world, host->rotation, "rotation")));
   return {place(world, host->position, "position"), turn};
 }
@@ -189,7 +189,7 @@ double length(const Turn& world, double host, double least, const char* name) {
   return found;
 }
 
-// Fills in the shape of a collider, in the same way as taichi_soft/contact/shapes.
+// Fills in the shape of a collider, with the same values as taichi_soft/contact/shapes.
 void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   constexpr double kShortest = 1e-6;
   Vector half = {0.0, 0.0, 0.0};
@@ -236,7 +236,8 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->mask = shape.mask;
 }
 
-// A rotating motor has a speed in rad/s and a torque; a pushing motor has a speed in length/s and a force.
+// The speed of a rotating motor is in rad/s and its limit a torque. The speed of a pushing motor is in length/s and its
+// limit a force.
 double motor_speed_in(const Turn& world, bool turns, double host) {
   return turns ? host : world.axes().length_in(host);
 }
@@ -431,7 +432,7 @@ ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices,
     require_size(count, row.triangles.count, "indices");
     std::copy(row.triangles.begin(), row.triangles.end(), indices);
     if (!found->axes.are_left_handed()) return;
-    for (size_t i = 0; i + 3 <= count; i += 3) std::swap(indices[i + 1], indices[i + 2]);  // left-handed axes
+    for (size_t i = 0; i + 3 <= count; i += 3) std::swap(indices[i + 1], indices[i + 2]);  // for left-handed axes
   });
 }
 
@@ -454,7 +455,7 @@ ts_result ts_world_create(ts_scene scene, ts_world* world) {
 
 ts_result ts_world_destroy(ts_world world) {
   return guarded([&] {
-    const Turn turn(world);  // wait until no other thread is in a call
+    const Turn turn(world);  // waits until no other thread is in a call
     worlds().remove(world);
   });
 }
@@ -497,7 +498,7 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
 }
 
 #if defined(__wasm__)
-// Ends a `Frame` that a JavaScript exception left open.
+// Ends a `Frame` that was not ended because JavaScript threw an exception.
 TS_API ts_result ts_web_end_frame(ts_world world) {
   worlds().find(world)->end_frame();
   return TS_OK;

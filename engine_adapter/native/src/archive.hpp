@@ -9,7 +9,7 @@
 namespace taichi_soft {
 
 std::vector<char> read_file(const std::string& path);
-uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32 (IEEE 802.3), continues `before`
+uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32 (IEEE 802.3), continued from `before`
 
 class Archive {
  public:
@@ -28,7 +28,7 @@ class Archive {
 
   template <typename Number>
   View<Number> get(const std::string& name) const;
-  // Numbers of an array. Also fails unless each row has `width` numbers.
+  // Numbers of an array. Fails in the same cases as `get`, and unless each row has `width` numbers.
   template <typename Number>
   View<Number> rows(const std::string& name, size_t width) const;
   std::vector<std::string> texts(const std::string& name) const;

@@ -1,4 +1,4 @@
-// Converts between the engine's axes and unit of length and those of this library: z up, right-handed, metres.
+// Converts between the engine's axes and unit of length and the library's: z up, right-handed, metres.
 #pragma once
 
 #include "rotations.hpp"
@@ -7,14 +7,15 @@ namespace taichi_soft {
 
 class Axes {
  public:
-  // Rows of the matrix from this library's positions to the engine's. Each row has one nonzero number, all of equal size.
+  // `rows` is the matrix from the library's positions to the engine's. Each row has one nonzero number. The absolute
+  // values of these numbers are equal.
   explicit Axes(const double* rows);
 
   Vector place_in(const double* host) const { return in(host, 1.0 / scale_); }
   void place_out(const Vector& ours, double* host) const { out(ours, scale_, host); }
   void normal_out(const Vector& ours, double* host) const { out(ours, 1.0, host); }
   Vector normal_in(const double* host) const { return in(host, 1.0); }
-  // Converts axial vectors: angular velocities, and moments (with the square of the engine's unit).
+  // Converts axial vectors: angular velocities, and moments, which contain the square of the unit of length.
   Vector turn_in(const double* host) const { return in(host, handedness_); }
   void moment_out(const Vector& ours, double* host) const { out(ours, handedness_ * scale_ * scale_, host); }
   Quaternion rotation_in(const double* host) const {
@@ -28,7 +29,7 @@ class Axes {
   double length_in(double host) const { return host / scale_; }
   double scale() const { return scale_; }
   bool are_left_handed() const { return handedness_ < 0; }
-  // Converts positions or normals from this library's rows of 3 numbers to the engine's. Both can be the same memory.
+  // Converts positions or normals, 3 numbers per row, to the engine's axes. `ours` and `host` can be the same memory.
   void rows_out(const float* ours, size_t count, bool are_places, float* host) const;
   void rows_in(const float* host, size_t count, float* ours) const;
 

@@ -27,15 +27,15 @@ struct Collider {
   bool has_target;
   Pose target;   // pose at the end of the next step
   Box bounds;    // bounding box in the frame of the shape
-  double skin;   // thickness, and an additional margin for edges
+  double skin;   // thickness plus a margin for edges
   int32_t kind;  // number from taichi_soft/contact/distances/shape_kind.py
   float parameters[8];
-  double friction, restitution;  // restitution -1: elasticity of the bodies
+  double friction, restitution;  // with a restitution of -1, the bodies' restitution is used
   int32_t group, mask;
-  uint32_t serial;  // different for each collider that uses the row
+  uint32_t serial;  // distinguishes successive colliders in the same row
 
   bool moves() const;
-  // Box around the collider's path during `dt` [s], and its highest speed [m/s].
+  // Box around the collider's path during `dt` [s]. `fastest` receives the collider's highest speed [m/s].
   Box way(double dt, double* fastest) const;
 };
 
@@ -52,11 +52,11 @@ class Colliders {
   bool prepare(double dt, std::vector<ColliderMotion>* motion);
   void finish(double dt);
 
-  int32_t free_row() const;  // row for a new collider; can be one after the last row
+  int32_t free_row() const;  // index of a row for a new collider, which may have to be appended
 
   std::vector<Collider> rows;
   double seam = 0.0;     // additional skin of shapes with flat faces [m]
-  bool is_dirty = true;  // true if the fields lack new poses or velocities
+  bool is_dirty = true;  // true if poses or velocities have changed since they were written to the fields
 };
 
 }  // namespace taichi_soft

@@ -17,7 +17,7 @@ struct Error : std::runtime_error {
 };
 
 #if defined(__wasm__)
-// In WebAssembly there are no exceptions: the host throws its own exception and restores the stack.
+// WebAssembly has no exceptions. Instead, the host throws its own exception and restores the stack.
 extern "C" __attribute__((import_module("taichi_soft"), import_name("fail"))) [[noreturn]] void taichi_soft_fail(
     ts_result code, const char* text);
 #endif

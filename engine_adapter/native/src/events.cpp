@@ -56,7 +56,7 @@ void Events::follow(const std::map<Pair, std::array<float, 3>>& touches, const P
       if (is_moving) {
         contact.pause += dt;
       } else {
-        contact.touched = time;  // at rest, so the two still touch
+        contact.touched = time;  // both objects are at rest, so they still touch
       }
     }
     if (contact.pause > pause_ - 1e-9 || !are_there(contact, present)) {
@@ -96,7 +96,7 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches, cons
                        const std::vector<int32_t>& frozen, int64_t step, double time, double dt) {
   if ((kinds_ & kContacts) != 0) follow(touches, present, step, time, dt);
   const auto say = [&](int32_t kind, ts_body body) { tell({kind, -1, step, time, body, 0, {0.0, 0.0, 0.0}, 0.0}); };
-  if (looks()) {  // even if sleep events are off, because a restore may turn them on
+  if (looks()) {  // also if sleep events are off, because a restore can turn them on
     const std::vector<ts_body> now = sleeping(present);
     for (size_t slot = 0; slot < now.size(); ++slot) {
       if (now[slot] != 0 && now[slot] != sleepers_[slot]) say(TS_FELL_ASLEEP, now[slot]);

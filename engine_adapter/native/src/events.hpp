@@ -1,4 +1,4 @@
-// Events of steps, the same as those of taichi_soft/events.
+// Events of steps, equal to the events of taichi_soft/events.
 #pragma once
 
 #include <array>
@@ -13,20 +13,20 @@
 
 namespace taichi_soft {
 
-using Pair = std::array<int32_t, 3>;  // a slot, the kind of the other object, and its slot or number
+using Pair = std::array<int32_t, 3>;  // slot of a body; kind of the other object; slot or number of the other object
 
 struct Contact {    // current contact
-  ts_body a, b;     // b is 0 for a collider
+  ts_body a, b;     // b is 0 if a touches a collider
   uint32_t serial;  // serial number of the collider
   int32_t slot, kind, other;
-  double began, touched, pause;  // [s]: start of the first step, end of the last one, time since the last impulse
+  double began, touched, pause;  // start of the first step, end of the last step, time since the last impulse [s]
   double impulse[3];
 };
 
 // Bodies and colliders that exist after a step.
 struct Present {
-  std::vector<ts_body> bodies;      // by slot, 0 for an empty slot
-  std::vector<uint32_t> colliders;  // serial numbers, 0 for none
+  std::vector<ts_body> bodies;      // body in each slot; 0 for an empty slot
+  std::vector<uint32_t> colliders;  // serial number of each collider; 0 for an empty row
 };
 
 class Events {
@@ -39,7 +39,7 @@ class Events {
   static bool looks_for(int32_t kinds) {
     return (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED | TS_FELL_ASLEEP | TS_WOKE)) != 0;
   }
-  // Starts to record from the current state. `status` must be up to date if `looks_for(kinds)`.
+  // Starts to record from the current state. If `looks_for(kinds)` is true, `status` must be up to date.
   void record(int32_t kinds, const Present& present);
   void take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
@@ -55,11 +55,11 @@ class Events {
     std::vector<Contact> contacts;
   };
   Memory memory() const;
-  // Drops waiting events after a step count, because the world was restored to it.
+  // Drops waiting events of later steps, because the world was restored to the step count `steps`.
   void recall(const Memory& memory, int64_t steps, const Present& present);
   size_t contact_count() const { return (kinds_ & kContacts) != 0 ? going_on_.size() : 0; }
 
-  std::vector<int32_t> status;  // by slot, after the last step, then two numbers: see `read_touches`
+  std::vector<int32_t> status;  // status after the last step, by slot; then two numbers, see `read_touches`
   size_t touch_rows = 0;        // largest number of touching pairs in any step
 
  private:

@@ -22,7 +22,7 @@ std::string path_of(const std::string& folder, const char* name) {
   return (std::filesystem::u8path(folder) / name).u8string();
 }
 
-// Names of the files that this machine can run, the best first.
+// Names of the kernel files that this machine can run, the fastest first.
 std::vector<std::string> wanted_files() {
 #if defined(_WIN32)
   const std::string platform = "windows", end = ".dll";
@@ -51,7 +51,7 @@ std::string texts(const std::vector<std::string>& names) {
   return found.empty() ? "nothing" : found;
 }
 
-// Index of the best existing file for this machine. A game can contain only some of the exported files.
+// Index of the fastest existing file for this machine. A game can contain only some of the exported files.
 size_t choose(const std::filesystem::path& folder, const std::vector<std::string>& files) {
   const std::vector<std::string> wanted = wanted_files();
   std::filesystem::path missing;

@@ -1,4 +1,4 @@
-// Makes calls follow IEEE 754, including subnormal numbers, in any floating-point mode of the game's threads.
+// Makes calls follow IEEE 754, including subnormal numbers, whatever floating-point mode the game's threads use.
 #pragma once
 
 #include <cstdint>

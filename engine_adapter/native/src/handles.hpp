@@ -1,4 +1,4 @@
-// Maps handles to objects. Handles are numbers, because dangling pointers cannot be detected.
+// Maps handles to objects. Handles are numbers, because invalid numbers can be detected and dangling pointers cannot.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace taichi_soft {
 
-// Reference to an object during a call. In WebAssembly a refused call runs no destructors, so there this is a raw
-// pointer, which is safe because there is only one thread.
+// Reference to an object during a call. In WebAssembly the reference is a raw pointer, because a refused call runs no
+// destructors. The raw pointer is safe, because WebAssembly has only one thread.
 #if defined(__wasm__)
 template <typename Thing>
 using Kept = Thing*;
@@ -23,7 +23,7 @@ using Kept = std::shared_ptr<Thing>;
 template <typename Thing>
 class Handles {
  public:
-  // Each kind of object has its own number, so that handles of different kinds differ.
+  // `kind` is a different number for each kind of object, so that handles of different kinds differ.
   Handles(const char* name, uint64_t kind) : name_(name), kind_(kind << 56) {}
 
   uint64_t add(std::shared_ptr<Thing> thing) {
@@ -50,7 +50,7 @@ class Handles {
     return row_of(handle).thing;
   }
 
-  // Removes a handle. Running calls keep the object until they end.
+  // Removes a handle. The object exists until all running calls that use it have ended.
   std::shared_ptr<Thing> remove(uint64_t handle) {
     const Guard lock(mutex_);
     return std::move(row_of(handle).thing);

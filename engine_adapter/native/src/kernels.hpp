@@ -12,7 +12,7 @@ namespace taichi_soft {
 
 struct Runtime;
 
-// Memory layout of Taichi 1.7, on which the code of kernels relies.
+// Argument of a kernel. The layout is that of Taichi 1.7, which the machine code requires.
 struct Context {
   void* arguments;  // struct of the kernel's arguments, in order
   Runtime* runtime;
@@ -43,8 +43,8 @@ class Kernels {
  public:
   using Kernel = void (*)(Context* context);
 
-  // Loads the file for this platform from a folder. Fails if there is no such file, or if its length or checksum is not
-  // that of the exported file.
+  // Loads the file for this platform from a folder. Fails if there is no such file, or if its length or checksum
+  // differs from the exported file.
   Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums);
   // Uses kernels that are linked into the game.
   explicit Kernels(const ts_linked_kernel* rows) : rows_(rows) {}
@@ -52,7 +52,7 @@ class Kernels {
   Kernels(const Kernels&) = delete;
   Kernels& operator=(const Kernels&) = delete;
 
-  // Identifies the export that made the kernels.
+  // Text that identifies the export that made the kernels.
   const char* stamp() const { return rows_->name; }
   Kernel find(const std::string& name) const;
 

@@ -16,7 +16,7 @@ class Guard {
   explicit Guard(Mutex&) {}
 };
 
-class Attempt {  // a lock that is taken only if it is free
+class Attempt {  // tries to lock without waiting
  public:
   explicit Attempt(Mutex&) {}
   bool has_succeeded() const { return true; }

@@ -43,7 +43,7 @@ float Machine::launch(const char* kernel, const std::vector<Argument>& arguments
     if (each.kind == Argument::kWhole) pack(&packed_, each.whole);
     if (each.kind == Argument::kReal) pack(&packed_, each.real);
     if (each.kind == Argument::kArray) {
-      // A struct with the alignment of a pointer.
+      // An array is a struct, which has the alignment of a pointer.
       packed_.resize((packed_.size() + sizeof(void*) - 1) / sizeof(void*) * sizeof(void*));
       pack(&packed_, each.rows);
       if (each.width > 0) pack(&packed_, each.width);

@@ -1,4 +1,4 @@
-// The memory of one world, and calls of its kernels.
+// Owns the memory of one world and calls its kernels.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct Argument {
   int32_t whole;
   float real;
   const void* data;
-  int32_t rows, width;  // a width of 0 means that there is only one dimension
+  int32_t rows, width;  // with a width of 0, the array has only one dimension
 };
 
 class Machine {
@@ -52,7 +52,7 @@ class Machine {
   static Argument array(const Buffer& buffer, uint32_t rows, uint32_t width = 0) {
     return array(buffer.data(), rows, width);
   }
-  // Returns: the kernel's return value, if it has one.
+  // Runs a kernel. Returns: the kernel's return value, if the kernel has one.
   float launch(const char* kernel, const std::vector<Argument>& arguments);
 
   Threads threads;

@@ -12,7 +12,7 @@ Vector rest_place(const Asset& asset, int32_t vertex) {
   return {at[0], at[1], at[2]};
 }
 
-// Vertex of a list that is nearest to a rest position. If several are equally near, the first one.
+// Vertex in `among` that is nearest to a rest position. Among equally near vertices, the first in the list.
 int32_t nearest_vertex(const Asset& asset, const std::vector<int32_t>& among, const Vector& place) {
   double least = std::numeric_limits<double>::infinity();
   int32_t found = among[0];

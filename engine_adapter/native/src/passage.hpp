@@ -1,4 +1,4 @@
-// Motion of a body whose level of detail changes, and nearest vertices between its levels.
+// Motion of a body whose level of detail changes, and searches for nearest vertices of another level.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace taichi_soft {
 
-// Numbers of the rows of `read_motion` in taichi_soft/fracture/kernels/topology.py.
+// Motion of all vertices, in the layout of `read_motion` in taichi_soft/fracture/kernels/topology.py.
 struct Motion {
   enum Column : size_t { kPosition = 0, kInvMass = 12, kTarget = 17, kReaction = 23, kWidth = 26 };
 
@@ -20,11 +20,12 @@ struct Motion {
   std::vector<double> numbers;
 };
 
-// Vertices of the target that are nearest at rest to given vertices of the source, unique and ascending.
+// For each vertex in `vertices` of the source, finds the vertex of the target that is nearest at rest. Returns: unique
+// vertices in ascending order.
 std::vector<int32_t> nearest_vertices(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
-// Nearest vertex of the target for each given vertex, in order.
+// Like `nearest_vertices`, but returns one vertex of the target for each vertex in `vertices`, in the same order.
 std::vector<int32_t> nearest_of_each(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
-// Nearest vertex of the source at rest for each given vertex of the target.
+// For each vertex in `vertices` of the target, finds the vertex in `among` of the source that is nearest at rest.
 std::vector<int32_t> nearest_sources(const Asset& source, const std::vector<int32_t>& among, const Asset& target,
                                      const std::vector<int32_t>& vertices);
 

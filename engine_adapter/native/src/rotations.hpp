@@ -60,7 +60,7 @@ inline Quaternion multiplied(const Quaternion& second, const Quaternion& first) 
           w * u - (a * d + b * e + c * f)};
 }
 
-// Cosine and sine of an angle [rad], with the same bits as in Python. C libraries differ in the last bits.
+// Cosine and sine of an angle [rad], bit-identical to Python. Different C libraries would return different last bits.
 inline std::pair<double, double> cos_sin(double angle) {
   constexpr double whole = 6.283185307179586;
   const double part = (angle - whole * std::floor(angle / whole + 0.5)) / 8.0, square = part * part;
@@ -78,7 +78,7 @@ inline std::pair<double, double> cos_sin(double angle) {
   return {1.0 - versine, sine};
 }
 
-// Angle [rad] from its sine and its cosine. The cosine must be 0 or more.
+// Angle [rad] with a sine and a cosine. The cosine must be 0 or more.
 inline double angle_of(double sine, double cosine) {
   double tangent = sine / (1.0 + cosine);
   tangent = tangent / (1.0 + std::sqrt(1.0 + tangent * tangent));

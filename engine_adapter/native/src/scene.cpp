@@ -15,7 +15,7 @@ namespace {
   fail(TS_ERROR_FILE, "the world file is invalid: %s. Export it again", what);
 }
 
-// True if all numbers are within the limit of positions.
+// True if all numbers are below the limit for positions.
 bool are_places(const Archive::View<double>& numbers) {
   for (double number : numbers) {
     if (!(std::fabs(number) <= 1e30)) return false;
@@ -50,7 +50,7 @@ bool is_surface_valid(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
     const size_t limit = i < blocks * kStride ? k : body_vertices;
     if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= limit) return false;
   }
-  size_t before = head + blocks + 2;  // after the number of blocks with small rings, whose value is harmless
+  size_t before = head + blocks + 2;  // after the number of blocks with small rings, which needs no check
   for (size_t block = 0; block <= blocks; ++block) {
     const int32_t begin = mesh.ints[head + block];
     if (begin < 0 || size_t(begin) < before || size_t(begin) > mesh.ints.count) return false;
@@ -146,7 +146,7 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   read_fields();
   read_assets();
   read_meshes();
-  // Snapshots remain valid if the same scene is exported again.
+  // `code` does not change if the same scene is exported again, so that snapshots remain valid.
   for (const char* name : {"fields/kept", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
@@ -165,7 +165,7 @@ void Scene::read_fields() {
   const size_t image = archive.get<unsigned char>("fields/image").count;
   if (rows.count != 5 * field_names_.size()) invalid_file("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
-  std::map<size_t, const Bound*> bounds;  // by the address of their field
+  std::map<size_t, const Bound*> bounds;  // bounds by the address of their field
   for (const Bound& each : kBounds) {
     const auto name = std::find(field_names_.begin(), field_names_.end(), each.field);
     if (name != field_names_.end()) bounds[places_[size_t(name - field_names_.begin())].offset] = &each;
@@ -229,7 +229,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
   return asset;
 }
 
-// Rows of one level. The first world of the scene checks that they fit the slots.
+// Reads the rows of one level. The first world of the scene checks that the rows fit the slots.
 SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, size_t most) const {
   constexpr size_t kCornerRows = 4 * kLanes, kEdgeRows = 6 * kLanes;
   const std::string slot = prefix + "slot/", touching = prefix + "touching/";
@@ -267,7 +267,7 @@ SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, si
   rows.touching_triangles = archive.rows<int32_t>(touching + "triangles", 3);
   rows.carriers = archive.rows<int32_t>(touching + "carriers", 4);
   rows.weights = archive.rows<float>(touching + "weights", 4);
-  // The points of a hull follow all particles of the slot's capacity.
+  // The points of a hull come after the slot's capacity of particles.
   const size_t room = most + asset.hull.count / 4;
   if (rows.carriers.count != rows.weights.count || rows.carriers.count != asset.hull.count ||
       !are_below(rows.carriers, n) || !are_below(rows.touching_outer, room) ||

@@ -1,4 +1,4 @@
-// A world file in memory: the data that all worlds of a scene use.
+// A world file in memory: data that all worlds of a scene share.
 #pragma once
 
 #include <map>
@@ -24,9 +24,9 @@ struct Bound;
 struct KeptField {  // a field in snapshots, and the number of its elements there
   enum { kAlways, kOfJoints, kOfMotors };
   Place place;
-  size_t count;  // per row of joints or motors, for their fields
+  size_t count;  // total; for kOfJoints per row of joints, for kOfMotors per particle of motors
   int whose;
-  const Bound* bound;  // bounds of its numbers, or null
+  const Bound* bound;  // bounds of the field's numbers, or null
 };
 
 struct SlotRows {  // data that kernels write into a slot, see `body_rows` in taichi_soft/fracture/cutting.py
@@ -36,7 +36,7 @@ struct SlotRows {  // data that kernels write into a slot, see `body_rows` in ta
   std::vector<Archive::View<float>> constants;                          // constants of tetrahedra, by field
 };
 
-// Map from the vertices of one level of detail to those of another, see taichi_soft/levels/passage.py.
+// Map from the vertices of one level of detail to the vertices of another, see taichi_soft/levels/passage.py.
 struct Passage {
   Archive::View<int32_t> sources, begins;
   Archive::View<double> weights;
@@ -52,7 +52,7 @@ struct Asset {
   Archive::View<double> element_stiffness;
   size_t element_width;
   Archive::View<int32_t> tets;
-  Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if bodies touch by their surface
+  Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if contact uses the surface
   Archive::View<double> hull_weights;
   double thickness, friction, wave_speed;
   int32_t slot_count;
@@ -87,7 +87,7 @@ class Scene {
   Scene(std::vector<char> world, const ts_linked_kernel* kernels);
 
   const std::vector<std::string>& names(int32_t kind) const;  // names of objects of a kind such as TS_BODY
-  // Fails if the field is missing, or has fewer or narrower elements.
+  // Fails if the field is missing, has fewer than `count` elements, or fewer than `width` numbers per element.
   Place place(const std::string& field, size_t count = 0, size_t width = 1) const;
 
   Kernels::Kernel kernel(const std::string& name) const;
@@ -101,7 +101,7 @@ class Scene {
   double floor;
   int32_t floor_collider;  // collider of the floor, or -1
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
-  double pull_in_weights, highest_pull_speed;  // the first in N/kg
+  double pull_in_weights, highest_pull_speed;  // for grabs: default force per mass [N/kg], highest speed [m/s]
   Archive::View<double> patch_limits;          // limits that the kernel shape_patch receives
   size_t patch_rows;
   std::vector<Asset> assets;
@@ -110,7 +110,7 @@ class Scene {
   std::vector<std::string> constant_names;     // names of fields with constants of tetrahedra
   std::vector<Mesh> meshes;
   std::vector<KeptField> kept;
-  uint32_t code = 0;  // number that is equal for compatible snapshots
+  uint32_t code = 0;  // equal for scenes whose snapshots are compatible
 
  private:
   Scene(std::vector<char> world, const std::string& name);

@@ -63,7 +63,8 @@ void Threads::run_on_workers(int32_t count, void* closure, Task task) {
   ends_.wait(lock, [this] { return busy_ == 0; });
 }
 
-// Returns fewer helpers if the system provides no more threads, because no exception can pass through a kernel.
+// Returns the number of helpers. If the system cannot create a thread, this number is smaller; there is no exception,
+// because exceptions cannot pass through a kernel.
 int32_t Threads::helpers_for(int32_t count) noexcept {
   const int32_t wanted = std::min(count, most_) - 1;
   try {

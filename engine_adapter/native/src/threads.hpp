@@ -23,11 +23,12 @@ class Threads {
   Threads(const Threads&) = delete;
   Threads& operator=(const Threads&) = delete;
 
-  int32_t most() const { return most_; }  // largest number of threads, with the calling one
+  int32_t most() const { return most_; }  // largest number of threads, including the calling thread
   void set_most(int32_t count) { most_ = count; }
   void use_host(ts_run_jobs function, void* user) { host_ = function, user_ = user; }
 
-  // Runs tasks 0 to count - 1, started in this order. Returns after all have ended. Threads are created on demand.
+  // Runs tasks 0 to count - 1, which are started in this order. Returns after all tasks have ended. Creates threads on
+  // demand.
   void run(int32_t count, void* closure, Task task);
 
  private:
@@ -44,7 +45,7 @@ class Threads {
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
   uint64_t round_ = 0;   // current or last round
-  int32_t helpers_ = 0;  // number of workers in this round, the first ones
+  int32_t helpers_ = 0;  // number of workers in this round: the first workers in `workers_`
   int32_t busy_ = 0;     // number of workers that have not finished the round
   bool is_over_ = false;
   void* closure_ = nullptr;

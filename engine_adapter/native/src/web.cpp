@@ -1,4 +1,4 @@
-// Replaces files.cpp in builds for the web, and adds functions for JavaScript to those of taichi_soft.h.
+// Replaces files.cpp in builds for the web, and adds functions for JavaScript that taichi_soft.h does not declare.
 #include "kernels.hpp"
 #include "scene.hpp"
 

@@ -38,7 +38,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   }
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
-  frame_alive_.assign(frames, 0);  // one unused row if there are no frames
+  frame_alive_.assign(frames, 0);  // without frames, there is one unused row
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
   feels_.assign(feels.begin(), feels.end());
   colliders_ = Colliders(archive);
@@ -56,7 +56,7 @@ void World::bind() {
   collider_room_ = scene_->place("colliders.kind", colliders_.rows.size()).count;
   fields_ = Fields(machine_->root(), *scene_, collider_room_);
   if (scene_->patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is invalid: grabs. Export it again");
-  // The kernel that reads contacts does not check how many rows there are.
+  // The kernel that reads contacts does not check the number of rows.
   if (events_.touch_rows < size_t(scene_->slot_count) * (collider_room_ + (scene_->has_soft_contact ? kPairRows : 0))) {
     fail(TS_ERROR_FILE, "the world file is invalid: events. Export it again");
   }

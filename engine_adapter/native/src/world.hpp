@@ -1,4 +1,4 @@
-// A running instance of a scene: its steps, and the calls of the game between them.
+// A running instance of a scene: steps, and the game's calls between steps.
 #pragma once
 
 #include <map>
@@ -44,15 +44,15 @@ struct Surroundings {
 
 struct Drive {  // settings of a motor
   bool turns, is_fixed, has_point;
-  Vector axis, point;  // the point is 0 if none is given
+  Vector axis, point;  // `point` is 0 unless `has_point`
   double speed, limit;
 };
 
 // The part of a body on which a grab acts.
 struct Patch {
   std::vector<int32_t> vertices;
-  std::vector<double> shares;  // weights of a pull, with the sum 1
-  double strength;             // [N], largest force on the patch alone
+  std::vector<double> shares;  // fraction of the grab's force on each vertex, with sum 1
+  double strength;             // largest force that the patch allows [N]
 };
 struct SnapshotHead;
 
@@ -63,7 +63,7 @@ class World {
   World& operator=(const World&) = delete;
 
   const Scene& scene() const { return *scene_; }
-  Mutex turn;            // held by the thread in a call
+  Mutex turn;            // locked during a call
   ThreadId advancing{};  // thread that makes the steps of a frame, and unlocks `turn` between steps
 
   // Steps.
@@ -73,7 +73,7 @@ class World {
   void set_job_system(ts_run_jobs function, void* user) { machine_->threads.use_host(function, user); }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
-  int32_t steps_due(double seconds);  // adds the time of a frame
+  int32_t steps_due(double seconds);  // adds the time of a frame, and returns the number of due steps
   void step_in_time();
   void end_frame();  // drops the time of steps that were due but not made
   ts_before_step before_step() const { return before_step_; }
@@ -85,7 +85,7 @@ class World {
   ts_body body_in(int32_t slot) const;
   int32_t slot_of(ts_body body) const;  // fails for a removed body
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
-  // The level of detail of the body in a slot.
+  // Asset at the current level of detail of the body in a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
   int32_t status_of(int32_t slot) const { return fields_.body_status(slot); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
@@ -147,7 +147,8 @@ class World {
 
   Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
   Hit closest(const Vector& point, double farthest);
-  // Slots of bodies that touch a box with edges of `size`, or a sphere whose radius is every number of `size`.
+  // Slots of bodies that touch a box with edges of `size`, or a sphere. For a sphere, all numbers of `size` are the
+  // radius.
   std::vector<int32_t> overlaps(bool is_box, const Pose& pose, const Vector& size);
 
   // Colliders.
@@ -176,7 +177,7 @@ class World {
   void restore(const char* bytes, size_t size);
 
  private:
-  struct Holder {  // a point of a body, as weights of four vertices
+  struct Holder {  // a point of a body, given by weights of four vertices
     int32_t vertices[4];
     double weights[4];
   };
@@ -193,7 +194,7 @@ class World {
   };
   class Packed;
 
-  struct Levels {  // levels of detail by slot, and vertices of pins at the finest level
+  struct Levels {  // for each slot, the level of detail, and the vertices of the finest level that pins represent
     std::vector<int32_t> levels;
     std::vector<std::vector<int32_t>> held;
     size_t held_count() const;
@@ -285,27 +286,27 @@ class World {
   std::vector<ColliderMotion> motion_;
   Events events_;
   Surroundings surroundings_;
-  std::vector<double> friction_;         // of each body, against other bodies
-  std::vector<float> present_, coming_;  // poses of frames after the last and the next step: rotation by rows
-                                         // and position, (f, 12)
+  std::vector<double> friction_;         // friction of each body in contact with other bodies
+  std::vector<float> present_, coming_;  // poses of frames after the last and the next step, (f, 12): rotation by
+                                         // rows, then position
   std::vector<unsigned char> frame_alive_;
-  std::vector<int32_t> levels_;             // level of detail in each slot, even in empty ones
-  std::vector<std::vector<int32_t>> held_;  // vertices of the finest level for pins at a coarser one
-  std::vector<int32_t> attachments_;        // by particle: attachment that holds it, or 0
-  std::vector<unsigned char> feels_;        // by particle: 1 if its frame reports the load
+  std::vector<int32_t> levels_;             // level of detail in each slot, even in empty slots
+  std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser level represent
+  std::vector<int32_t> attachments_;        // attachment of each particle, or 0
+  std::vector<unsigned char> feels_;        // 1 for each particle whose load on a frame is reported
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
   int32_t steps_left_ = 0;  // steps that remain in the current frame
-  double picture_ = 1.0;    // interpolation factor from the previous step to the last one
+  double picture_ = 1.0;    // interpolation factor between before (0) and after (1) the last step
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;
-  bool has_work_ = true;   // a pinned particle has a target, or has just reached one
-  bool is_still_ = false;  // all bodies slept after the last step, and nothing has changed since
-  double rows_at_ = -1.0;  // alpha of the cached positions; negative if they are outdated
+  bool has_work_ = true;   // true if a pinned particle has a target or has just reached its target
+  bool is_still_ = false;  // true if all bodies slept after the last step and nothing has changed since then
+  double rows_at_ = -1.0;  // alpha of the cached positions; negative if the cache is outdated
 
   Fields fields_;
   size_t collider_room_ = 0;

@@ -27,7 +27,7 @@ int32_t World::slot_of(ts_body body) const {
   return static_cast<int32_t>(slot);
 }
 
-// Contact points of a body whose vertices are at `x`.
+// Positions of a body's contact points if its vertices are at `x`.
 std::vector<Vector> World::touching_points(const Asset& asset, const std::vector<Vector>& x) const {
   std::vector<Vector> found;
   if (asset.hull.count == 0) {
@@ -132,7 +132,7 @@ void World::despawn(int32_t slot) {
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
-  fields_.body_drives(slot) &= ~kMovesPins;  // otherwise attached vertices would still move to their targets
+  fields_.body_drives(slot) &= ~kMovesPins;  // attached vertices no longer move to earlier targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 

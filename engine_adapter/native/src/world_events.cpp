@@ -1,4 +1,4 @@
-// Events: reads contacts and sleep from the fields.
+// Reads contacts and the status of bodies from the fields, for events.
 
 #include <algorithm>
 
@@ -14,7 +14,7 @@ Present World::present() const {
   return found;
 }
 
-// Reads and clears the contacts of the last step, and reads which bodies are asleep.
+// Reads and clears the contacts of the last step, and reads the status of all bodies. Returns: impulses by pair.
 std::map<Pair, std::array<float, 3>> World::look() {
   const uint32_t numbers = uint32_t(events_.status.size()), rows = uint32_t(events_.touch_rows);
   int32_t* status = machine_->numbers.room<int32_t>(numbers);

@@ -56,7 +56,7 @@ Pose World::frame_pose(int32_t number) const {
   return {{row[9], row[10], row[11]}, quaternion_of(turn)};
 }
 
-// Vertices that are attached to a frame; for -1, to any frame.
+// Vertices that are attached to the frame `number`. A number of -1 means any frame.
 std::vector<int32_t> World::attached_vertices(int32_t slot, int32_t number) const {
   std::vector<int32_t> found;
   for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {

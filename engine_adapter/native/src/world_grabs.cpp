@@ -83,7 +83,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   return grab_at(int32_t(g));
 }
 
-// Patch around a point at rest, which is given by weights of `count` vertices, three or four.
+// Patch around a point of the rest shape. The point is given by weights of `count` corners, three or four.
 Patch World::patch_around(const Asset& asset, const int32_t* corners, const double* weights, uint32_t count) {
   const uint32_t n = uint32_t(asset.vertex_count()), elements = uint32_t(asset.element_stiffness.count);
   const double* rows = machine_->rows.room<double>(2 * n);

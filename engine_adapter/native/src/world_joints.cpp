@@ -20,8 +20,8 @@ Vector World::vertex_place(int32_t slot, int32_t vertex) const {
   return {fields_.particle_position(p, 0), fields_.particle_position(p, 1), fields_.particle_position(p, 2)};
 }
 
-// Weights of points in tetrahedra of `count` vertices at `x`. Each point uses the tetrahedron that contains it, or the
-// one that it is least outside of.
+// Weights of points in tetrahedra whose `count` vertices are at `x`. Each point uses the tetrahedron in which its
+// smallest weight is largest. Such a tetrahedron contains the point, if any does.
 std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, const double* x, size_t count,
                                            const Archive::View<int32_t>& tets) {
   const uint32_t k = uint32_t(points.size());
@@ -38,7 +38,7 @@ std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, co
   return holders;
 }
 
-// Weights of vertices of `slot` in the tetrahedra of `other`, for the current shapes.
+// Weights of vertices of the body in `slot`, relative to the tetrahedra of the body in `other`, for the current shapes.
 std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
@@ -59,7 +59,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
     }
     double sum = 0.0;
     for (double& each : weights) {
-      if (std::fabs(each) < kLeastWeight) each = 0.0;  // rounding errors must not involve other vertices
+      if (std::fabs(each) < kLeastWeight) each = 0.0;  // a rounding error must not become a weight
       sum += each;
     }
     for (double& each : weights) each = each / sum;
@@ -67,7 +67,7 @@ std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int
   return holders;
 }
 
-// Weights of vertices of `other`, each in the first tetrahedron that contains it, if any.
+// Weights of vertices of the body in `other`, in the first tetrahedron of which each is a corner, if any.
 std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<int32_t>& partners) const {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   std::vector<Holder> holders;
@@ -85,7 +85,7 @@ std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<in
   return holders;
 }
 
-// Largest speed with which held vertices can follow [m/s].
+// Largest speed at which held vertices can follow their holder [m/s].
 double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
   const Asset& asset = asset_of(slot);
   std::sort(held.begin(), held.end());

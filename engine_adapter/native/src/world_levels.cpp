@@ -16,7 +16,7 @@ Argument array_of(const Archive::View<Number>& view, size_t width = 0) {
 
 }  // namespace
 
-// Reads levels from the world file, and checks that they fit the slots.
+// Reads the levels of all bodies from the world file, and checks that they fit the slots.
 void World::read_levels() {
   const Archive& archive = scene_->archive;
   const size_t slots = size_t(scene_->slot_count);
@@ -76,13 +76,13 @@ void World::read_levels() {
   }
 }
 
-// True if all numbers are valid vertices of the finest level of the body in a slot.
+// True if all `vertices` are valid vertices of the finest level of the body in a slot.
 bool World::are_held(int32_t slot, const std::vector<int32_t>& vertices) const {
   const size_t n = whole_of(slot).vertex_count();
   return std::all_of(vertices.begin(), vertices.end(), [n](int32_t v) { return v >= 0 && size_t(v) < n; });
 }
 
-// Writes a level of a body's asset into the body's slot, with the current motion.
+// Writes a level of an asset into the slot of a body, with a motion and a status.
 void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status) {
   const Asset& asset = whole_of(slot).level(size_t(level));
   const SlotRows& rows = asset.rows;
@@ -115,7 +115,7 @@ void World::write_kind(int32_t slot) {
   machine_->launch("write_kind", {Machine::whole(slot), array_of(asset_of(slot).rows.kind)});
 }
 
-// Writes a complete body of a level, at rest, into a slot that is used again.
+// Writes a level of the slot's asset into a slot that is reused. The body is at rest and absent.
 void World::refill(int32_t slot, int32_t level) {
   write_slot(slot, level, Motion(whole_of(slot).level(size_t(level)).vertex_count()), kAbsent);
 }
@@ -154,7 +154,7 @@ std::vector<int32_t> World::pinned(int32_t slot) const {
   return found;
 }
 
-// Vertices of a level that are nearest to given vertices of the finest level.
+// Vertices of a level that are nearest to the vertices in `finest` of the finest level.
 std::vector<int32_t> World::nearest_at(int32_t slot, std::vector<int32_t> finest, int32_t level) const {
   const Asset& asset = whole_of(slot);
   if (level != 0) return nearest_vertices(asset, finest, asset.level(size_t(level)));
@@ -172,7 +172,7 @@ std::vector<int32_t> World::finest_held(int32_t slot) const {
   return nearest_of_each(asset_of(slot), present, whole_of(slot));
 }
 
-// Vertices of each attachment at another level. `held` are the held vertices.
+// Attachments of a body with their vertices at another level, by number. `held` lists the held vertices of that level.
 std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, const std::vector<int32_t>& held,
                                                               int32_t level) const {
   std::map<int32_t, Hanging> found;
@@ -194,7 +194,8 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
   return found;
 }
 
-// Releases constraints that have no vertex at another level, and finds the held vertices there.
+// Prepares a change to another level: releases joints, motors, and attachments without a vertex at that level, and
+// finds the held vertices of that level.
 void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                       std::map<int32_t, Hanging>* attached) {
   for (size_t j = 0; j < kMostJoints; ++j) {
@@ -203,7 +204,7 @@ void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector
   for (size_t m = 0; m < kMostMotors; ++m) {
     if (fields_.motors.motor.body(m) == slot + 1) end_motor(m);
   }
-  for (bool is_done = false; !is_done;) {  // a release removes held vertices, so other constraints may lose theirs
+  for (bool is_done = false; !is_done;) {  // detaching removes held vertices, on which other attachments may depend
     std::vector<int32_t> finest = finest_held(slot);
     *held = nearest_at(slot, finest, level);
     *attached = attachments_at_level(slot, *held, level);
@@ -225,7 +226,8 @@ void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector
   }
 }
 
-// Writes the attached vertices, and distributes the last step's load over the vertices of each attachment.
+// Writes the attached vertices to `after`, and distributes the load of the last step over the vertices of each
+// attachment.
 void World::attach_at_level(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const {
   for (const auto& each : attached) {
     const Hanging& held = each.second;
@@ -276,7 +278,7 @@ void World::hold_at(size_t g, const Vector& place) {
   write_patch(g, slot, patch);
 }
 
-// Motion of another level, in which the vertices `held` are pinned.
+// Converts a motion to another level. The vertices in `held` are pinned.
 Motion World::mapped(const Motion& before, const Asset& source, const Asset& target, const Passage& over,
                      const std::vector<int32_t>& held) {
   Motion after(target.vertex_count());

@@ -24,7 +24,7 @@ void require_motor_limit(double limit) {
   }
 }
 
-// Axis in the rest state, computed from the current rotation of the particles.
+// Direction of the current axis in the rest shape, computed from the current rotation of the vertices.
 Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) {
   const Asset& asset = asset_of(slot);
   std::vector<Vector> rest, now;
@@ -68,7 +68,7 @@ std::vector<World::MotorRow> World::motors() const {
   return found;
 }
 
-// Replaces all motors by the given ones, in the order of their indices.
+// Replaces all motors by `rows`, which are in the order of their indices.
 void World::write_motors(const std::vector<MotorRow>& rows) {
   for (size_t m = 0; m < kMostMotors; ++m) fields_.motors.motor.body(m) = 0;
   size_t at = 0;

@@ -6,7 +6,7 @@
 
 namespace taichi_soft {
 
-// Writes the slots of all bodies into a buffer. Returns: their number.
+// Writes the slots of all bodies into a buffer. Returns: number of bodies.
 uint32_t World::write_active_slots() {
   int32_t* slots = machine_->rows.room<int32_t>(size_t(scene_->slot_count));
   uint32_t count = 0;
@@ -24,7 +24,7 @@ Hit World::hit_from(const float* row) const {
   found.distance = row[0];
   const Archive::View<int32_t>& surface = asset_of(found.slot).surface;
   for (int k = 0; k < 3; ++k) {
-    // For a body without triangles, the vertices are tested.
+    // In a body without triangles, single vertices are hit.
     found.vertices[k] = surface.count == 0 ? found.triangle : surface[size_t(3 * found.triangle + k)];
     found.weights[k] = row[1 + k];
     found.point[k] = row[4 + k];
@@ -36,7 +36,7 @@ Hit World::hit_from(const float* row) const {
 
 namespace {
 
-// Next larger number. Kernels accept only distances below the limit, but the limit itself must count.
+// Next larger float. Kernels accept only distances below a limit, but a distance equal to `limit` must also count.
 float next_above(double limit) {
   return std::nextafter(as_float(std::min(limit, 3e38)), std::numeric_limits<float>::infinity());
 }
@@ -83,7 +83,7 @@ std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector
   const uint32_t particles = uint32_t(scene_->particle_count);
   float* shape = machine_->numbers.room<float>(15);
   int32_t* first = machine_->found.room<int32_t>(slots);
-  machine_->vertices.room<int32_t>(particles);  // required output: vertices inside the shape, not used here
+  machine_->vertices.room<int32_t>(particles);  // output of the kernel that is not used here: vertices inside the shape
   const Matrix turn = matrix_of(pose.rotation);
   for (int k = 0; k < 3; ++k) {
     shape[k] = as_float(pose.position[k]);

@@ -19,7 +19,7 @@ uint32_t bits_of(float number) {
 }  // namespace
 
 uint64_t World::hash() const {
-  // The same bits as `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
+  // Bit-identical to `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
   uint64_t code = 1469598103934665603u;
   const auto mix = [&code](uint64_t word) {
     code = (code ^ word) * 1099511628211u;
@@ -98,12 +98,12 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<KeptField>& ke
   return 4 * words;
 }
 
-// Size of the levels, the numbers of held vertices, and these vertices [bytes].
+// Size of the levels, the counts of held vertices, and the held vertices [bytes].
 size_t size_of_levels(const SnapshotHead& head, size_t slots) {
   return sizeof(int32_t) * (2 * slots + size_t(head.held));
 }
 
-// Size of everything that follows the fields [bytes].
+// Size of the parts after the fields [bytes].
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
          sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
@@ -113,7 +113,7 @@ size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
 
 }  // namespace
 
-// Levels in a snapshot, which contains those of existing bodies.
+// Levels for a snapshot, which contains only the levels of existing bodies.
 World::Levels World::present_levels() const {
   Levels found;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
@@ -202,7 +202,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, memory.sleepers);
   put_all(&at, memory.contacts);
   std::memcpy(bytes, &head, sizeof head);
-  head.sum = checksum(bytes, head.size);  // computed with a sum of 0
+  head.sum = checksum(bytes, head.size);  // checksum of the bytes with `sum` equal to 0
   std::memcpy(bytes, &head, sizeof head);
 }
 
@@ -217,7 +217,7 @@ bool World::is_valid(const Contact& contact, size_t colliders) const {
          is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
 }
 
-// Fields of a snapshot, addressed by their offsets in a world.
+// Fields in a snapshot, found by their offsets in a world's memory.
 class World::Packed {
  public:
   Packed(const World& world, const char* at, const SnapshotHead& head, const std::vector<int32_t>& levels)
@@ -254,7 +254,7 @@ bool World::lies_in(int32_t particle, int32_t slot, int32_t level) const {
   return p >= begin && p < begin + whole_of(slot).level(size_t(level)).vertex_count();
 }
 
-// Indices of bodies and particles have already been checked.
+// True if the joints are consistent. The caller has already checked the indices of bodies and particles.
 bool World::are_joints_valid(const Packed& packed, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   const Place bodies = s.place("joints.bodies"), rows = s.place("joints.rows");
@@ -344,7 +344,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     if (flags[0] > 1 || flags[1] > 1) return false;
     Collider row;
     take(&at, &row, 1);
-    // Shapes with a grid must be shapes of the export.
+    // Only exported colliders have the grid that height fields and meshes need.
     const bool is_known =
         row.kind >= 0 && (row.kind <= TS_CAPSULE || (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
@@ -361,7 +361,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
   return true;
 }
 
-// The same check for the snapshot in the world file.
+// Checks the initial state in the world file, as `restore` checks a snapshot.
 void World::require_image() const {
   std::vector<char> bytes(snapshot_size());
   snapshot(bytes.data());

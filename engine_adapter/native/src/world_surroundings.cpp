@@ -45,7 +45,7 @@ void World::set_friction(double friction) {
 bool World::is_floor(int32_t number) const {
   if (number < 0 || number != scene_->floor_collider || size_t(number) >= colliders_.rows.size()) return false;
   const Collider& row = colliders_.rows[size_t(number)];
-  return row.is_alive && row.serial == kFirstSerial;  // the row may contain another collider
+  return row.is_alive && row.serial == kFirstSerial;  // a later collider may occupy the row
 }
 
 void World::set_collider_friction(int32_t number, double friction) {

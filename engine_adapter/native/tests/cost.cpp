@@ -1,4 +1,4 @@
-// Measures the time of a step without its kernel: cost FOLDER [ROUNDS [STEPS]]
+// Measures the time of a step outside its kernel: cost FOLDER [ROUNDS [STEPS]]
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -28,7 +28,7 @@ void run_timed(void* context) {
   kernel_took = microseconds_since(start);
 }
 
-// The same scene with linked kernels, in which the kernel of the step is timed.
+// Loads a scene again with linked kernels, of which the kernel of a step is timed.
 std::shared_ptr<Scene> with_timed_step(const Scene& scene, const std::string& folder) {
   std::ifstream file(folder + "/world.tsw", std::ios::binary);
   std::vector<char> world((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());

@@ -1,7 +1,7 @@
 /* Calls the library with random valid and invalid arguments: fuzz FOLDER SECONDS SEED.
  *
- * It exits with 0 if every call returned TS_OK or an error with a text, and no refused call changed the world's
- * state.
+ * The exit code is 0 if every call returned TS_OK or an error with a text, and no refused call changed the state of the
+ * world.
  */
 #include <inttypes.h>
 #include <math.h>
@@ -28,7 +28,7 @@ static uint32_t below(uint32_t limit) { return (uint32_t)((next() >> 33) % limit
 
 static int one_in(uint32_t count) { return below(count) == 0; }
 
-static int is_tame; /* true for calls with likely valid arguments, which would be rare otherwise */
+static int is_tame; /* true for calls whose arguments are likely valid; random arguments rarely are */
 
 static int bad(uint32_t count) { return !is_tame && one_in(count); }
 
@@ -73,7 +73,7 @@ static ts_body any_body(ts_world world) {
   return found;
 }
 
-static ts_grab any_grab(ts_world world) { /* a current grab, an earlier one, or one of another world */
+static ts_grab any_grab(ts_world world) { /* a current grab, an earlier grab, or a grab of another world */
   static ts_grab known[16];
   ts_grab found = 0;
   if (bad(15)) return next();
@@ -123,7 +123,7 @@ static ts_pull* pull(void) {
   return bad(20) ? NULL : &found;
 }
 
-/* Drained events must have valid contents and no longer wait. */
+/* Drain events, and check that they have valid contents and no longer wait. */
 static ts_result drain(ts_world world) {
   static ts_event events[100];
   const int has_room = !bad(10);
@@ -182,7 +182,7 @@ static ts_result take_hold(ts_world world, ts_body body) {
   return result;
 }
 
-/* Body for reading loads: usually one that is attached. */
+/* Body whose load is read. The body is usually attached to `its_frame`. */
 static ts_body hanging;
 static int32_t its_frame;
 
@@ -422,7 +422,7 @@ static void look(ts_world world, uint64_t found[64]) {
   }
 }
 
-/* A valid snapshot must restore; a damaged one must be refused. */
+/* Check that a valid snapshot can be restored and that a damaged snapshot is refused. */
 static void try_snapshots(ts_world world) {
   size_t size = 0;
   uint64_t before = 0, after = 0, there[64], again[64];

@@ -1,7 +1,7 @@
 /* Plays a recorded game on a world file: play FOLDER < GAME.
  *
- * A game is a list of calls, one per line, written by tests/native/games.py. Each step prints the hash of the state,
- * and each read a hash of the result. The players in other languages print the same.
+ * A game is a list of calls, one per line, written by tests/native/games.py. The program prints the hash of the state
+ * after each step, and a hash of each result that is read. The players in other languages print the same hashes.
  */
 #include <inttypes.h>
 #include <stdio.h>

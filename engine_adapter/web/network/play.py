@@ -37,11 +37,11 @@ class Network:
 
     def __init__(self, seed: int) -> None:
         self._rng, self._newest = random.Random(seed), [0, 0]
-        self._way: list[tuple[float, int, int, bytes]] = []  # by time of arrival
+        self._way: list[tuple[float, int, int, bytes]] = []  # messages in transit, the next to arrive first
         self.counts: Counter[str] = Counter()
 
     def send(self, now: float, to: int, data: bytes) -> None:
-        """Send a message to player `to` at a time [s]."""
+        """Send a message to player `to` at time `now` [s]."""
         rng = self._rng
         self.counts["sent"] += 1
         if rng.random() < LOST:
@@ -54,7 +54,7 @@ class Network:
             heapq.heappush(self._way, (due, self.counts["sent"], to, data))
 
     def due(self, now: float) -> Iterator[tuple[int, bytes]]:
-        """Yield the messages that have arrived by a time [s], with the players that receive them."""
+        """Yield the messages that have arrived by time `now` [s], each as (receiving player, bytes)."""
         while self._way and self._way[0][0] <= now:
             _, number, to, data = heapq.heappop(self._way)
             self.counts["overtaken"] += number < self._newest[to]
@@ -76,7 +76,7 @@ class Line:
         self.port = self.socket.getsockname()[1]
 
     def meet(self, process: subprocess.Popen[str], name: str) -> None:
-        """Wait until the player has connected. Raises: ChildProcessError if its process ends before."""
+        """Wait until the player has connected. Raises: ChildProcessError if the process has ended."""
         self.socket.settimeout(0.1)
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:

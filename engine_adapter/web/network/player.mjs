@@ -1,4 +1,4 @@
-// Player of the network sample in Node.js, with a WebAssembly world. See `player.py` for details.
+// Player of the network sample in Node.js, with a WebAssembly world. The program does the same as `player.py`.
 //
 //     node player.mjs FOLDER --port N --ticks N [--fast]
 
@@ -50,7 +50,7 @@ function frame() {
   line.send(session.confirmed >= ticks && session.tick === ticks ? "done" : "frame");
 }
 
-// Run frames with the clock of this machine.
+// Runs frames in real time.
 function run(due = performance.now()) {
   frame();
   const next = due + 1000 * DT;

@@ -15,8 +15,8 @@ FORCE, LIFT = 8.0, 0.02  # force per unit of input [N]; height by which each pla
 
 
 def act(inputs: Inputs) -> None:
-    """Apply the inputs of a tick. The bytes of an input are 100 + x, 100 + y, and 1 to raise the stage
-    or 0.
+    """Apply the inputs of a tick. An input has three bytes: 100 + x, 100 + y, and 1 to raise the stage, else
+    0.
     """
     for body, (x, y, _) in zip(players, inputs, strict=True):
         body.apply_force((FORCE * (x - 100), FORCE * (y - 100), 0.0))
@@ -47,8 +47,8 @@ class Player:
         act(inputs)
 
     def frame(self) -> None:
-        """Make a tick and send a message. If this machine is ahead of the other one, skip a tick from time to
-        time.
+        """Make a tick and send a message. If this machine is ahead of the other machine, sometimes skip a
+        tick.
         """
         session = self.session
         start = time.perf_counter()
@@ -102,7 +102,7 @@ def play(player: Player, is_fast: bool) -> None:
 
 
 def main() -> None:
-    """Play over the local port that the command line gives."""
+    """Play over the local port that is passed on the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
     parser.add_argument("--ticks", type=int, required=True)

@@ -1,1 +1,1 @@
-"""Kernels that a world file needs in place of Python code."""
+"""Kernels that replace Python code in the native library."""

@@ -75,7 +75,7 @@ def copy_state(
     words: ti.types.ndarray(dtype=ti.i32, ndim=1),
     packs: ti.template(),
 ):
-    """Copy all kept fields to `words` in the layout of `table`, or from `words` if `packs` is False."""
+    """Copy all kept fields to `words`, in the layout of `table`. If `packs` is False, copy back."""
     for number, group in ti.static(_groups(state)):
         if ti.static(_is_long(state, group)):
             ti.loop_config(serialize=True)

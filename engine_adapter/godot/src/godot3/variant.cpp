@@ -50,7 +50,7 @@ void read_transform(const Variant& value, float out[12]) {
   std::memcpy(out, &found, sizeof found);
 }
 
-// Reads a pool array of Godot; the functions of the kinds differ only in name.
+// Reads a pool array of Godot. The functions for different kinds of arrays differ only in name.
 #define TAKEN(kind, Number)                                                                    \
   godot_pool_##kind##_array array = api->godot_variant_as_pool_##kind##_array(&value);         \
   auto* read = api->godot_pool_##kind##_array_read(&array);                                    \

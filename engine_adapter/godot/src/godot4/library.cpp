@@ -38,7 +38,7 @@ void call(void* which, GDExtensionClassInstancePtr instance, const GDExtensionCo
   error->error = GDEXTENSION_CALL_OK;  // scripts continue after a refused call and check for null
 }
 
-// For callers that checked types and counts. All values are Variants, the same as above.
+// Method for callers that have already checked types and counts. All values are Variants, as in `call`.
 void call_typed(void* which, GDExtensionClassInstancePtr instance, const GDExtensionConstTypePtr* values,
                 GDExtensionTypePtr result) {
   call_into(result, which, instance, static_cast<const Method*>(which)->argument_count, values);

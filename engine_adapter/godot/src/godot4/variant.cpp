@@ -52,7 +52,7 @@ void find_types() {
   }
 }
 
-// Refuses a Godot with double precision, where Variant and all vectors are larger.
+// Throws Refused in a Godot with double precision, in which Variant and all vectors are larger.
 void require_single_precision() {
   const double parts[] = {1.0, 2.0, 3.0};
   const GDExtensionConstTypePtr arguments[] = {Address(&parts[0]), Address(&parts[1]), Address(&parts[2])};

@@ -10,7 +10,8 @@ struct Variant {
   alignas(8) unsigned char memory[24];
 };
 
-// All functions of Godot's interface that are used, by names in camel case and with underscores. Godot 4.1 has them.
+// All functions of Godot's interface that the library uses, by names in camel case and with underscores. Godot 4.1 and
+// later versions have these functions.
 #define FUNCTIONS_OF_GODOT(X)                                                     \
   X(PrintError, print_error)                                                      \
   X(VariantNewNil, variant_new_nil)                                               \
@@ -51,7 +52,7 @@ void find_functions(GDExtensionInterfaceGetProcAddress get_proc_address);
 struct TypeFunctions {
   GDExtensionVariantFromTypeConstructorFunc to_variant = nullptr;
   GDExtensionTypeFromVariantConstructorFunc from_variant = nullptr;
-  GDExtensionPtrConstructor make = nullptr;  // makes an empty value; or a StringName from a String, or the reverse
+  GDExtensionPtrConstructor make = nullptr;  // makes an empty value, or converts between String and StringName
   GDExtensionPtrDestructor destroy = nullptr;
   GDExtensionPtrBuiltInMethod resize = nullptr, size = nullptr;
 };
@@ -71,7 +72,7 @@ class Address {
   void* value_;
 };
 
-// A value of an opaque Godot type. It must be filled immediately after construction.
+// A value of an opaque Godot type. Fill it immediately after construction.
 template <GDExtensionVariantType type>
 class Held {
  public:

@@ -1,6 +1,6 @@
-// Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in Unity's order: BehaviourChecks FOLDER, a world with
-// axes for Unity. With the second argument `levels`, the world is `levels` of tests/native/scenes.py. This does not test
-// Unity.
+// Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in Unity's order: BehaviourChecks FOLDER [levels]. The
+// folder contains a world with axes for Unity; with `levels`, it is the scene `levels` of tests/native/scenes.py. This
+// program does not test Unity.
 using System;
 using System.IO;
 using System.Reflection;
@@ -11,7 +11,7 @@ namespace TaichiSoft
     internal static class BehaviourChecks
     {
         private const float Step = 1f / 50;
-        private static Action lateUpdates = () => { }, destroy = () => { }; // of the components that draw levels
+        private static Action lateUpdates = () => { }, destroy = () => { }; // calls for the components in CheckLevels
 
         private static void Require(bool isTrue, string text)
         {
@@ -24,7 +24,7 @@ namespace TaichiSoft
             return (Action)Delegate.CreateDelegate(typeof(Action), component, method);
         }
 
-        // As the inspector does.
+        // Sets a serialized field, as Unity's inspector does.
         private static void Set(object component, string name, object value)
         {
             FieldInfo field = component.GetType().GetField(name, BindingFlags.Instance | BindingFlags.NonPublic);
@@ -57,7 +57,7 @@ namespace TaichiSoft
             return 0;
         }
 
-        // Bodies without a skin are drawn with the mesh of their level.
+        // Checks that bodies without a skin are drawn with the mesh of their level of detail.
         private static void CheckLevels(string folder)
         {
             var world = new SoftWorldBehaviour();
@@ -107,7 +107,7 @@ namespace TaichiSoft
             body.Despawn();
             frame();
             foreach (Vector3 vertex in bar.sharedMesh.vertices) Require(Dot(vertex, vertex) == 0, "nobody is drawn");
-            world.World.Spawn(1, new Placement(new Vector3d(4, 3, 3), Quaterniond.Identity)); // free in any axes
+            world.World.Spawn(1, new Placement(new Vector3d(4, 3, 3), Quaterniond.Identity)); // far from other bodies
             frame();
             RequireLevel(world.Scene, bar.sharedMesh, world.World.GetBody(3), 0);
             destroy();
@@ -195,7 +195,7 @@ namespace TaichiSoft
             };
             Action frame = () =>
             {
-                time += 0.002 + 0.03 * times.NextDouble(); // less than a step, or more
+                time += 0.002 + 0.03 * times.NextDouble(); // shorter or longer than a step
                 while ((steps + 1) * (double)Step <= time)
                 {
                     ++steps;
@@ -217,7 +217,7 @@ namespace TaichiSoft
                 }
                 catch (InvalidOperationException)
                 {
-                    ++thrown; // Unity goes on with the next frame, too
+                    ++thrown; // Unity also continues with the next frame
                 }
             }
             Require(thrown == 1, "what a listener throws is lost");
@@ -231,12 +231,12 @@ namespace TaichiSoft
             }
             Console.WriteLine("allocated: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
 
-            // The same steps without components.
+            // Make the same steps without components.
             var scene = new Scene(folder);
             var plain = new World(scene);
             int asset = plain.GetBody(1).GetAsset();
             var expected = new float[3 * drawn.vertices.Length];
-            var events = new SoftEvent[3]; // fewer than some steps have
+            var events = new SoftEvent[3]; // some steps have more events
             var happenedThere = new int[told.Length];
             plain.RecordEvents(EventKinds.All & ~EventKinds.Froze);
             for (int i = 1; i <= steps; ++i)
@@ -268,7 +268,7 @@ namespace TaichiSoft
             Require(apart < 1e-5, "the mesh is elsewhere");
             Require(lowest > -0.05, "y does not point up");
 
-            // In Unity a face is seen from where its vertices go round clockwise, and Cross follows the left hand.
+            // In Unity, the vertices of a visible face are clockwise, and Cross follows the left-hand rule.
             int[] triangles = drawn.triangles;
             for (int i = 0; i < triangles.Length; i += 3)
             {

@@ -1,5 +1,5 @@
-// The few types of Unity that the components and docs/unity.md name, so that a compiler without Unity can read it and a test
-// can run it. Members are those of Unity's reference; what they do here is the least that the test needs.
+// Stubs for the types of Unity that the components and docs/unity.md use, so that the code can be compiled and tested
+// without Unity. The members have the signatures of Unity's reference, and do only what the test needs.
 using System;
 
 namespace UnityEngine
@@ -81,7 +81,7 @@ namespace UnityEngine
         }
     }
 
-    // A name that taichi-soft has as well.
+    // taichi-soft also has a type with this name.
     public struct Pose
     {
         public Vector3 position;
@@ -101,7 +101,7 @@ namespace UnityEngine
     {
         public Transform transform { get; set; }
 
-        // Unity looks among the components of the game object; here is what the test has put.
+        // Unity searches the components of the game object. In this stub, the test sets the component.
         public Component other;
 
         public T GetComponent<T>() where T : Component

@@ -1,14 +1,16 @@
-# Draws a soft body of a SoftWorld. Godot has a node SoftBody already, so this one is called TaichiSoftBody.
+# Draws a soft body of a SoftWorld. The name is TaichiSoftBody, because Godot already has a node SoftBody.
 #
-# Vertices are places in the scene, so this node leaves its parent's transform. Set its look by material_override.
+# Vertices are in world coordinates, so this node ignores its parent's transform. Set `material_override` to change the
+# material.
 class_name TaichiSoftBody
 extends MeshInstance3D
 
-## The SoftWorld; empty for the nearest one above this node.
+## Path of the SoftWorld. If empty, the node uses the nearest SoftWorld among its ancestors.
 @export var world_path := NodePath()
-## As the script of the world called it; empty where `body` is set, to what SoftWorld.spawn returned.
+## Name of the body in the world's script. Leave it empty if you set `body` to a result of SoftWorld.spawn.
 @export var body_name := ""
-## Empty for the first mesh of the body's asset. A body without a skin is drawn by the mesh of its level of detail.
+## Name of the mesh. If empty, the first mesh of the body's asset is drawn. Without a skin, this mesh depends on the
+## level of detail.
 @export var mesh_name := ""
 
 var body := 0:
@@ -17,7 +19,7 @@ var body := 0:
 var _world: SoftWorld = null
 var _drawn := ArrayMesh.new()
 var _mesh := -1
-var _level := -1  # level of detail that the mesh draws; -1 for all of them: a skin
+var _level := -1  # level of detail that the mesh draws; -1 for a skin, which draws all levels
 var _arrays := []
 
 
@@ -36,7 +38,7 @@ func _ready() -> void:
     set_process(_world != null)
 
 
-## Draw another body; 0 for none.
+## Draw another body. With 0, draw no body.
 func set_body(value: int) -> void:
     body = value
     _mesh = -1
@@ -48,15 +50,15 @@ func _process(_delta: float) -> void:
     draw()
 
 
-## Read the body from the world into the mesh; called in each frame.
+## Update the mesh with the body's current shape. The node calls this in each frame.
 func draw() -> void:
     if _mesh < 0 or _world.native == null:
         return
     var read = _read()
-    _drawn.clear_surfaces()  # of a kept mesh, as that keeps the instance's material
+    _drawn.clear_surfaces()  # reuse the mesh, because a new one would reset the instance's material
     # Godot 3: if _drawn.get_surface_count() > 0:
     # Godot 3:     _drawn.surface_remove(0)
-    if read == null:  # it was taken out of the world
+    if read == null:  # the body was removed from the world
         set_body(0)
         return
     _arrays[Mesh.ARRAY_VERTEX] = read[0]
@@ -77,10 +79,10 @@ func _on_started() -> void:
     set_body(_world.body(body_name) if body_name != "" else body)
 
 
-# Positions and normals; null if the body was removed from the world.
+# Return positions and normals; null if the body was removed from the world.
 func _read():
     var native: RefCounted = _world.native
-    if _level >= 0:  # a snapshot can change the level, too
+    if _level >= 0:  # restoring a snapshot can also change the level
         var level = native.get_level(body)
         if level != null and level != _level:
             _find_mesh()
@@ -106,7 +108,7 @@ func _find_mesh() -> void:
     _arrays[Mesh.ARRAY_TEX_UV] = uvs if uvs.size() > 0 else null
 
 
-# Number of the mesh that draws a level of detail of an asset; -1 for none.
+# Return the number of the mesh that draws a level of detail of an asset; -1 if there is none.
 func _mesh_of(asset: int, level: int) -> int:
     var native: RefCounted = _world.native
     if mesh_name != "":

@@ -1,13 +1,14 @@
-# A world that `taichi-soft export --axes y-up` wrote, stepped with Godot's own physics.
+# Loads a world that `taichi-soft export --axes y-up` wrote, and steps it together with Godot's physics.
 #
-# Physics bodies below this node, or in the group "soft_colliders", are colliders of the soft bodies, by their
-# CollisionShape3Ds: spheres, boxes, capsules and planes (WorldBoundaryShape3D). Those that move are followed in each
-# physics frame, and rigid bodies are pushed. The world file has room for 15 by default: World(collider_room=...).
+# Each CollisionShape3D of a physics body below this node or in the group "soft_colliders" becomes a collider for the
+# soft bodies. Spheres, boxes, capsules and planes (WorldBoundaryShape3D) are supported. The colliders of moving physics
+# bodies follow them in each physics frame, and soft bodies push rigid bodies. By default, a world file has space for 15
+# such colliders, see World(collider_room=...).
 class_name SoftWorld
 extends Node3D
 
 signal started
-## A collider is a number; `node` is the physics body that it was made of, or null.
+## `collider` is the number of the collider. `node` is its physics body, or null.
 signal contact_began(which: int, collider: int, node: Node, impulse: Vector3)
 signal contact_ended(which: int, collider: int, node: Node, impulse: Vector3, duration: float)
 signal soft_contact_began(which: int, other: int, impulse: Vector3)
@@ -23,7 +24,7 @@ enum Event { CONTACT_BEGAN = 1, CONTACT_ENDED = 2, SLEPT = 4, WOKE = 8, FROZE = 
 
 const NATIVE := "SoftWorldNative"  # the class of taichi_soft.gdextension
 # Godot 3: const NATIVE := preload("res://addons/taichi_soft/soft_world_native.gdns")
-const AFTER_OTHERS := 100  # so that what moves bodies comes first
+const AFTER_OTHERS := 100  # priority of a node that runs after the nodes that move physics bodies
 const NEARLY := 1.0 - 1e-6
 const VALUES_PER_EVENT := 8
 const TOLD_BY := {
@@ -38,21 +39,21 @@ const TOLD_BY := {
 
 @export_dir var world_file := ""
 @export var autostart := true
-## Of a step; 0 for as many as are stable.
+## Number of substeps of a step. With 0, the library chooses a stable number.
 @export_range(0, 1000) var substeps := 0
 @export_group("Colliders of Godot's shapes")
 @export_range(0.0, 2.0, 0.01) var friction := 0.5
-## Below 0 for the bodies' own.
+## Restitution of the colliders. Below 0, the restitution of the soft bodies is used.
 @export_range(-1.0, 1.0, 0.01) var restitution := -1.0
 @export_range(0.0, 1.0, 0.001) var thickness := 0.0
 
-var native: RefCounted = null  # the functions of SoftWorldNative; null until started
+var native: RefCounted = null  # SoftWorldNative; null before `start`
 
 var _dt := 0.0
-var _shapes := {}  # by a collider's number, from the shape's axes to those of its resource
+var _shapes := {}  # transform from the library's shape to Godot's shape, by number of the collider
 var _followed: Array[Dictionary] = []
-var _nodes := {}  # by a collider's number, a WeakRef of the physics body that it was made of
-var _nodes_gone := {}  # the same of those that were taken out since the last step
+var _nodes := {}  # WeakRef of the physics body, by number of the collider
+var _nodes_gone := {}  # the entries of `_nodes` for colliders that were removed since the last step
 var _recorded := 0  # bits of Event
 
 
@@ -67,7 +68,7 @@ func _physics_process(delta: float) -> void:
     step(delta)
 
 
-## Load the world file: takes seconds. Returns whether it could be done.
+## Load the world file, which takes seconds. Return true on success.
 func start() -> bool:
     stop()
     var fresh: RefCounted = ClassDB.instantiate(NATIVE) if ClassDB.class_exists(NATIVE) else null
@@ -85,7 +86,7 @@ func start() -> bool:
     return true
 
 
-## Give the world back. Bodies are no more.
+## Unload the world and all its bodies.
 func stop() -> void:
     set_physics_process(false)
     native = null
@@ -97,14 +98,14 @@ func stop() -> void:
     _recorded = 0
 
 
-## One step of `delta` seconds; called in each physics frame.
+## Make one step of `delta` seconds. The node calls this in each physics frame. Return false if the step failed.
 func step(delta: float) -> bool:
     if not _is_started("step") or not _set_step(delta):
         return false
     for each in _followed.duplicate():
         _move(each)
     _record()
-    # Godot has made its own step. It gets what the bodies give in this one with its next.
+    # Godot has already made its own step. Its rigid bodies receive the impulses of this soft step in their next step.
     if native.advance(delta) == null:
         return false
     for each in _followed:
@@ -113,7 +114,7 @@ func step(delta: float) -> bool:
     return true
 
 
-## The body of that name in the script of the world; 0 for none.
+## Return the body with a name from the world's script; 0 if there is none.
 func body(body_name: String) -> int:
     if not _is_started("body"):
         return 0
@@ -121,7 +122,7 @@ func body(body_name: String) -> int:
     return 0 if slot == null else native.body(slot)
 
 
-## A new body; 0 where that is refused.
+## Add a body of an asset and return it; 0 if the library refuses the call.
 func spawn(asset_name: String, place: Transform3D, velocity := Vector3(), spin := Vector3()) -> int:
     if not _is_started("spawn"):
         return 0
@@ -136,7 +137,8 @@ func despawn(which: int) -> bool:
     return _is_started("despawn") and native.despawn(which) != null
 
 
-## Be there at the end of the coming step. `which` is a name of the world's script or a number of add_collider.
+## Move a collider to a place over the next step. `which` is a name from the world's script or a number from
+## add_collider.
 func move_collider(which: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.COLLIDER, which, "move_collider")
     if number < 0:
@@ -145,7 +147,7 @@ func move_collider(which: Variant, place: Transform3D) -> bool:
     return native.move_collider(number, place * turn) != null
 
 
-## A collider of one of Godot's shapes; returns its number, or -1 where that is refused.
+## Add a collider with one of Godot's shapes. Return its number, or -1 if the call is refused.
 func add_collider(shape: Resource, place: Transform3D) -> int:
     if not _is_started("add_collider"):
         return -1
@@ -160,7 +162,7 @@ func add_collider(shape: Resource, place: Transform3D) -> int:
         # Godot 3: size = 2.0 * shape.extents
     elif shape is CapsuleShape3D:
         kind = Shape.CAPSULE
-        size = Vector3(shape.radius, maxf(shape.height - 2.0 * shape.radius, 0.0), 0.0)  # without its caps
+        size = Vector3(shape.radius, maxf(shape.height - 2.0 * shape.radius, 0.0), 0.0)  # without the caps
         # Godot 3: size = Vector3(shape.radius, shape.height, 0.0)
         # Godot 3: turn.basis = Basis(Vector3.RIGHT, PI / 2)  # Godot's lies along z, the library's along y
     elif shape is WorldBoundaryShape3D:
@@ -189,15 +191,15 @@ func remove_collider(number: int) -> bool:
     return true
 
 
-## What bodies gave it in the last step [N s].
+## Return the impulse of all bodies on a collider in the last step [N s].
 func collider_impulse(which: Variant) -> Vector3:
     var number := _number(Kind.COLLIDER, which, "collider_impulse")
     var found = null if number < 0 else native.collider_impulse(number)
     return Vector3() if found == null else found[0]
 
 
-## The first soft body on a ray: body, point, normal, distance, triangle, weights and vertices of its own surface.
-## Empty where there is none.
+## Find the first soft body that a ray hits. Return body, point, normal, distance, and the hit triangle of the body's
+## surface with the weights and the numbers of its vertices. The Dictionary is empty if the ray hits no body.
 func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     var found = native.raycast(origin, direction, reach) if _is_started("raycast") else null
     if found == null or found.is_empty():
@@ -213,19 +215,20 @@ func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
     }
 
 
-## Bodies that touch a sphere, or enclose it.
+## Return the bodies that touch or enclose a sphere.
 func overlap_sphere(center: Vector3, radius: float) -> Array:
     var found = native.overlap_sphere(center, radius) if _is_started("overlap_sphere") else null
     return [] if found == null else found
 
 
-## Bodies that touch a box with edges of `size`, or enclose it.
+## Return the bodies that touch or enclose a box with edges of `size`.
 func overlap_box(place: Transform3D, size: Vector3) -> Array:
     var found = native.overlap_box(place, size) if _is_started("overlap_box") else null
     return [] if found == null else found
 
 
-## Take hold where `raycast` has hit, and pull towards there. Returns a number; 0 where nothing was hit.
+## Grab a body at a result of `raycast`. The initial target is the point of the hit. Return the grab, or 0 if `hit` is
+## empty.
 func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
     if not _is_started("grab") or hit.is_empty():
         return 0
@@ -233,7 +236,7 @@ func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
     return 0 if made == null else made
 
 
-## Pull towards another point.
+## Move the target of a grab.
 func move_grab(which: int, point: Vector3) -> bool:
     return _is_started("move_grab") and native.move_grab(which, point) != null
 
@@ -242,18 +245,18 @@ func release_grab(which: int) -> bool:
     return _is_started("release_grab") and native.release_grab(which) != null
 
 
-## With what it pulls [N].
+## Return the force of a grab [N].
 func grab_force(which: int) -> Vector3:
     var found = native.grab_force(which) if _is_started("grab_force") else null
     return Vector3() if found == null else found
 
 
-## Gravity [m/s^2], from the next step on.
+## Set gravity [m/s^2] from the next step on.
 func set_gravity(gravity: Vector3) -> bool:
     return _is_started("set_gravity") and native.set_gravity(gravity) != null
 
 
-## Coulomb's coefficient of a body against others. That of a collider by its name or number: set_collider_friction.
+## Set the Coulomb coefficient of a body for contact with other bodies. For colliders, see set_collider_friction.
 func set_body_friction(which: int, friction: float) -> bool:
     return _is_started("set_body_friction") and native.set_body_friction(which, friction) != null
 
@@ -263,13 +266,14 @@ func set_collider_friction(collider: Variant, friction: float) -> bool:
     return number >= 0 and native.set_collider_friction(number, friction) != null
 
 
-## Let vertices be held by another body: where they are in it, or each at a vertex of it. Returns a number, or 0.
+## Attach vertices to the body `other`: at their current positions in it, or each to one of its vertices in `onto`.
+## Return the joint, or 0 if the call is refused.
 func join(which: int, vertices: PackedInt32Array, other: int, onto := PackedInt32Array()) -> int:
     var made = native.join(which, vertices, other, onto) if _is_started("join") else null
     return 0 if made == null else made
 
 
-## The joint of the world's script of this name; 0 for none.
+## Return the joint with a name from the world's script; 0 if there is none.
 func joint(called: Variant) -> int:
     var number := _number(Kind.JOINT, called, "joint")
     var found = null if number < 0 else native.joint_of(number)
@@ -280,13 +284,14 @@ func release_joint(which: int) -> bool:
     return _is_started("release_joint") and native.release_joint(which) != null
 
 
-## With what the other body pulls [N].
+## Return the force of the other body on the joint's vertices [N].
 func joint_force(which: int) -> Vector3:
     var found = native.joint_force(which) if _is_started("joint_force") else null
     return Vector3() if found == null else found
 
 
-## Turn vertices about an axis that turns with them, with so much torque at most. Returns a number, or 0.
+## Add a motor that rotates vertices about an axis with at most `max_torque` [N m]. The axis rotates with the vertices.
+## Return the motor, or 0 if the call is refused.
 func add_motor(which: int, vertices: PackedInt32Array, axis: Vector3, speed: float, max_torque: float) -> int:
     if not _is_started("add_motor"):
         return 0
@@ -294,7 +299,7 @@ func add_motor(which: int, vertices: PackedInt32Array, axis: Vector3, speed: flo
     return 0 if made == null else made
 
 
-## The motor of the world's script of this name; 0 for none.
+## Return the motor with a name from the world's script; 0 if there is none.
 func motor(called: Variant) -> int:
     var number := _number(Kind.MOTOR, called, "motor")
     var found = null if number < 0 else native.motor_of(number)
@@ -305,7 +310,7 @@ func set_motor_speed(which: int, speed: float) -> bool:
     return _is_started("set_motor_speed") and native.set_motor_speed(which, speed) != null
 
 
-## With 0 its vertices coast.
+## Set the largest torque [N m] or force [N] of a motor. With 0 the vertices coast.
 func set_motor_limit(which: int, limit: float) -> bool:
     return _is_started("set_motor_limit") and native.set_motor_limit(which, limit) != null
 
@@ -314,72 +319,73 @@ func remove_motor(which: int) -> bool:
     return _is_started("remove_motor") and native.remove_motor(which) != null
 
 
-## Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments bar the change;
-## with `release` they are released. Each level has its own vertices.
+## Change the level of detail of a body; 0 is the finest. Each level has its own vertices. If joints, motors or
+## attachments prevent the change, they are released if `release` is true; otherwise return false.
 func set_level(which: int, level: int, release := false) -> bool:
     return _is_started("set_level") and native.set_level(which, level, int(release)) != null
 
 
-## The level of detail of a body; -1 for no body.
+## Return the level of detail of a body; -1 if the body does not exist.
 func get_level(which: int) -> int:
     var found = native.get_level(which) if _is_started("get_level") else null
     return -1 if found == null else found
 
 
-## Number of levels of detail that a body has; 0 for no body.
+## Return the number of levels of detail of a body; 0 if the body does not exist.
 func level_count(which: int) -> int:
     var asset = native.asset_of(which) if _is_started("level_count") else null
     return 0 if asset == null else native.level_count(asset)
 
 
-## Positions of the vertices of a body at its level of detail, by their numbers.
+## Return the positions of all vertices of a body at its current level of detail.
 func positions(which: int) -> PackedVector3Array:
     var found = native.positions(which) if _is_started("positions") else null
     return PackedVector3Array() if found == null else found
 
 
-## A place that moves as the game says, for bodies to hang from. Returns its number, or -1 where that is refused.
+## Add a frame, a pose that the game moves and that vertices can be attached to. Return its number, or -1 if the call is
+## refused.
 func add_frame(place: Transform3D) -> int:
     var made = native.add_frame(place) if _is_started("add_frame") else null
     return -1 if made == null else made
 
 
-## Be there at the end of the coming step. `frame` is a name of the world's script or a number of add_frame.
+## Move a frame to a place over the next step. `frame` is a name from the world's script or a number from add_frame.
 func move_frame(frame: Variant, place: Transform3D) -> bool:
     var number := _number(Kind.FRAME, frame, "move_frame")
     return number >= 0 and native.move_frame(number, place) != null
 
 
-## What hangs from it is let go.
+## Remove a frame and detach its vertices.
 func remove_frame(frame: Variant) -> bool:
     var number := _number(Kind.FRAME, frame, "remove_frame")
     return number >= 0 and native.remove_frame(number) != null
 
 
-## Let vertices go with a frame, from where both are now. `feels` where frame_load is asked later.
+## Attach vertices to a frame at their current positions. Set `feels` to true to use frame_load later.
 func attach(which: int, vertices: PackedInt32Array, frame: Variant, feels := false) -> bool:
     var number := _number(Kind.FRAME, frame, "attach")
     return number >= 0 and native.attach(which, vertices, number, int(feels)) != null
 
 
-## Let vertices go; none stands for all that hang from frames.
+## Detach vertices from frames. Without a list of vertices, detach all attached vertices of the body.
 func detach(which: int, vertices := PackedInt32Array()) -> bool:
     return _is_started("detach") and native.detach(which, vertices) != null
 
 
-## What a body pulled a frame with in the last step [N].
+## Return the mean force of a body on a frame in the last step [N].
 func frame_load(which: int, frame: Variant) -> Vector3:
     var number := _number(Kind.FRAME, frame, "frame_load")
     var found = null if number < 0 else native.frame_load(which, number)
     return Vector3() if found == null else found[0]
 
 
-## Tells states apart: that of Python's world in the same state.
+## Return a hash of the state. A world of Python in the same state has the same hash.
 func state_hash() -> String:
     return native.state_hash() if _is_started("state_hash") else ""
 
 
-## The soft bodies and their colliders; Godot's own bodies are not in it.
+## Return the state of the soft bodies and their colliders. The snapshot does not contain Godot's physics bodies.
 func snapshot() -> PackedByteArray:
     return native.snapshot() if _is_started("snapshot") else PackedByteArray()
 
@@ -418,12 +424,12 @@ func _set_step(delta: float) -> bool:
     if native.set_fixed_step(delta, substeps, 1) == null:
         return false
     _dt = delta
-    # The picture is alpha of the way from the step before to the last one. With nearly a step of time put in
-    # here it stays that of the last step, where Godot draws its own bodies.
+    # Drawn positions are interpolated between the states before (alpha 0) and after (alpha 1) the last step. Adding
+    # nearly a step of time here keeps alpha close to 1, so that soft bodies are drawn in step with Godot's own bodies.
     return native.advance(NEARLY * delta) != null
 
 
-# From a plane to axes whose y stands on it.
+# Return a transform whose y axis is the normal of a plane and whose origin is on the plane.
 func _above(plane: Plane) -> Transform3D:
     var up := plane.normal.normalized()
     var aside := Vector3.RIGHT if absf(up.x) < 0.9 else Vector3.BACK
@@ -439,7 +445,7 @@ func _physics_bodies() -> Array[PhysicsBody3D]:
         if node is PhysicsBody3D:
             found.append(node)
         var children := node.get_children()
-        children.reverse()  # so that they come out in the order of the scene
+        children.reverse()  # so that bodies are found in the order of the scene
         for child in children:
             waiting.append(child)
     for node in get_tree().get_nodes_in_group("soft_colliders"):
@@ -449,7 +455,7 @@ func _physics_bodies() -> Array[PhysicsBody3D]:
 
 
 func _follow(physics_body: PhysicsBody3D) -> void:
-    # The class of bodies that move can inherit that of bodies that do not.
+    # The class of moving bodies can be a subclass of the class of static bodies.
     var stays := physics_body is StaticBody3D and not physics_body is AnimatableBody3D
     for shape in physics_body.get_children():
         if not shape is CollisionShape3D or shape.disabled or shape.shape == null:
@@ -470,7 +476,7 @@ func _follow(physics_body: PhysicsBody3D) -> void:
             )
 
 
-# Only what somebody is connected to: to look for contacts takes time.
+# Record only events with connected signals, because finding contacts takes time.
 func _record() -> void:
     var kinds := 0
     for told_by in TOLD_BY:
@@ -527,8 +533,8 @@ func _move(each: Dictionary) -> void:
     var place := shape.global_transform
     var rigid := each.body.get_ref() as RigidBody3D
     if rigid != null:
-        # As the server says: under Bullet the node itself is one step behind. Then soft and rigid bodies would gain
-        # energy.
+        # Read the pose from the physics server. With Bullet, the pose of the node is one step late, which would add
+        # energy to the coupled bodies.
         var state := PhysicsServer3D.body_get_direct_state(rigid.get_rid())
         if state != null:
             place = state.transform * shape.transform
@@ -537,8 +543,8 @@ func _move(each: Dictionary) -> void:
         move_collider(each.number, place)
 
 
-# The engine feels an impulse one step late. So it gets half of it in advance, and that is taken back later:
-# the page docs/coupling.md says why.
+# Rigid bodies receive impulses one step late. To predict the next impulse, half of the present one is added now and
+# subtracted in the next step, see docs/coupling.md.
 func _push_back(each: Dictionary) -> void:
     var rigid := each.body.get_ref() as RigidBody3D
     if rigid == null or rigid.freeze:
