@@ -25,8 +25,8 @@ class WorldContext(Context):
     substeps: Substeps
     make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # creates the handle of a slot's body
     fields: Simulation | None = None
-    built_with: list[str] = field(default_factory=list)  # digests of the colliders' shapes at `build`
-    structure: bytes = b""  # cached digest of the structure that this world's snapshots must have
+    built_with: list[str] = field(default_factory=list)  # digest of each collider's shape at `build`
+    structure: bytes = b""  # cached digest of the world's structure; snapshots must have the same digest
 
     @property
     def contact(self) -> ContactSettings:

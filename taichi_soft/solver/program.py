@@ -12,7 +12,7 @@ class StepProgram(Program):
 
     integrator: IntegratorModel
     has_floor: bool
-    has_contact: bool = False  # True for contact with colliders, which include the floor
-    has_soft_contact: bool = False  # True for contact between bodies
+    has_contact: bool = False  # True if bodies can touch colliders or the floor
+    has_soft_contact: bool = False  # True if bodies can touch each other
     has_plasticity: bool = False  # True if a body has plasticity
     worker_count: int = 1  # number of threads that run a flat step together

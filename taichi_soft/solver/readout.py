@@ -36,7 +36,7 @@ class Readout:
         self._alpha: float | None = None  # interpolation factor of `_rows`; None if `_rows` is outdated
 
     def has_moved(self) -> None:
-        """Mark the cached positions as outdated."""
+        """Mark the cached positions as outdated, because bodies have moved."""
         self._alpha = None
 
     def positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
@@ -55,7 +55,7 @@ class Readout:
         """Implement `World.read_render_mesh`. Raises: OptionError for a buffer that does not fit."""
         x = as_buffer(positions, "positions", mesh.vertex_count)
         n = as_buffer(normals, "normals", mesh.vertex_count)
-        if np.may_share_memory(x, n):  # exact for contiguous arrays
+        if np.may_share_memory(x, n):  # the answer is exact for contiguous arrays
             raise OptionError("positions and normals share memory: give each a buffer of its own")
         read_render_mesh(self._state, mesh, alpha, x, n)
         return x, n

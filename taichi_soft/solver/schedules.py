@@ -12,18 +12,18 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 FLAT_FROM_TETS = 100_000
-"""Smallest size of a world's largest body, in tetrahedra, for which all threads compute each body together.
-On idle cores, this schedule is faster even for much smaller bodies (`taichi-soft profile --crossover`). But
-if another program occupies a core, a barrier waits milliseconds for the interrupted thread, and the schedule
-is faster only for the largest bodies."""
+"""Number of tetrahedra of the largest body from which the schedule "auto" chooses FLAT on a CPU. On idle cores,
+FLAT is faster even for much smaller bodies (`taichi-soft profile --crossover`). But if another program
+occupies a core, a barrier waits milliseconds for the interrupted thread, and FLAT is faster only for the
+largest bodies."""
 
 MAX_CALL_WORK = 2_000_000
-"""Largest product of tetrahedra and substeps in one kernel call. Ctrl-C waits until the call ends. A call
-takes 0.03 s on one thread, several times as long with contact, and up to 23 times as long if the step is
-retried. Before a step that needs several calls, the world takes a snapshot."""
+"""Largest product of tetrahedra and substeps in one kernel call. Ctrl-C waits until the call ends, so
+calls must be short. A call takes 0.03 s on one thread, several times as long with contact, and up to 23
+times as long if the step is retried. Before a step that needs several calls, the world takes a snapshot."""
 
 ALL = 2**31 - 1
-"""Number of substeps for a kernel call that runs the whole step."""
+"""Limit of substeps per kernel call that lets one call run the whole step."""
 
 Launch = Callable[[int, float], int]
 

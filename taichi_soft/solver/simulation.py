@@ -58,14 +58,14 @@ class Simulation:
     state: State
     program: StepProgram
     launch: Launch
-    long_from: int  # largest number of substeps that one kernel call runs
+    long_from: int  # steps with more substeps need several kernel calls
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
-    loss: str = ""  # why the last step lost events; "" if it lost none, or a loss was already reported
-    troubled: int = 0  # number of failed, inverted or inexactly solved bodies in the last step
+    loss: str = ""  # message about events that the last step lost; "" if there is none to report
+    troubled: int = 0  # number of bodies that failed, inverted or were solved inexactly in the last step
     _skips: bool = True  # True if bodies can skip the next step
-    _is_still: bool = False  # True if no body is awake, and nothing changed since the last step
+    _is_still: bool = False  # True if no body is awake and nothing has changed after the last step
     _warned: set[int] = field(default_factory=set)  # slots whose inexact solves were reported
     _inverted: set[int] = field(default_factory=set)  # slots whose inverted tetrahedra were reported
 
@@ -118,7 +118,7 @@ class Simulation:
     def _record_failures(self, substeps: int, h: float) -> list[str]:
         """Record the bodies that the last step froze. Returns: a message for each frozen body."""
         clock, reports = self.clock, []
-        # Record the substeps of the last attempt, because only the last attempt freezes bodies.
+        # Only the last attempt freezes bodies, so record the substeps of that attempt.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
         if self.program.integrator.halvings > 0:
             finer, is_braked = 1 << self.program.integrator.halvings, False
@@ -201,7 +201,7 @@ class Simulation:
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Return the islands of the last step, sorted by slot. A body added since that step is an island."""
+        """Return the islands of the last step, sorted by slot. A body added later has its own island."""
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)

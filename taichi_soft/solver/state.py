@@ -69,7 +69,8 @@ class Capacity(BodyCapacity):
 
 
 _FIELDS: WeakKeyDictionary[State, list[tuple[str, Declaration, Any]]] = WeakKeyDictionary()
-"""`State.fields` of each state. As attributes of a state, declarations would change kernels' cache keys."""
+"""Result of `State.fields` for each state. It is not an attribute of the state, because it would then change
+the cache keys of kernels."""
 
 
 class State(BodyFields):
@@ -97,7 +98,7 @@ class State(BodyFields):
         "hull": HullFields,
         "jobs": JobFields,
     }
-    """Classes of the further groups of fields, by the attribute of the state that holds the group."""
+    """Class of each group of fields, by the attribute of the state that contains the group."""
 
     def __init__(self, capacity: Capacity) -> None:
         """Allocate all fields. They contain zeros until `load`."""

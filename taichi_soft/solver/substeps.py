@@ -19,22 +19,23 @@ from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, Un
 _log = logging.getLogger(__name__)
 
 _PLAIN = {float, int, np.float64, type(None)}
-"""Types of arguments that `choose` can safely compare with the arguments of the last step."""
+"""Types of arguments that can be compared safely. For other types, `choose` does not reuse its last
+result."""
 
 
 SOFT_CONTACT_STEP = 1 / 240
 """Longest substep that implicit Euler uses by default in a world with contact between bodies [s]. The solve
-ignores forces between bodies, so bodies in a pile look softer with longer substeps: twice this substep
-compresses a pile of three blocks about three times as much, and with four times this substep the pile falls.
-"""
+ignores forces between bodies, so bodies in a pile look softer with longer substeps. For example, with twice
+this substep, a pile of three blocks is compressed about three times as much; with four times this substep,
+the pile falls."""
 
 
 MANY_SUBSTEPS = 500
-"""Number of substeps per step above which a world warns. With 500 substeps, a body of 1,000 tetrahedra takes
+"""Largest number of substeps per step without a warning. With 500 substeps, a body of 1,000 tetrahedra takes
 8 ms per step."""
 
 FRAME = 1 / 60
-"""Length of the step for which a world is checked when it is built [s]."""
+"""Length of the step for which `World.build` checks the number of substeps [s]."""
 
 TET_TIME = 15e-9
 """Approximate time per tetrahedron and substep on one thread [s] (`taichi-soft profile --baseline`)."""
@@ -49,7 +50,7 @@ class Substeps:
         """Start without estimates.
 
         Args:
-            has_stable_step: True if substeps above a stable length explode.
+            has_stable_step: True if bodies explode in substeps above a stable length.
             soft_contact, most: see `World(soft_contact=, max_substeps=)`.
         """
         self._pools = pools
@@ -133,7 +134,7 @@ class Substeps:
 
         Raises: OptionError for invalid arguments, or if the step needs more substeps than the world allows.
         """
-        asked = (dt, substeps, type(dt), type(substeps))  # includes types, because 4.0 == 4 and True == 1
+        asked = (dt, substeps, type(dt), type(substeps))  # with types, because 4.0 == 4 and True == 1
         if not {type(dt), type(substeps)} <= _PLAIN or self._asked != asked:
             self._chosen = self._check(dt, substeps)
             self._asked = asked
@@ -151,7 +152,7 @@ class Substeps:
         _log.info("a step of %g s is made in %d substeps", seconds, count)
         if not self.has_stable_step:
             return seconds, count, h
-        # Check assets only. Callers choose the number to avoid new estimates for cut or changed bodies.
+        # Check only assets: callers pass `substeps` to avoid new estimates for cut or changed bodies.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned:
@@ -173,5 +174,5 @@ class Substeps:
         """Discard estimates of materials that are no longer used."""
         used = {record_of(each).description for each in self._pools.occupants}
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
-        if self._asked[1:2] == (None,):  # the number was chosen for the previous materials
+        if self._asked[1:2] == (None,):  # the chosen number belongs to the previous materials
             self.forget()

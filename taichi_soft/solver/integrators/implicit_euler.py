@@ -33,8 +33,9 @@ def predict(state: ti.template(), program: ti.template(), body, job, felt):
 
 @ti.func
 def check(state: ti.template(), body, h, is_last):
-    """Return 1 if the body kept its shape. In the last attempt, first slow down a body whose shape
-    changed too much.
+    """Return 1 if the body kept its shape in the substep.
+
+    In the last attempt, a body whose shape changed too much is first slowed down.
     """
     if is_last == 1:
         slow_down(state, body, h)
@@ -52,5 +53,5 @@ IMPLICIT_EULER = IntegratorModel(
     has_hulls=False,  # the solve constrains vertices only
     drifts_at_once=False,
     halvings=MAX_PIECES.bit_length() - 1,
-    work=50,  # typical number of matrix products in a solve
+    work=50,  # a solve needs about 50 matrix products
 )

@@ -14,5 +14,5 @@ LAZY_LEAPFROG = IntegratorModel(
     predict=kick_by_forces,
     check=any_shape,
     advance=advance,
-    lag=0.5,  # a value as accurate as the method itself
+    lag=0.5,  # approximate, but as accurate as the method itself
 )

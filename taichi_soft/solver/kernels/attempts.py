@@ -26,9 +26,9 @@ from taichi_soft.solver.kernels.untangling import MAX_REFINEMENT
 
 @ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
-    """Return the largest number of halvings of the substep, and the number of the last attempt.
+    """Return how often the substep can be halved, and the number of the last attempt.
 
-    If the two numbers differ, the last attempt has the same substeps as the attempt before it, and strong
+    If the two numbers differ, the last attempt keeps the substeps of the attempt before it and adds strong
     damping.
     """
     halvings = state.retries[None]

@@ -26,7 +26,7 @@ def _freeze_if_invalid(state: ti.template(), body):
         while p < particles[1]:
             restore_particle(state, p)
             p = row_behind(p)
-        place_points(state, body)  # a snapshot with non-finite points cannot be restored
+        place_points(state, body)  # non-finite points would make snapshots invalid
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN
@@ -49,7 +49,7 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         if ti.static(state.capacity.implicit):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
     else:
-        clear_contacts(state, body)  # a restored body has touched nothing
+        clear_contacts(state, body)  # the contacts belong to the undone step
     return failed
 
 

@@ -17,11 +17,11 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
 
 CALMING = 0.5
-"""Fraction of the relative velocity along an edge that its ends lose per step."""
+"""Fraction by which damping reduces the relative velocity of an edge's ends, along the edge, in each step."""
 
 SLOW_FACTOR = 10.0
-"""A body counts as slow if its root mean square speed, weighted by mass, is below `SLOW_FACTOR` times
-`sleep_speed`."""
+"""Speed below which a body counts as slow, as a multiple of `sleep_speed`. It is compared with the root mean
+square of the body's particle speeds, weighted by mass."""
 
 
 @ti.func
@@ -69,7 +69,7 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        # Skip touched particles. Damping between contact impulses would make a weight on the particles creep.
+        # Skip touched particles. If they were damped between contact impulses, loaded bodies would creep.
         if state.particle_touches[p] + state.particle_touches[q] == 0:
             between = state.particle_position[q] - state.particle_position[p]
             apart = felt_velocity(state, program, q, gravity, kick, h, 1)

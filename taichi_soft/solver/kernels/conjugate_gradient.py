@@ -9,7 +9,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 SLIDES, STICKS = 0.0, 1.0
-"""Constraints of a touching particle: SLIDES acts only along the normal, STICKS in all directions."""
+"""Constraints of a touching particle. SLIDES constrains its velocity along the normal, STICKS in all
+directions."""
 
 
 @ti.func
@@ -99,7 +100,7 @@ def solve_system(state: ti.template(), body, load):
 
     Args:
         load: result of `squared_load`, to which the tolerance is relative.
-    Returns: the remaining residual over the load.
+    Returns: the remaining residual divided by the load.
     """
     _correct_common_velocity(state, body)
     particles = state.body_particles[body]
@@ -134,6 +135,6 @@ def solve_system(state: ti.template(), body, load):
                 state.direction[p] = state.image[p] + turn * state.direction[p]
             count += 1
         else:
-            count = most_iterations  # stop, because only rounding errors remain
+            count = most_iterations  # stop: only rounding errors remain
     _correct_common_velocity(state, body)
     return ti.sqrt(ti.cast(left / ti.max(load, 1e-300), state.real))

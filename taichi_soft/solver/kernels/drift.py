@@ -60,8 +60,8 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
     """Collide the particles of a body on the path along which they have just moved.
 
     Args:
-        travelled: distance that the body has travelled since near colliders were listed, including this path
-            [m].
+        travelled: distance that the body has moved after near colliders were last listed [m]. It includes
+            this path.
     """
     particles = state.body_particles[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
@@ -86,8 +86,8 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
     """Collide a body whose particles have moved, and update its rest timer.
 
     Args:
-        travelled: distance that the body has travelled since near colliders were listed, including this path
-            [m].
+        travelled: distance that the body has moved after near colliders were last listed [m]. It includes
+            this path.
     """
     set_travelled(state, body, travelled)
     if state.colliders.near_count[body] > 0:
@@ -123,7 +123,7 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
 
 @ti.func
 def has_drifted(state: ti.template(), body, speed, h, since):
-    """Collide a body that the kick has moved. If the colliders near the body are unknown, undo the move.
+    """Collide a body that the kick has moved, or undo the move if the colliders near the body are unknown.
 
     Returns: 1 if the move was not undone.
     """

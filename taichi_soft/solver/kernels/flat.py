@@ -29,7 +29,8 @@ from taichi_soft.elements.kernels.internal_forces import accumulate_forces, clea
 from taichi_soft.solver.kernels.kick import MAX_VELOCITY_CHANGE
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
-# Larger than any body status: a _FAILING body must retry the step, a _DONE body has completed the step.
+# Additional body statuses, larger than all others. A _FAILING body must retry the step. A _DONE body has
+# completed the step.
 _FAILING, _DONE = 5, 6
 
 
@@ -94,8 +95,9 @@ def _felt_time(state: ti.template(), program: ti.template(), body, h, s):
 
 @ti.func
 def _moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
-    """Compute the motion of one particle in a substep under its internal force [N]. A pinned particle keeps
-    its velocity.
+    """Compute the motion of one particle in a substep, from gravity and its internal `force` [N].
+
+    A pinned particle keeps its velocity.
 
     Returns: new position [m] and velocity [m/s], and acceleration [m/s^2].
     """

@@ -17,17 +17,19 @@ from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 MAX_IMPULSE = 1e24
-"""Largest valid impulse [N s]. Larger impulses, from the overflow of a solve, count as zero."""
+"""Largest valid impulse [N s]. Larger impulses come from overflow in a solve, and are replaced by zero."""
 
 MAX_SOLVES = 6
-"""Largest number of solves in one substep to find the particles that stick, slide and leave."""
+"""Largest number of solves per body and substep. After each solve, some particles begin to stick or slide, or
+are released."""
 
 TOLERANCE = 0.003
-"""Largest accepted violation of Coulomb's law, relative to the sum of impulses."""
+"""Largest accepted violation of Coulomb's law, as a fraction of the sum of all impulses. If the violation is
+larger, the system is solved again."""
 
 MAX_REVERSAL = 0.1
-"""Largest relative increase of a sliding velocity that corrects too strong friction. Larger increases would
-prevent bodies from coming to rest."""
+"""Limit of the correction of a sliding particle's velocity if friction was too strong, as a fraction of that
+velocity. Without the limit, corrections would prevent bodies from coming to rest."""
 
 
 @ti.func
@@ -80,8 +82,8 @@ def _begin_solve(state: ti.template(), body):
 def _impulse_of(state: ti.template(), p):
     """Return the impulse of the last solve on a constrained particle.
 
-    Returns: component along the normal [N s], tangential component, friction limit of the tangential
-    component, and tangential velocity of the particle relative to the surface [m/s].
+    Returns: component of the impulse along the normal, tangential component, largest tangential component
+        that friction allows [N s]; and tangential velocity of the particle relative to the surface [m/s].
     """
     hold = state.particle_hold[p]
     n = hold.xyz
@@ -97,8 +99,8 @@ def _impulse_of(state: ti.template(), p):
 def _measure_errors(state: ti.template(), body):
     """Measure how far impulses violate Coulomb's law.
 
-    Returns: four sums over all particles [N s]: all impulses; impulses that pull; excess of sticking
-    particles over the friction limit; errors of the friction on sliding particles.
+    Returns: four sums over all particles [N s]: all impulses; impulses that pull; impulses of sticking
+        particles in excess of the friction limit; errors of the friction on sliding particles.
     """
     total, pulling = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     beyond, wrong = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
@@ -148,7 +150,7 @@ def solve_held(state: ti.template(), body, held_count, h):
 
     `solution` receives the changes of velocity [m/s], and `image` the system times these changes [N s].
 
-    Returns: the remaining residual over the load.
+    Returns: the remaining residual divided by the load.
     """
     load = squared_load(state, body, h)
     residual, solves = ti.cast(0.0, state.real), 0
@@ -173,7 +175,8 @@ def solve_held(state: ti.template(), body, held_count, h):
 def held_velocity(state: ti.template(), p):
     """Return the velocity of a constrained particle after the solve.
 
-    Remaining errors of friction are corrected on the particle alone, without adding energy.
+    The function also corrects the remaining error of friction, for this particle alone and without adding
+    energy.
 
     Returns: velocity [m/s], impulse along the normal, and tangential impulse [N s].
     """

@@ -80,8 +80,9 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
 
 @ti.func
 def _apply_impulse(state: ti.template(), body, p, h, since):
-    """Apply the impulse of a constrained particle to its collider. Returns: the velocity of the particle
-    [m/s].
+    """Apply the impulse of a constrained particle to its collider.
+
+    Returns: the velocity of the particle [m/s].
     """
     c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
     velocity, pressing, across = held_velocity(state, p)
@@ -106,7 +107,7 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
     Args:
         since: time since the start of the step [s].
         is_first: 1 in the first substep of a step.
-    Returns: the highest speed [m/s], and the highest speed relative to the `common` velocity.
+    Returns: the highest speed of a particle, absolute and relative to the `common` velocity [m/s].
     """
     held_count = _constrain_to_colliders(state, body, h, since)
     record_residual(state, body, solve_body(state, program, body, h, held_count), is_first)

@@ -24,13 +24,15 @@ from taichi_soft.solver.kernels.held_particles import solve_held
 from taichi_soft.solver.kernels.rigid_rotation import multiply, project_out_rotation
 
 FARTHEST = 0.5
-"""Largest relative change of an edge in a substep. If an edge changes more, the substep is halved."""
+"""Largest allowed change of an edge in a substep, as a fraction of its length. If an edge changes more, the
+substep is halved."""
 
 MIN_LENGTH = 0.1
-"""Smallest reference length for the relative change of an edge, over the mean edge length."""
+"""Smallest length to which the change of an edge is compared, as a fraction of the root mean square edge
+length. It prevents halving for very short edges."""
 
 MAX_PIECES = 32
-"""Largest number of pieces into which a failing substep is divided."""
+"""Largest number of parts into which a failing substep is divided."""
 
 
 @ti.func
@@ -80,14 +82,14 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 @ti.func
 def record_residual(state: ti.template(), body, residual, is_first):
-    """Record the largest residual of a step's solves in `body_residual`. NaN residuals are ignored."""
+    """Record in `body_residual` the largest residual of all solves of a step. NaN residuals are ignored."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
     state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
 def _scale_motion(state: ti.template(), body, h, share):
-    """Scale a body's motion relative to its mean motion by `share`, in a substep of `h` [s]."""
+    """Multiply a body's motion relative to its mean motion by `share`, in a substep of `h` [s]."""
     momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -104,7 +106,10 @@ def _scale_motion(state: ti.template(), body, h, share):
 
 @ti.func
 def _largest_change(state: ti.template(), body):
-    """Return the largest relative change of an edge's vector since the positions in `direction`."""
+    """Return the largest change of an edge in this substep, as a fraction of its length.
+
+    `direction` contains the positions before the substep.
+    """
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
@@ -122,13 +127,13 @@ def _largest_change(state: ti.template(), body):
 
 @ti.func
 def keeps_shape(state: ti.template(), body):
-    """True if no edge has changed by a larger fraction than `FARTHEST` since the positions in `direction`."""
+    """True if no edge changed by more than the fraction `FARTHEST` of its length in this substep."""
     return _largest_change(state, body) <= FARTHEST
 
 
 @ti.func
 def slow_down(state: ti.template(), body, h):
-    """Slow a body down if an edge changed by a larger fraction than `FARTHEST` in a substep of `h` [s]."""
+    """Slow a body down if an edge changed by more than the fraction `FARTHEST` in a substep of `h` [s]."""
     change = _largest_change(state, body)
     if change > FARTHEST:
         _scale_motion(state, body, h, FARTHEST / change)

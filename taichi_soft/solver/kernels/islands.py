@@ -15,7 +15,8 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 ISLAND_MARGIN = 0.25
-"""Margin around the box of a body, in mean edge lengths, for motion that its velocities do not predict."""
+"""Margin around the box of a body, in mean edge lengths. It covers motion that the velocities at the start of
+the step do not predict."""
 
 
 @ti.func
@@ -46,7 +47,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
             k = row_behind(k)
         surface = state.body_surface[body]
-        # Extend the box, because parts of a body can change the direction of their motion in the step.
+        # Extend the box: parts of a body can change their direction of motion during the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
         state.body_bounds_lower[body] = lower - reach
@@ -55,8 +56,9 @@ def _find_boxes(state: ti.template(), body_count, dt):
 
 @ti.func
 def _sort_by_lower_x(state: ti.template(), body_count):
-    """Sort bodies by the lower x of their boxes. An insertion sort is fast, because the order hardly changes
-    between steps.
+    """Sort bodies by the lower x of their boxes.
+
+    The order hardly changes between steps, so an insertion sort is fast.
     """
     for i in range(1, body_count):
         body = state.islands.sweep_order[i]

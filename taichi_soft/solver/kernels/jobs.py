@@ -27,10 +27,10 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import MOST_PARTS, Job
 
 OWNER = 0
-"""Worker number of the owner of an island. Helpers have larger numbers."""
+"""Worker number of the thread that owns an island. Helpers have larger numbers."""
 
 HELP = -1
-"""Value of `Job.phase` with which a helper runs the phase that the owner has started."""
+"""Value of `Job.phase` for a helper. It means the phase that the owner of the island has started."""
 
 
 @ti.func

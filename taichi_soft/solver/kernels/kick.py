@@ -15,17 +15,18 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import Job
 
 MAX_VELOCITY_CHANGE = 1.0
-"""Largest change of a particle's velocity by the forces of one substep, over the speed of sound in its body.
-Stable vibrations stay below this limit, even in slivers, because a stable substep is about the time in which
-sound crosses the smallest tetrahedron."""
+"""Largest change of a particle's velocity that forces can cause in one substep, as a multiple of the speed of
+sound in its body. After a larger change, the attempt fails. Stable vibrations stay below this limit, even in
+slivers: a stable substep is about the time in which sound crosses the smallest tetrahedron."""
 
 TOUCHED_FACTOR = 4.0
-"""Factor on `MAX_VELOCITY_CHANGE` for a particle that touched something in the last substep, because contact
-removes most of the change."""
+"""Factor by which `MAX_VELOCITY_CHANGE` is larger for a particle that touched something in the last substep.
+Contact removes most of the change of such a particle."""
 
 EXPLODING = 20.0
-"""A body counts as exploding if a particle moves farther than this in one substep, in mean edge lengths of
-the surface. Other bodies pass through an exploding body until it is frozen or slower."""
+"""Largest displacement of a particle in one substep, in mean edge lengths of the surface. If a particle moves
+farther, its body counts as exploding. Other bodies pass through an exploding body until it is frozen or
+slower."""
 
 
 @ti.func
@@ -52,7 +53,7 @@ def _store_block(state: ti.template(), first, positions: ti.template(), velociti
 def _store_last_block(
     state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()
 ):
-    """Store the last particles of a body, fewer than `LANES`, as `_store_block` does."""
+    """Do the same as `_store_block` for the last block of a body, which has only `count` particles."""
     lane = 0
     while lane < count:
         p = first + lane
@@ -66,7 +67,7 @@ def _store_last_block(
 
 @ti.func
 def _store_speeds(state: ti.template(), first, count, common, velocities: ti.template()):
-    """Store the speeds of up to `LANES` particles relative to the `common` velocity, for contact.
+    """Store the speeds of up to `LANES` particles relative to the `common` velocity. Contact reads them.
 
     Call this before new velocities are stored.
 

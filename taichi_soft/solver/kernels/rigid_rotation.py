@@ -17,7 +17,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_edge_products
 
 THIN = 1e-6
-"""Small moment of inertia that is added about every axis, over the trace of the inertia tensor."""
+"""Moment of inertia that is added about every axis, as a fraction of the trace of the inertia tensor. It
+keeps the tensor of a straight line invertible."""
 
 
 @ti.func

@@ -33,8 +33,8 @@ def begin_skips(state: ti.template(), body_count: ti.i32):
 def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
     """Make the bodies that skipped a step active again.
 
-    Interpolated positions of these bodies are their current positions. The contacts of the bodies, and the
-    forces of force fields on them, are cleared.
+    The current positions of these bodies become their previous positions, so that interpolation does not
+    move them. Their contacts, and the forces of force fields on them, are cleared.
 
     Returns: the number of bodies that skipped the step.
     """

@@ -10,11 +10,12 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CALM_TIME = 0.5
-"""Time for which all bodies of an island must be slow [s]. A thrown body is slow for a shorter time at its
-highest point."""
+"""Time for which all bodies of an island must stay slow before the island falls asleep [s]. It is long enough
+that a thrown body does not fall asleep at its highest point."""
 
 WAKE_MARGIN = 0.01
-"""Distance from the box of a sleeping body within which an event wakes the body [m]."""
+"""Margin around the box of a sleeping or skipping body [m]. A moving collider within this margin, or a
+change of the world there, wakes the body."""
 
 
 @ti.func
@@ -101,7 +102,10 @@ def store_box(state: ti.template(), body):
 
 @ti.real_func
 def store_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
-    """Store the boxes around bodies that skip the next step. Bodies can have moved since `skip_bodies`."""
+    """Store the boxes around bodies that skip the next step.
+
+    Call this directly before the step, because a body can still be moved after `skip_bodies`.
+    """
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
             store_box(state, body)

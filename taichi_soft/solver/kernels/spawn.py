@@ -13,7 +13,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Place a body in its slot, with the state that it would have at the start of a world.
+    """Place a body in its slot, in the state of a body at the start of a world.
 
     Args:
         rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's

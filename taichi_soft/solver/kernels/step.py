@@ -39,13 +39,13 @@ from taichi_soft.solver.kernels.substep import (
 from taichi_soft.solver.step_fields import Job, Moment, Progress
 
 ALL_SLEEP = -1
-"""Result of `step_islands` if no body is awake, so that another step would change nothing."""
+"""Result of `step_islands` if no body is awake. Another step would then change nothing."""
 
 UNFINISHED = -2
 """Result of `step_islands` if the step needs more calls."""
 
 DONE = -1
-"""Value of `Progress.attempt` after the step of an island is complete."""
+"""Value of `Progress.attempt` for an island that has completed the step."""
 
 
 @ti.func
@@ -100,7 +100,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
 def _begin_attempt(state: ti.template(), program: ti.template(), island, dt, run: ti.template()):
     if is_alone(state, program, island) == 1:
         body = state.islands.body[state.islands.first[island]]
-        # Add the speed gained by gravity, so that near colliders are listed only once per step.
+        # Add the speed that gravity can add, so that near colliders are listed only once per step.
         run.fastest = highest_speed(state, body) + dt * gravity_on(state, body).norm()
     elif ti.static(program.has_soft_contact):
         run.velocity = _mean_velocity(state, island)
@@ -123,10 +123,9 @@ def _make_substeps(
 
 @ti.func
 def _mean_velocity(state: ti.template(), island):
-    """Return the mean velocity of the particles of an island [m/s].
+    """Return the mean velocity of an island's particles [m/s]; zero if a body of the island does not move.
 
-    Motion that all bodies share brings no two bodies closer to each other. The velocity is zero if a body of
-    the island does not move.
+    Contact uses speeds relative to this velocity: motion that all bodies share brings no two bodies closer.
     """
     total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
     for i in range(state.islands.first[island], state.islands.first[island + 1]):

@@ -40,17 +40,16 @@ from taichi_soft.solver.kernels.vibration import damp_body, time_to_positions
 from taichi_soft.solver.step_fields import Job
 
 BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
-"""Phases that run separately for each body. BEGIN and END belong to the whole step, the others to a
-substep."""
+"""Phases that run separately for each body. BEGIN and END run once per step, all others once per substep."""
 
 NONE, OUTDATED, VALID = range(3)
-"""State of an island's contact candidates: NONE at the start of a step, OUTDATED after a failed attempt,
-VALID after a search."""
+"""States of an island's contact candidates. NONE: no search yet in this step. OUTDATED: an attempt failed
+after the search. VALID: the candidates can be used."""
 
 MAX_IMPULSE_STEP = 0.1
-"""Displacement of a struck body in a substep, in mean edge lengths, above which it can strike the next body
-in the same substep. After a smaller displacement, it can penetrate the next body by that distance, and
-contact moves it out again."""
+"""Largest displacement by an impact in one substep, in mean edge lengths, that contact ignores when it looks
+for further impacts. A body that is displaced more can strike another body in the same substep. A body that is
+displaced less penetrates the other body by at most this distance, and contact moves it out again."""
 
 
 @ti.func
@@ -187,9 +186,10 @@ def is_alone(state: ti.template(), program: ti.template(), island):
 def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
     """Combine the results of the bodies' kicks: speeds, and stability of the attempt.
 
-    Returns: the highest speed [m/s], and the speed that a body can gain from an impact, relative to the
-    island. Exploding bodies do not count in the second speed, because they would cause new searches in every
-    substep.
+    Returns: the highest speed of a particle [m/s]; and the speed, relative to the mean velocity of the
+        island, that an impact can give a body [m/s], or 0 if the displacement at this speed is at most
+        `MAX_IMPULSE_STEP`. The second result ignores exploding bodies, which would cause a new search in
+        every substep.
     """
     highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     least_edge = ti.cast(NO_CONTACT, ti.f32)
@@ -219,8 +219,9 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
 def _solve_contact(
     state: ti.template(), program: ti.template(), island, now, run: ti.template(), impact_speed
 ):
-    """Solve contact between the bodies of an island: update outdated candidates, find contacts, apply
-    impulses.
+    """Find the contacts between the bodies of an island, and apply their impulses.
+
+    If the candidates are outdated, search for new candidates first.
     """
     if ti.static(program.has_soft_contact):
         if has_contact_pairs(state, island) == 1:

@@ -8,8 +8,8 @@ tetrahedra has lost its shape. Within a third of a second, its particles are mov
 shape.
 
 The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
-can be too long for these bodies, so that parts of the bodies would vibrate for ever. Such
-bodies get more substeps.
+can be too long for these bodies. Parts of them would then vibrate for ever, so these bodies get more
+substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -24,35 +24,39 @@ from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 PATIENCE = 15
-"""Number of fixed steps between two checks: a quarter of a second."""
+"""Number of fixed steps between two checks of a body. At 60 steps/s, this is a quarter of a second."""
 
 REPORTED_AFTER = 8 * PATIENCE
-"""Number of fixed steps after which a body with inverted tetrahedra is reported: two seconds."""
+"""Number of fixed steps after which a body that still has inverted tetrahedra is reported. At 60 steps/s,
+this is two seconds."""
 
 FAILED_FRACTION = 0.1
-"""Fraction of inverted tetrahedra above which a body counts as failed if the step was retried."""
+"""Smallest fraction of inverted tetrahedra with which a body counts as failed. The fraction is compared only
+after a retried step, or after the caller set the shape."""
 
 RESTORING_STEPS, CALMING = 20, 0.8
-"""Number of steps in which a failed body moves to its rest shape, and fraction of its vibration that remains
-after each of these steps. The damping also restores bodies that are twisted by two turns without an inverted
-tetrahedron."""
+"""RESTORING_STEPS is the number of steps in which a failed body moves to its rest shape. CALMING is the
+fraction of the body's vibration that remains after each of these steps. The damping also restores bodies
+that are twisted by two turns without an inverted tetrahedron."""
 
 FADING = 20.0
 """Rate at which the vibration of a body with inverted tetrahedra is damped [1/s]. Without damping, inverted
-slivers would excite each other, light slivers for seconds."""
+slivers would excite each other. Light slivers would do so for seconds."""
 
 STEP_MARGIN = 0.9
-"""Square of the ratio of a deformed body's substep to the estimated stability limit of the substep."""
+"""Square of the safety factor on the substep of a deformed body. The substep is sqrt(STEP_MARGIN) times the
+estimated largest stable substep."""
 
 MAX_REFINEMENT = 4.0
-"""Largest number of substeps over the number at rest. If even shorter substeps are needed, the step is
-retried."""
+"""Largest factor by which a deformed body can raise the number of substeps, relative to its number at
+rest. If the body needs more substeps, the step fails and is retried."""
 
 RELAXING = 0.8
-"""Fraction of the additional substeps that remains after each check, once the shape no longer needs them."""
+"""Fraction of the additional substeps that a body keeps at each check after its shape needs fewer. Their
+number therefore falls gradually."""
 
 FLAT = 1e-5
-"""Volume relative to the volume at rest, below which a tetrahedron counts as inverted."""
+"""Volume below which a tetrahedron counts as inverted, as a fraction of its volume at rest."""
 
 
 @ti.func
@@ -110,9 +114,7 @@ def _stiffness_of(state: ti.template(), block, lane):
 
 @ti.func
 def _refinement_of(state: ti.template(), body):
-    """Return the number of substeps that the current shape of a body requires, over the number at rest; at
-    least 1.
-    """
+    """Return the factor, 1 or more, by which a body's current shape raises its number of substeps at rest."""
     now, rest = ti.cast(0.0, state.real), ti.cast(1e-30, state.real)
     row, blocks = state.body_blocks[body][0] * LANES, state.body_blocks[body]
     while row < blocks[1] * LANES:
@@ -235,7 +237,7 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
         age = ti.max(before, -RESTORING_STEPS - 1) + 1
-        if before >= 0 or before == PLACED:  # otherwise, a restoration has begun and continues
+        if before >= 0 or before == PLACED:  # otherwise, the body is already being restored
             if _needs_rest_shape(state, body):
                 age = -RESTORING_STEPS
             elif before == PLACED:

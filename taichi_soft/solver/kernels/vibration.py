@@ -24,27 +24,28 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.untangling import kept_while_inverted
 
 MAX_FADING = 0.43
-"""Largest exponent of damping in one substep: the fraction d = exp(-0.43) = 0.65 remains. For particles in
-contact, the kick is not part of the damped vibration, so the velocity v of a mode with stiffness k and mass 1
-becomes d v + h a. The substep is stable for h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step.
-A failed body is damped more strongly, once per step."""
+"""Largest exponent of damping in one substep. With 0.43, the fraction d = exp(-0.43) = 0.65 of the vibration
+remains. The limit keeps particles in contact stable. For them, the kick is not part of the damped vibration,
+so the velocity v of a mode with stiffness k and mass 1 becomes d v + h a. The substep is then stable for
+h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step. Failed bodies are damped more strongly, once
+per step."""
 
 MOVING, SLOW, RESTING = range(3)
-"""Rest states of a body, by its overall speed: see `calming`."""
+"""Rest states of a body, from the highest overall speed to the lowest. See `calming`."""
 
 RESTING_RATE = 2.0
-"""Smallest rate at which the vibrations of a resting body are damped [1/s]."""
+"""Smallest rate at which the vibrations of a RESTING body are damped [1/s]."""
 
 STRONG_DAMPING = 0.5
 """Fraction of the vibration that remains after each substep of the last attempt at a step."""
 
 FARTHEST = 0.1
-"""Largest path of a particle relative to the rigid motion in a substep of the last attempt, over the mean
-edge of the surface."""
+"""Largest displacement of a particle relative to the body's rigid motion in one substep of the last
+attempt, as a fraction of the mean edge length of the surface."""
 
 THIN_BODY = 1e-6
-"""Product of the principal moments over the cube of their sum, below which a body counts as a straight line.
-A line has no inertia about itself."""
+"""Limit below which a body counts as a straight line. It is compared with the product of the principal
+moments of inertia divided by the cube of their sum. For a straight line, this value is 0."""
 
 
 @ti.func
@@ -73,12 +74,13 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 @ti.func
 def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
-    """Return the velocity of a particle after its forces have acted for `kick` [s], in m/s; if `is_held` is
-    1, also after contact.
+    """Return the velocity of a particle after its forces have acted for `kick` [s], in m/s.
+
+    If `is_held` is 1, the velocity includes the effect of contact.
 
     Contact removes the speed that a pressed particle gains in the kick. If that speed counted as vibration,
-    damping would push bodies at rest. The effect of the floor in a substep of `h` [s] is known in advance.
-    For other contacts, the effect of the last substep is used.
+    damping would move bodies at rest. The effect of the floor in a substep of `h` [s] is known in advance.
+    For other contacts, the effect in the last substep is used.
     """
     velocity = _kicked_velocity(state, p, gravity, kick)
     if is_held == 1:
@@ -183,10 +185,9 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
 
 @ti.func
 def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
-    """Limit the speed of particles relative to the rigid motion to `farthest` [m/s], after forces have acted
-    for `kick` [s].
+    """Limit the speed of particles relative to the body's rigid motion to `farthest` [m/s].
 
-    Momentum and angular momentum are conserved.
+    Speeds are measured after forces have acted for `kick` [s]. Momentum and angular momentum are conserved.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
@@ -213,7 +214,7 @@ def _limited(beside, most):
     """Return a velocity relative to the rigid motion, limited to `most` [m/s]."""
     speed = beside.norm()
     slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
-    if not speed < 1e18:  # the square of the speed overflows, so the direction is unknown
+    if not speed < 1e18:  # the square of the speed overflowed, so the direction is unknown
         slower = beside * 0.0
     return slower
 
