@@ -192,7 +192,7 @@ def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[n
 
     Args:
         body: body that was cut.
-        pieces: pairs of a piece and the original of each vertex of the piece, (n,); the largest piece first.
+        pieces: each piece with the original of each of its vertices, (n,); the largest piece first.
     """
     context = context_of(body)
     frames = context.of(Frames)

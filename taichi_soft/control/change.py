@@ -43,7 +43,7 @@ def numbers(*values: Any) -> Rows32:
 def some_particles(body: SoftBody, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
     """Check and sort vertex indices of a body. None means all vertices.
 
-    Raises: OptionError if an index is invalid, or if there is none.
+    Raises: OptionError if an index is invalid, or if `particles` is empty.
     """
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)

@@ -28,7 +28,8 @@ ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
 """Function that returns accelerations, (n, 3) [m/s^2], for positions (n, 3) [m] and a time [s]."""
 
 MAX_ACCELERATION = 1e9
-"""Largest acceleration [m/s^2]. At this limit, a vertex reaches the highest valid velocity within 20 us."""
+"""Largest acceleration that `apply_force` accepts [m/s^2]. At this acceleration, a vertex reaches the highest
+valid velocity within 20 us."""
 
 
 def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -> None:

@@ -29,31 +29,34 @@ from taichi_soft.core.serialisation import below
 Floats = NDArray[np.float64]
 
 SHORTEST, PERIODS = 0.5, 8.0
-"""A change lasts SHORTEST [s] or PERIODS / omega, whichever is longer. omega is the angular frequency of the
-slowest mode [rad/s]."""
+"""SHORTEST is the smallest duration of a change [s]. PERIODS is the smallest product of the duration and
+the angular frequency of the slowest mode. A change has the smallest duration
+that satisfies both limits."""
 
 HELD = 6.4
-"""Frequency of a free beam, relative to the frequency of a beam that is held at one end: (4.730 / 1.875)^2,
-from the roots of the bending equation."""
+"""Frequency of a free beam, as a multiple of the frequency of the same beam held at one end. The value is
+(4.730 / 1.875)^2, from the roots of the bending equation."""
 
 FADING = 2.0
-"""Exponent of the stiffness in the damping of vibrations. This value damps the slowest mode critically."""
+"""Exponent in the damping of vibrations during a change. Vibrations are damped in proportion to
+k^-FADING, where k is the stiffness. The value 2 damps the slowest mode critically."""
 
 TIMES_A_STEP = 8.0
-"""Smallest number of dampings of vibrations per step: see `kept_vibration`."""
+"""Smallest number of times that vibrations are damped in each step of a change. See `kept_vibration`."""
 
 LIFT = 1e-4
-"""A change is immediate if it adds less energy than lifting the body by this height [m]."""
+"""Height that limits the energy of an immediate change [m]. A change is immediate if it adds less energy
+than lifting the body by this height."""
 
 LARGEST_RATIO = 1e12
-"""Upper limit of the ratio of new to initial stiffness, for elements with an initial stiffness of zero."""
+"""Largest ratio of new to initial stiffness. Elements with an initial stiffness of zero get this ratio."""
 
 
 @dataclass(eq=False)
 class Easing:
     """A running change of material."""
 
-    constants: Floats  # present values in the fields: see `_constants`
+    constants: Floats  # present constants in the fields, in the layout of `_constants`
     ratio: float  # largest ratio of final to initial stiffness of all elements
     seconds: float  # duration of the change [s]
     passed: float = 0.0  # elapsed time [s]
@@ -83,7 +86,7 @@ class Easings(Slice):
         """Start without running changes."""
         super().__init__(context)
         self.by_body: dict[SoftBody, Easing] = {}
-        self._left: list[SoftBody] = []  # bodies that had a running change before a restore
+        self._left: list[SoftBody] = []  # bodies whose change was running before a restore
 
     def begin(self, body: SoftBody, material: Any) -> None:
         """Start to change the material of a body."""
@@ -152,7 +155,7 @@ class Easings(Slice):
         Args:
             body: body that was cut.
             order: order of the body's tetrahedra in the fields before the cut.
-            pieces: pairs of a piece and the original of each tetrahedron of the piece, (m,).
+            pieces: each piece with the original of each of its tetrahedra, (m,).
         """
         easing = self.by_body.get(body)
         self.release_body(body)

@@ -14,15 +14,16 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 FARTHEST = -0.5
-"""Smallest allowed weight. A point must lie in its tetrahedron scaled by 3 about the centre."""
+"""Smallest allowed weight of a vertex. A point with this weight is outside its tetrahedron, but inside the
+same tetrahedron scaled by 3 about its centre."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """Barycentric coordinates of n points: vertices and weights. The four weights of a point sum to 1."""
+    """Barycentric coordinates of n points. The four weights of a point sum to 1."""
 
-    vertices: NDArray[np.int32]  # (n, 4)
-    weights: Floats  # (n, 4)
+    vertices: NDArray[np.int32]  # (n, 4), vertices that carry each point
+    weights: Floats  # (n, 4), weights of these vertices
 
 
 def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
@@ -45,7 +46,7 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
             f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
             "move the two together first, or give vertices in onto"
         )
-    weights[np.abs(weights) < 1e-4] = 0.0  # round-off must not involve further vertices
+    weights[np.abs(weights) < 1e-4] = 0.0  # round-off: these vertices must not carry the point
     return Places(corners, weights / weights.sum(axis=1, keepdims=True))
 
 

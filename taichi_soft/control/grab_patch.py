@@ -1,4 +1,4 @@
-"""Patch of a grab: the part of a body that the grab pulls, and the largest force on it."""
+"""Patch of a grab: the part of a body that the grab pulls, and the strength of this part."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
-"""Radius of a patch, relative to the diagonal of the body. The patch is about the size of a hand's grip."""
+"""Radius of a patch, as a fraction of the diagonal of the body's bounding box. With this radius, a patch
+is about the size of a hand's grip."""
 
 FARTHEST_PULL = 0.5
-"""Largest estimated displacement of a patch, relative to the radius of the patch. Elements then stretch by a
-quarter to a third, which is stable with the longest stable substeps. Four times this value is unstable."""
+"""Largest estimated displacement of a patch, as a fraction of its radius. At this displacement, elements
+stretch by a quarter to a third, which is stable with the longest stable substeps. Four times this
+displacement is unstable."""
 
 LIMITS = np.array([PATCH_SIZE, 1.2, 1e-6, FARTHEST_PULL])
-"""Constants for `shape_patch`: relative radius, smallest radius relative to the distance of the farthest
-corner, smallest falloff of a vertex in a patch, largest relative displacement."""
+"""Constants for `shape_patch`. In this order: `PATCH_SIZE`; smallest radius of a patch, as a multiple of
+the distance between the point and the farthest corner; smallest falloff of a vertex in a patch;
+`FARTHEST_PULL`."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Patch:
 
 
 def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """Return the patch around a point at rest. The point is given by weights of three or four corners."""
+    """Return the patch around a point at rest, which has barycentric coordinates `weights` in `corners`."""
     elements, stiffness = elements_of(body)
     rows, strength = np.empty((len(body.masses), 2)), np.empty(1)
     x = np.ascontiguousarray(body.mesh.vertices)

@@ -37,10 +37,10 @@ from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, vector_of
 
 WEIGHTS = 10.0
-"""Default limit of a grab's force, relative to the weight of the body on Earth."""
+"""Default of the largest force of a grab, as a multiple of the body's weight on Earth."""
 
 HIGHEST_SPEED = 50.0
-"""Largest speed that a grab gives a body [m/s]. No hand is faster."""
+"""Largest speed to which a grab accelerates a body [m/s]. No hand moves faster."""
 
 
 class Grab(Handle):
@@ -177,7 +177,7 @@ def grab_at(
     frequency: float,
     max_force: float | None,
 ) -> Grab:
-    """Implement `Body.grab`. `point` is the initial target; None: the position of the grabbed point."""
+    """Implement `Body.grab`. `point` is the initial target; None means the position of the grabbed point."""
     if len(body.surface) == 0:
         raise MeshError(f"body {body.index} has no surface to grab")
     number = as_count(triangle, "triangle", 0, len(body.surface) - 1)

@@ -45,8 +45,9 @@ from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below
 
 DRAW = 0.25
-"""Largest closing speed of a gap, relative to the wave speed in the body times the square root of the held
-fraction of the body's mass. At the largest closing speed, elements stretch by at most about a quarter."""
+"""Largest closing speed of a gap, as a fraction of c sqrt(f), where c is the wave speed in the body and f
+is the fraction of the body's mass that the joint holds. At this speed, elements stretch by at most about a
+quarter."""
 
 
 class Joint(Handle):
@@ -113,7 +114,7 @@ class Joints(Numbered[Joint]):
 
     @property
     def rows_in_use(self) -> int:
-        """Total number of held particles of all joints."""
+        """Total number of particles that all joints hold."""
         return sum(len(joint.particles) for joint in self.by_number.values())
 
     def holding(self, body: SoftBody) -> list[Joint]:

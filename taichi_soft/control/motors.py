@@ -47,8 +47,8 @@ class Drive:
 
     turns: bool  # True: rotates about the axis, False: pushes along the axis
     is_fixed: bool  # True: the axis keeps its direction, False: the axis rotates with the particles
-    axis: NDArray[np.float64]  # unit vector, (3,); in world axes if fixed, else in the rest shape
-    point: NDArray[np.float64] | None  # point on the axis, (3,) [m]; None: centre of the particles
+    axis: NDArray[np.float64]  # unit vector, (3,); in world axes if `is_fixed`, else in the rest shape
+    point: NDArray[np.float64] | None  # point on the axis, (3,) [m]; None: the centre of the particles
     speed: float  # target speed [rad/s] or [m/s]
     limit: float  # largest torque [N m] or force [N]
 
@@ -59,8 +59,8 @@ class Drive:
 
 
 THINNEST = 1e-3
-"""Smallest ratio of width to length of the driven part. A thinner part has no defined rotation about its
-length."""
+"""Smallest ratio of width to length of the driven part. For a thinner part, the rotation about its long
+axis is undefined."""
 
 
 class Motor(Handle):

@@ -15,7 +15,7 @@ class Numbered(Slice, Generic[Kind]):
     """Base class of `Grabs`, `Joints` and `Motors`: all handles of one world, by index."""
 
     most = 0  # largest number of handles
-    advice_verb = ""  # verb for the advice in the error of `free_number`
+    advice_verb = ""  # verb in the advice of the error that `free_number` raises
 
     def __init__(self, context: Context) -> None:
         """Start without handles."""

@@ -45,7 +45,7 @@ def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, 
     """
     centers = [turned((body.center_of_mass() - start)[None], turn)[0] + end for body in bodies]
     for body, center in zip(bodies, centers, strict=True):
-        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # moves nothing
+        _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # measures only
         if not farthest < POSITION_LIMIT:
             raise OptionError(
                 f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: move it closer to the origin"

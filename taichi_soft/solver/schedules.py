@@ -12,10 +12,10 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
 FLAT_FROM_TETS = 100_000
-"""Number of tetrahedra of the largest body from which the schedule "auto" chooses FLAT on a CPU. On idle cores,
-FLAT is faster even for much smaller bodies (`taichi-soft profile --crossover`). But if another program
-occupies a core, a barrier waits milliseconds for the interrupted thread, and FLAT is faster only for the
-largest bodies."""
+"""Size of the largest body, in tetrahedra, from which the schedule "auto" chooses FLAT on a CPU. On idle
+cores, FLAT is faster even for much smaller bodies (`taichi-soft profile --crossover`). But if another
+program occupies a core, a barrier waits milliseconds for the interrupted thread, and FLAT is faster only
+for the largest bodies."""
 
 MAX_CALL_WORK = 2_000_000
 """Largest product of tetrahedra and substeps in one kernel call. Ctrl-C waits until the call ends, so

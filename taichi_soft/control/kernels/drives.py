@@ -50,7 +50,7 @@ def apply_wind(state: ti.template(), body: ti.i32, h: ti.f32):
             n = across / twice_area
             sum = state.particle_velocity[a] + state.particle_velocity[b] + state.particle_velocity[c]
             flow = ti.abs((wind.xyz - sum / 3.0).dot(n))
-            drag = wind.w * twice_area * flow / 24.0  # force per normal velocity on a vertex [kg/s]
+            drag = wind.w * twice_area * flow / 24.0  # force on a vertex / normal velocity [kg/s]
             for i in range(3):
                 p = corners[i]
                 inv_mass = state.particle_inv_mass[p]
@@ -136,7 +136,10 @@ def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
 
 @ti.kernel
 def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)) -> ti.i32:
-    """Write the wind: velocity [m/s], density times drag coefficient [kg/m^3]. Return 1 if it changed."""
+    """Write the wind: velocity [m/s], and density times drag coefficient [kg/m^3].
+
+    Returns: 1 if the wind changed, else 0.
+    """
     given = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
     differs = int((given != state.wind[None]).any())
     state.wind[None] = given

@@ -23,7 +23,8 @@ def _count_within(patch: ti.template(), distance):
 def _distance_of_last(patch: ti.template(), radius):
     """Find by bisection the smallest distance within which there are more vertices than a patch can have.
 
-    The bisection uses the bits of the floats. As integers, they have the same order as non-negative floats.
+    The bisection runs on the bits of the floats, because the bits of non-negative floats, read as integers,
+    have the same order as the floats.
     """
     lowest, highest = ti.cast(0, ti.i64), ti.bit_cast(radius, ti.i64)
     while lowest < highest:
@@ -72,10 +73,10 @@ def shape_patch(
 ):
     """Find the patch around a point at rest, and its strength.
 
-    The strength is `FARTHEST_PULL` times the radius and the stiffness of the patch. The stiffness is the
-    force per distance if each vertex moves in proportion to its falloff w. This stiffness is twice the energy
-    of that deformation per squared distance: the sum of V mu |grad w|^2 over all tetrahedra, or of
-    k (w_i - w_j)^2 / 3 over all springs.
+    The strength is the product of `FARTHEST_PULL`, the radius and the stiffness of the patch. The stiffness
+    is the force divided by the displacement, if each vertex moves in proportion to its falloff w. It is the
+    sum of V mu |grad w|^2 over all tetrahedra, or of k (w_i - w_j)^2 / 3 over all springs. This sum is twice
+    the energy of the deformation divided by the squared displacement.
 
     Args:
         corners: three or four vertices between which the point lies.

@@ -17,14 +17,16 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import add_inertia
 
 MOST_GRABS, PATCH_ROWS = 16, 128
-"""Largest number of grabs of a world, and largest number of particles of a grab."""
+"""MOST_GRABS is the largest number of grabs of a world. PATCH_ROWS is the largest number of particles of a
+grab's patch."""
 
 CORNERS = 4
-"""Number of corners of a grabbed point's element: a tetrahedron after a change of level, else a triangle with
-its first corner twice."""
+"""Number of corners of the element that contains a grabbed point. The element is a triangle whose first
+corner is stored twice. After a change of level, it is a tetrahedron."""
 
 PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
-"""Columns of the weights, the limits and the force in `numbers` of `write_grab` and `read_grab`."""
+"""Columns of `numbers` in `write_grab` and `read_grab`: the weights of the corners, the limits, and the
+force."""
 
 
 ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
@@ -41,11 +43,12 @@ class GrabFields(FieldGroup):
     corners = declare(
         MOST_GRABS, ti.i32, CORNERS, start=0, keep=USED_GRABS, below=Below(PARTICLE), native=True
     )
-    weights = declare(  # weights of the corners
+    weights = declare(  # barycentric coordinates of the grabbed point
         MOST_GRABS, REAL, CORNERS, start=0, keep=USED_GRABS, most=FINITE, native=True
     )
     target = declare(MOST_GRABS, REAL, 3, unit="m", start=0, keep=USED_GRABS, most=FINITE, native=True)
-    spring = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)  # `write_grab`
+    # Stiffness [N/m], damping [N s/m] and longest stretch [m].
+    spring = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
     limits = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
     # Force on the body in the last substep.
     force = declare(MOST_GRABS, REAL, 3, unit="N", start=0, keep=USED_GRABS, native=True)
@@ -71,11 +74,11 @@ def _stretch(state: ti.template(), g):
 
 @ti.func
 def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
-    """Return the change of a whole body's velocity [m/s] by the part of a force above the patch's strength.
+    """Return the change of a body's velocity [m/s] by the force of a grab above the strength of its patch.
 
     Args:
-        wanted: force of spring and damper at the resulting velocity [N].
-        drag: decrease of the force `wanted` per velocity [N s/m].
+        wanted: force of spring and damper at the velocity after the pull [N].
+        drag: decrease of this force if the velocity increases by 1 m/s [N s/m].
     """
     on_patch, on_all, inv_mass = state.grabs.limits[g].x, state.grabs.limits[g].y, state.grabs.limits[g].z
     force = wanted / (1.0 + h * drag * inv_mass)

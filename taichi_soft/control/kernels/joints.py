@@ -24,36 +24,38 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
-"""Largest number of joints of a world, and largest number of held particles of all joints."""
+"""MOST_JOINTS is the largest number of joints of a world. JOINT_ROWS is the largest number of particles
+that all joints hold together."""
 
 ENDS = 5
-"""Number of particles of a row: the held particle, with weight 1, and four particles of the other body, whose
-weights sum to -1. The weighted sum of their positions is the gap between the held particle and its point."""
+"""Number of particles of a row. The first is the held particle, with weight 1. The other four belong to
+the other body, and their weights sum to -1. The weighted sum of all five positions is the gap between the
+held particle and its point."""
 
 SWEEPS = 6
-"""Number of sweeps over all rows of an island per substep. The number must be even. Rows without common
-particles need one sweep."""
+"""Number of sweeps over all rows of an island in each substep. It must be even, because successive sweeps
+have opposite directions. If no particle belongs to two rows, one sweep would be enough."""
 
 CLOSE = 30.0
-"""Closing rate of a gap [1/s]. At higher rates, conflicting rows would shake light bodies. Rows can conflict
-between a fine and a coarse mesh."""
+"""Rate at which a gap closes [1/s]. Rows between a fine and a coarse mesh can contradict each other. At a
+higher rate, such rows would shake light bodies."""
 
 MOST_SHIFT = 0.5
-"""Largest change of the weights that moves an impulse to the particle's position. If a gap needs a larger
-change, the joint does not conserve angular momentum exactly."""
+"""Largest change of the weights of a point, by which its impulse acts at the position of the held
+particle. If a gap requires a larger change, the joint does not conserve angular momentum exactly."""
 
 
 MOST_WEIGHT = 1e3
-"""Largest weight of an end that is valid in a snapshot."""
+"""Largest valid weight of a particle in the rows of a snapshot."""
 
 ALL_JOINTS, USED_JOINT_ROWS, JOINT_ENDS = "joints", "rows of joints", "ends of joints"
 """Names of groups of rows in a snapshot."""
 
 
 class JointFields(FieldGroup):
-    """All joints of a world, and the rows of the joints in the order of creation, without free rows between.
+    """All joints of a world, and their rows. Rows are in the order of creation, without gaps.
 
-    End k of row r has the index r ENDS + k.
+    Particle k of row r has the index r ENDS + k.
     """
 
     owner, when = "control", "has_contact"
@@ -70,10 +72,10 @@ class JointFields(FieldGroup):
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
     share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # fraction of the impulse
-    # Impulse on the first end in the last substep.
+    # Impulse on the held particle in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap
-    is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if the particle is the first end of a row
+    is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if a joint holds the particle
 
 
 @ti.func

@@ -24,14 +24,15 @@ from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import ti
 
 MOST_MOTORS, MOTOR_ROWS = 64, 16384
-"""Largest number of motors of a world, and largest number of particles of all motors."""
+"""MOST_MOTORS is the largest number of motors of a world. MOTOR_ROWS is the largest number of particles
+that all motors drive together."""
 
 ALL_MOTORS, USED_MOTORS, MOTOR_PARTICLES = "motors", "used motors", "particles of motors"
 """Names of groups of rows in a snapshot."""
 
 MOST_CHANGE = 0.25
-"""Largest change of a particle's velocity per substep, relative to the speed of sound in its body. Faster
-changes would separate the particles from the rest of the body."""
+"""Largest change of a particle's velocity by a motor in one substep, as a fraction of the speed of sound
+in the body. Larger changes would separate the driven particles from the rest of the body."""
 
 
 @ti.dataclass
@@ -43,10 +44,10 @@ class MotorRow:
     end: ti.i32  # row after the motor's last row
     turns: ti.i32  # 1: rotates particles about the axis, 0: pushes particles along the axis
     is_fixed: ti.i32  # 1: the axis keeps its direction, 0: the axis rotates with the particles
-    has_point: ti.i32  # 1: the axis passes through `point`, 0: through the centre of the particles
-    axis: ti.math.vec3  # unit vector; in world axes if fixed, else in the rest shape
+    has_point: ti.i32  # 1: the axis passes through `point`, 0: it passes through the particles' centre
+    axis: ti.math.vec3  # unit vector; in world axes if `is_fixed`, else in axes of the rest shape
     point: ti.math.vec3  # point on the axis [m]
-    speed: ti.f32  # target [rad/s] or [m/s]
+    speed: ti.f32  # target speed [rad/s] or [m/s]
     limit: ti.f32  # largest torque [N m] or force [N]
 
 
@@ -123,13 +124,13 @@ def _run_motor(state: ti.template(), motor, h, kick):
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
         row = row_behind(row)
-    impulse = h * 0.0  # stays 0 if the inertia is NaN, because the point is infinite
+    impulse = h * 0.0  # stays 0 if an infinite point makes the inertia NaN
     if inertia > 0.0:
         speed = momentum / inertia
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
         change = ti.max(-most, ti.min(motor.speed - speed, most))
         pushed = inertia * change
-        # Larger values mean that the body diverges.
+        # Skip larger values, which mean that the body is diverging.
         if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18 and ti.abs(pushed) < 1e18:
             row = motor.first
             while row < motor.end:
@@ -159,7 +160,7 @@ def run_motors(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_f
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, motor, h, kick)
                 if motor.speed != 0.0 and motor.limit > 0.0 and state.body_calm_time[body] != 0.0:
-                    state.body_calm_time[body] = 0.0  # a slow start must not count as rest
+                    state.body_calm_time[body] = 0.0  # keeps a body awake that a motor starts slowly
 
 
 @ti.kernel
@@ -249,7 +250,7 @@ def find_rest_axis(
         rest, now: positions of the particles at rest and at present, (n, 3) [m].
         weights: masses of the particles, scaled to the sum 1.
         axis: present direction, (3,).
-        found: (4,), receives the direction at rest, and the ratio of the width of the part to its length.
+        found: (4,), receives the direction at rest, and the width of the driven part divided by its length.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -28,5 +28,5 @@ def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
 
 @ti.func
 def any_shape(state: ti.template(), body, h, is_last):
-    """Return 1, because explicit integrators accept every shape. `kick_by_forces` checks velocities instead."""
+    """Return 1, because explicit integrators accept every shape. `kick_by_forces` checks velocities."""
     return 1
