@@ -61,12 +61,13 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 DAMPING_INTERVAL = 0.5
-"""Longest time between two dampings of vibrations, multiplied by the angular frequency of the first mode. The
-value gives about 12 dampings per period."""
+"""Product of the longest time between two dampings of vibrations and the angular frequency of the first
+mode. With this value, vibrations are damped about 12 times per period."""
 
 MAX_BOX_DIFFERENCE = 0.25
-"""Largest distance between corresponding sides of two bounding boxes, of a level of detail and of the finest
-level. The distance is relative to the longest side of the finest level's box."""
+"""Largest difference between the bounding boxes of a level of detail and of the finest level. The
+difference is the largest distance between corresponding sides, as a fraction of the longest side of the
+finest level's box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +244,7 @@ class SoftBodyAsset:
             pinned = np.unique((offsets**2).sum(axis=2).argmin(axis=0)) if offsets.shape[1] else ()
             levels.append(SoftBodyAsset(mesh, material, pinned=pinned, **plain))
         self._checked_levels(levels)
-        # The calibration takes seconds, so all checks precede it.
+        # All checks come first, because the calibration takes seconds.
         materials = calibrated(self.description, [each.description for each in levels])
         fitted = (
             replace(each, material=calibrated_material)
@@ -437,7 +438,7 @@ class SoftBodyAsset:
         The row contains `body_edge`, `body_stride`, `body_sound_speed` and `vibration_row`.
 
         Args:
-            is_implicit: True for implicit Euler, which has no largest stable substep: the stride is then 0.
+            is_implicit: True for implicit Euler, which has no largest stable substep. The stride is then 0.
         """
         speed = self.description.sound_speed
         stride = 0.0 if is_implicit else self.stable_step.recommended * speed
@@ -535,7 +536,7 @@ def _are_same(skin: tuple[Surface, ...], other: tuple[Surface, ...]) -> bool:
 
 
 def _mean_stiffness(body: BodyDescription) -> float:
-    """Mean stiffness of a body divided by its mean density, up to a constant factor [m^2/s^2]."""
+    """Return the mean stiffness of a body divided by its mean density, up to a constant factor [m^2/s^2]."""
     mesh, material = body.mesh, body.material
     assert isinstance(mesh, TetMesh)
     assert isinstance(material, Material | AnisotropicMaterial)

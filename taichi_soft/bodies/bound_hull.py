@@ -1,4 +1,4 @@
-"""Hull of a body, bound to the tetrahedra of its cage. A hull has those surface points that make contact.
+"""Hull of a body, bound to the tetrahedra of its cage. A hull contains the points that make contact.
 
 A point x has a weight w_i for each vertex x_i of a tetrahedron, so that x = sum_i w_i x_i at any time. An
 impulse P at the point acts on each vertex as w_i P, so the point has the inverse mass sum_i w_i^2 / m_i.
@@ -25,8 +25,9 @@ Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
 
 MIN_WEIGHT = -2.0
-"""Smallest weight. This limit confines a point to its tetrahedron, enlarged ninefold about the centre. An
-impact on a point farther out would move the nearest vertices by many times the displacement of the point."""
+"""Smallest allowed weight of a vertex. It keeps each point inside its tetrahedron scaled by 9 about the
+centre. An impact on a point farther out would move the nearest vertices by many times the displacement of
+the point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
     offset = barycentric(hull.points, corners) - nearest
-    # Largest fraction of the offset from the mesh with no weight below `MIN_WEIGHT`.
+    # Largest fraction of a point's offset from the mesh that leaves every weight at least `MIN_WEIGHT`.
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(offset < 0.0, (MIN_WEIGHT - nearest) / offset, np.inf).min(axis=1)
     clamped_count = int((allowed < 1.0).sum())

@@ -26,13 +26,13 @@ _log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
 
 MODES = 4
-"""Number of slowest modes whose frequencies must agree. These modes dominate the visible wobble."""
+"""Number of slowest modes whose frequencies are calibrated. These modes dominate the visible wobble."""
 
 MODE_TOLERANCE = 2e-3
-"""Relative change of the squared frequencies below which the modes count as converged."""
+"""Tolerance of the search for the modes: see `change` of `lowest_modes`."""
 
 TOLERANCE = 0.01
-"""Relative error of the frequencies below which the updates end."""
+"""Relative error of the frequencies below which the update of the moduli ends."""
 
 WARNING_ERROR = 0.05
 """Relative error of the frequencies above which a warning is logged."""
@@ -40,12 +40,13 @@ WARNING_ERROR = 0.05
 MAX_UPDATES = 6
 
 RCOND = 0.1
-"""Singular values of the sensitivities below this fraction of the largest value are ignored. Such values
-belong to modes that no modulus can separate, for example the two bending modes of a round bar."""
+"""Smallest singular value of the sensitivities that is used, as a fraction of the largest singular value.
+Smaller singular values belong to modes that no modulus can separate, for example the two bending modes of
+a round bar."""
 
 MAX_CHANGE = 3.0
-"""Largest ratio between a modulus and the median of all moduli. A larger ratio would visibly change the
-body."""
+"""Largest factor by which a modulus can differ from the median of all moduli. A larger factor would
+visibly change the body."""
 
 
 def calibrated(fine: BodyDescription, coarser: Sequence[BodyDescription]) -> list[Material]:
@@ -63,7 +64,7 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
     material = coarse.material
     assert isinstance(material, Material)
     density = material.density * mass / coarse.masses.sum()
-    factors = np.zeros(len(coarse.mesh.tets))  # logarithm of each tetrahedron's factor of `young`
+    factors = np.zeros(len(coarse.mesh.tets))  # logarithm of the factor on `young`, for each tetrahedron
     best, smallest_error = coarse.material, np.inf
     for _ in range(MAX_UPDATES):
         young = material.young * np.exp(factors)

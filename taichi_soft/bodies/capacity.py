@@ -12,7 +12,7 @@ ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 
 
 LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
-"""Smallest capacity of a world. "colliders" and "samples" apply to worlds with contact."""
+"""Smallest value of each attribute. "colliders" and "samples" are attributes of worlds with contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 
@@ -27,7 +27,7 @@ class BodyCapacity:
     bodies: int
     triangles: int
     outer: int
-    parallel: bool  # True adds fields for the forces of all corners and edges, for the flat schedule
+    parallel: bool  # True adds fields for the forces of corners and edges; for schedule `flat`
     rings: int = 0  # number of rows of edge rings; 0 if no edges carry elastic forces
     implicit: bool = False  # True adds fields for the linear system of implicit integration
     anisotropic: bool = False  # True adds fields for 21 elastic constants per tetrahedron

@@ -9,7 +9,8 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.serialisation import serialised
 
 DEFAULT_THICKNESS = 0.02
-"""Default thickness, relative to the mean edge length of the surface. A layer this thin is invisible."""
+"""Default thickness of the contact layer, as a fraction of the mean edge length of the surface. A layer
+this thin is invisible."""
 
 
 @serialised("friction", "thickness", "itself", "group", "mask")

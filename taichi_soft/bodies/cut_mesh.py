@@ -1,4 +1,4 @@
-"""Mesh of a body after cuts, stored as the numbers from which the body's arrays can be rebuilt."""
+"""Mesh of a body after cuts, stored as the integers from which the body's arrays can be rebuilt."""
 
 from __future__ import annotations
 

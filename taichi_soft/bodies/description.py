@@ -27,7 +27,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 SHORTEST_EDGE = 1e-6
-"""Shortest edge that a mesh can have [m]. The volumes of smaller tetrahedra are outside float32's range."""
+"""Smallest allowed edge length of a mesh [m]. The volume of a smaller tetrahedron would be outside
+float32's range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,7 @@ class BodyDescription:
 
     @cached_property
     def rest_inverses(self) -> Floats:
-        """A^-1 of each tetrahedron, (m, 3, 3) [1/m], in the caller's order, read-only."""
+        """Inverse edge matrix A^-1 of each tetrahedron, (m, 3, 3) [1/m], in the caller's order, read-only."""
         return read_only(rest_inverses(self.mesh))
 
     @cached_property
@@ -150,13 +151,13 @@ def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
     See thesis chapter 6. A vertex of a `CageMesh` has the mass of the solid that it carries.
     """
     masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
-    if isinstance(mesh, CageMesh):  # mean density of the adjacent tetrahedra times carried volume
+    if isinstance(mesh, CageMesh):  # mean density of the adjacent tetrahedra, times the carried volume
         masses *= mesh.vertex_volumes / lumped(mesh.tets, mesh.volumes * mesh.fill, len(mesh.vertices))
     return masses.astype(np.float64)
 
 
 def rest_inverses(mesh: BodyMesh) -> Floats:
-    """A^-1 of thesis eq. 6.1 for every tetrahedron, (m, 3, 3) [1/m]."""
+    """Return the inverse edge matrix A^-1 (thesis eq. 6.1) of each tetrahedron, (m, 3, 3) [1/m]."""
     return edge_inverses(mesh.vertices[mesh.tets])
 
 

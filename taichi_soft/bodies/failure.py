@@ -11,9 +11,9 @@ class Failure:
 
     body: int  # slot of the body
     tetrahedron: int | None  # first tetrahedron that failed, in the caller's order; None if unknown
-    step: int  # step of the world, counted from 0, that was undone for this body
-    substep: int | None  # substep in which the last try of that step failed; None if unknown
-    time: float  # [s], time of the last valid state, in which the body is frozen
+    step: int  # index of the step that was undone for this body, from 0
+    substep: int | None  # substep in which the last attempt at that step failed; None if unknown
+    time: float  # [s], time of the last valid state, which the frozen body keeps
     edge: tuple[int, int] | None = None  # first edge that failed, for a law along edges
 
 
@@ -23,6 +23,6 @@ class FailedStep:
 
     step: int
     time: float  # [s], time before the step
-    substeps: int  # number of substeps of the last retry
+    substeps: int  # number of substeps in the last attempt
     h: float  # [s], length of a substep
-    is_braked: bool  # True if vibrations were strongly damped in the step
+    is_braked: bool  # True if the last attempt damped vibrations strongly

@@ -52,7 +52,7 @@ class BodyFields(FieldGroup):
     particle_position = declare(
         PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=POSITION_LIMIT, native=True
     )
-    particle_velocity = declare(  # earlier than the position by half of `body_velocity_lag`
+    particle_velocity = declare(  # at a time half of `body_velocity_lag` before the position
         PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
     )
     # Zero between steps. A force has four components, because the CPU loads and stores four floats at once.
@@ -67,8 +67,8 @@ class BodyFields(FieldGroup):
     prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
     prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
     rest_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED)
-    # `particle_aim` is the kind of motion of a pinned particle, see `control.kernels.pins`. `particle_target`
-    # is the position of its target, in the axes of the world or of a frame.
+    # `particle_aim` encodes how a pinned particle moves, see `control.kernels.pins`. `particle_target` is the
+    # particle's target, in the axes of the world or of a frame.
     particle_aim = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(FRAME, WITH_FRAME), native=True
     )
@@ -86,18 +86,18 @@ class BodyFields(FieldGroup):
     particle_speed = declare(PARTICLE, REAL, unit="m/s")
 
     tet_vertices = declare(BLOCK, ti.i32, each=4 * LANES, start=LOADED)
-    tet_rest_inverse = declare(  # by columns; constant unless the body is plastic
+    tet_rest_inverse = declare(  # stored by columns; changes only if the body is plastic
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, keep=SHAPE, most=FINITE
     )
-    tet_original_inverse = declare(  # before any plastic flow
+    tet_original_inverse = declare(  # `tet_rest_inverse` before plastic flow
         BLOCK, REAL, unit="1/m", each=9 * LANES, start=LOADED, when="plastic"
     )
     body_plasticity = declare(BODY, REAL, 4, start=LOADED, when="plastic")  # see `Plasticity.row`
     tet_lame = declare(BLOCK, REAL, unit="Pa", each=2 * LANES, start=LOADED)
-    tet_stiffness = declare(  # upper triangle row by row
+    tet_stiffness = declare(  # upper triangle, stored by rows
         BLOCK, REAL, unit="Pa", each=21 * LANES, start=LOADED, when="anisotropic"
     )
-    # Damping of the corners' velocities relative to their mean.
+    # Damping constant for the velocities of the corners relative to their mean.
     tet_damping = declare(BLOCK, REAL, unit="N s/m", each=LANES, start=LOADED)
 
     edge_vertices = declare(EDGE, ti.i32, 2, start=LOADED, layout=ti.Layout.SOA)
@@ -118,20 +118,20 @@ class BodyFields(FieldGroup):
         BLOCK, REAL, unit="Pa", each=LANES, start=LOADED, when="rings"
     )
     tet_pressure = declare(BLOCK, REAL, unit="Pa", each=LANES, when="rings")  # E nu dV / V0
-    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum of the adjacent tetrahedra
+    edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum over the adjacent tetrahedra
     tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
 
     # Fields for implicit integration. The linear system has 3 x 3 blocks. Diagonal blocks are stored by
-    # particle. Off-diagonal blocks are stored by edge, for the row of its first and the column of its second
-    # end.
+    # particle. Off-diagonal blocks are stored by edge: the row of a block belongs to the first end of the
+    # edge, and the column to the second end.
     particle_block = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_block_inverse = declare(PARTICLE, REAL, (3, 3), when="implicit")
     particle_inertia = declare(PARTICLE, REAL, unit="kg", when="implicit")  # mass plus inertia of grabs
     edge_block = declare(EDGE, REAL, (3, 3), when="implicit")
-    edge_normal = declare(EDGE, REAL, 3, when="solves_bonds")  # from the last evaluation of forces
+    edge_normal = declare(EDGE, REAL, 3, when="solves_bonds")  # normal in the last evaluation of forces
     edge_compared = declare(EDGE, REAL, 3, unit="m", when="solves_bonds")
-    # Terms of `rigid_rotation`, where W maps an angular velocity to velocities: K W of each particle,
-    # W^T K W, the inverse inertia tensor, and the centre of mass relative to the first particle.
+    # Terms for `rigid_rotation`: K W of each particle, W^T K W, the inverse inertia tensor, and the centre of
+    # mass relative to the first particle. W maps an angular velocity to velocities.
     particle_turning = declare(PARTICLE, REAL, (3, 3), when="implicit")
     body_turning = declare(BODY, REAL, (3, 3), when="implicit")
     body_inverse_inertia = declare(BODY, REAL, (3, 3), unit="1/(kg m^2)", when="implicit")
@@ -151,9 +151,9 @@ class BodyFields(FieldGroup):
     particle_hold = declare(PARTICLE, REAL, 4, when="implicit")
     hold_velocity = declare(PARTICLE, REAL, 3, unit="m/s", when="implicit")
     hold_friction = declare(PARTICLE, REAL, 3, unit="N s", when="implicit")
-    # Largest residual of the solves in the last step, relative to the load.
+    # Largest residual of the solves in the last step, divided by the load.
     body_residual = declare(BODY, REAL, start=0, keep=BODY, inherited=True, when="implicit")
-    solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, maximum number of iterations
+    solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, largest number of iterations
 
     # The following fields are only for the schedule `flat`.
     corner_force = declare(  # corner by corner in each block
@@ -186,16 +186,17 @@ class BodyFields(FieldGroup):
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
-    # Bounding box at the time of the last query that used the box.
+    # Bounding box that the last query computed.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
     body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
     # Overlap with other bodies, in a world with soft contact: CLEAR, JUST_PLACED or OVERLAPPING.
     body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
-    # Bounding box of the path in a step, of the surface during a search for contacts, or of a sleeping body.
+    # Bounding box: of the body's path in a step while islands are searched, of its surface while contacts are
+    # searched, or of the body while it sleeps or skips a step.
     body_bounds_lower = declare(BODY, REAL, 3, unit="m", keep=BODY)
     body_bounds_upper = declare(BODY, REAL, 3, unit="m", keep=BODY)
-    # Rest timer: time since a particle was faster than `sleep_speed`.
+    # Rest timer: time for which no particle was faster than `sleep_speed`.
     body_calm_time = declare(BODY, REAL, unit="s", start=0, keep=BODY)
     # Bits that show what acts on the body, see `bodies.status`.
     body_drives = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True)
@@ -208,17 +209,17 @@ class BodyFields(FieldGroup):
     body_fading = declare(BODY, REAL, unit="1/s", start=LOADED, keep=BODY, inherited=True)
     # Longest time between two dampings of vibrations.
     body_fading_interval = declare(BODY, REAL, unit="s", start=LOADED, keep=BODY, inherited=True)
-    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 in the last retry of a step, for strong damping
+    body_is_braked = declare(BODY, ti.i32, start=0)  # 1 in the last attempt at a step, for strong damping
     # Number of steps with inverted tetrahedra. It is negative during a restoration, see `untangling`.
     body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
-    body_jolted = declare(BODY, ti.i32, start=0)  # 1 if the substeps of a step were too long
-    # Number of substeps that the present shape needs, relative to the number at rest.
+    body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was retried because its substeps were too long
+    # Number of substeps that the present shape needs, divided by the number at rest.
     body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
     body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge length of the surface
     # Distance that sound travels in the longest stable substep at rest.
     body_stride = declare(BODY, REAL, unit="m", start=LOADED)
     body_sound_speed = declare(BODY, REAL, unit="m/s", start=LOADED, keep=BODY, inherited=True, most=FINITE)
-    # Maximum number of retries of a failed step, each with twice the substeps.
+    # Largest number of retries of a failed step. Each retry has twice the substeps.
     retries = declare(WORLD, ti.i32)
     block_model = declare(BLOCK, ti.i32, start=LOADED)
 
@@ -238,8 +239,8 @@ class BodyFields(FieldGroup):
         self.real = ti.f64 if capacity.double else ti.f32
         super().__init__(capacity, self.real)
         fields = [(each, field) for _, each, field in self.declared()]
-        # `spawn_body` resets the fields of `body_starts` in a slot. When a body is cut, its pieces get its
-        # values of the fields in `inherited`.
+        # `spawn_body` resets the fields in `body_starts`. The pieces of a cut body get that body's values of
+        # the fields in `inherited`.
         self.body_starts = [
             (field, each.start)
             for each, field in fields
@@ -351,7 +352,7 @@ class BodyFields(FieldGroup):
         fill, order = self.loader.fill, np.argsort(corners[:, 0], kind="stable")
         fill(self.corner_slot, corners[order, 1])
         fill(self.particle_corners, _row_ranges(corners[:, 0], count))
-        numbers = np.flatnonzero(edges[:, 0] != edges[:, 1])  # without the spare rows
+        numbers = np.flatnonzero(edges[:, 0] != edges[:, 1])  # the edges without the spare rows
         ends = edges[numbers].T.reshape(-1)
         incident = np.concatenate([numbers, -1 - numbers])
         fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
@@ -437,8 +438,8 @@ Kind = TypeVar("Kind", bound=BodyFields)
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
     """Return free fields of a kind that can hold a capacity, or make new fields.
 
-    The function prefers fields with compiled kernels for `program`, and then the smallest fields. If the
-    garbage of closed worlds can contain such fields, it is collected first.
+    The function prefers fields with compiled kernels for `program`, and then the smallest fields. If closed
+    worlds that await garbage collection can contain such fields, the function collects garbage first.
     """
     fields = _best(kind, capacity, program)
     if (fields is None or program not in fields.programs) and len(_free) < len(_made):

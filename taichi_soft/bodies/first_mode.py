@@ -15,24 +15,27 @@ from taichi_soft.core.residue import rounded
 Floats = NDArray[np.float64]
 
 _EXTRA_MODES = 3
-"""Number of modes computed in addition to the requested modes: round bodies have several modes of equal
-frequency."""
+"""Number of modes that are computed in addition to the requested modes. They are needed for round bodies,
+which have several modes of equal frequency."""
 
 _CHUNK = 4
-"""Number of columns that are multiplied by the stiffness matrix at once. More do not fit into the cache."""
+"""Number of columns that are multiplied by the stiffness matrix at once. More columns would not fit into
+the cache."""
 
 _MAX_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
-"""The search ends when the relative change of the squared frequency over `_WINDOW` iterations is below
-`_CHANGE`. In long bodies, a single iteration can change the frequency little long before convergence."""
+"""The search for modes ends when the squared frequency changes by less than the fraction _CHANGE in
+_WINDOW iterations. A single iteration is not enough: in a long body, it can change the frequency very
+little although the search is far from converged."""
 
 _ROUND_OFF = 1e-9
-"""Length of a direction, relative to the longest direction, below which it is discarded as round-off.
-Normalised round-off would contain rigid motion. Bodies of few tetrahedra soon have no new directions."""
+"""Smallest length of a search direction, as a fraction of the longest direction. Shorter directions are
+round-off and are discarded, because they would contain rigid motion after normalisation. They appear soon
+in bodies of few tetrahedra."""
 
 MAX_PARTS = 30
-"""Largest number of separate components whose rigid motions are removed. A body with more components
-counts as undamped."""
+"""Largest number of separate components of a body whose rigid motions are removed. A body with more
+components counts as undamped."""
 
 
 def first_frequency(body: BodyDescription) -> float:
@@ -84,7 +87,7 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
     if deformed.shape[1] == 0:
         return np.zeros(0), np.zeros((0, *body.mesh.vertices.shape))
     scale, block = vibration.diagonal()[:, None], count + _EXTRA_MODES
-    # Without a random direction, modes orthogonal to all polynomials would appear only through round-off.
+    # Without a random direction, only round-off would produce modes that are orthogonal to all polynomials.
     random_direction = np.random.default_rng(0).normal(size=(len(deformed), 1))
     random_direction -= rigid @ (rigid.T @ random_direction)
     deformed = np.hstack([deformed, random_direction / np.linalg.norm(random_direction)])

@@ -181,7 +181,7 @@ def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArr
     double = positions.dtype == np.float64
     cached = _cached.get(double)
     if cached is not None:
-        last_body = cached.body  # the parts are compared, because each call makes a new object
+        last_body = cached.body  # compare the parts, because each call makes a new object
         if (last_body.mesh, last_body.material, last_body.model) != (body.mesh, body.material, body.model):
             del _cached[double], cached  # frees the fields of the last body
     if double not in _cached:

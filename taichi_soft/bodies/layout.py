@@ -67,11 +67,11 @@ class BodyArrays:
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
-    hull: HullArrays | None = None  # hull that makes contact instead of `outer`
+    hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
 
     @property
     def expansion_modulus(self) -> Floats:
-        """Pressure of each tetrahedron on its edges per relative change of volume, (m,) [Pa].
+        """Pressure of each tetrahedron on its edges, divided by its relative change of volume, (m,) [Pa].
 
         The pressure is zero if the law has no expansion.
         """
@@ -176,7 +176,7 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices
-    # Every block is full, except blocks with the last edges of a particle.
+    # All blocks are full, except those that contain the last edges of a particle.
     blocks = (edges + (LANES - 1) * particles) // LANES
     return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
@@ -286,7 +286,7 @@ def _edge_blocks(first_ends: Ints) -> Ints:
     starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
     counts = np.diff(np.r_[starts, len(first_ends)])
     halves = -(-counts // HALF)
-    # Number of each half, counted from 0 for each first end.
+    # Index of each half among the halves with the same first end.
     number = np.arange(halves.sum()) - np.repeat(np.cumsum(halves) - halves, halves)
     rows = np.repeat(starts, halves) + number * HALF
     sizes = np.minimum(np.repeat(counts, halves) - number * HALF, HALF)

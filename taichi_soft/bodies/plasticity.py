@@ -10,7 +10,7 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
 
 _UNLIMITED = 1e30
-"""Number used instead of infinity, because kernels must not use infinity."""
+"""Number that replaces infinity in kernels, which must not use infinity."""
 
 
 @serialised("yield_stress", "yield_strain", "creep", "maximum")
@@ -30,8 +30,8 @@ class Plasticity:
             related by yield_stress = 3 G yield_strain, with the shear modulus G.
         creep: rate of flow [1/s]. The excess strain falls to 1/e in a time of 1/creep. Infinity: the excess
             strain flows within one step.
-        maximum: largest equivalent logarithmic plastic strain: a tetrahedron can become e^maximum times as
-            long permanently. Elongated tetrahedra need shorter substeps, which `World.stable_substeps` does
+        maximum: largest equivalent logarithmic plastic strain. A tetrahedron can permanently become e^maximum
+            times as long. Elongated tetrahedra need shorter substeps, which `World.stable_substeps` does
             not consider.
     Raises: OptionError for a value out of range, or unless exactly one yield point is given.
     """

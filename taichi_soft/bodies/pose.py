@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _REGULARISATION = 1e-10
-"""Weight that prefers the smallest rotation. The weight has an effect only if the shape does not determine
-the rotation: for a straight rope about its axis, or for a body shrunk to a point."""
+"""Weight with which small rotations are preferred. It has an effect only if the shape does not determine
+the rotation, for example about the axis of a straight rope, or for a body shrunk to a point."""
 
 
 @dataclass(frozen=True, eq=False)

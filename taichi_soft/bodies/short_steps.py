@@ -14,11 +14,12 @@ from taichi_soft.meshing import TetMesh
 _log = logging.getLogger(__name__)
 
 LATTICE_STEP = 0.33
-"""Stable step of a lattice that fills space, relative to the time cell / sqrt(young / density)."""
+"""Stable step of a lattice that fills space, divided by the time cell / sqrt(young / density)."""
 
 WARNING_RATIO = 4.0
-"""A warning is logged if the stable step of a lattice is longer than the mesh's step by a larger factor. A
-lattice whose outer vertices are moved onto a surface can need steps half as long as a plain lattice."""
+"""Largest ratio of a lattice's stable step to the mesh's stable step without a warning. Even a good mesh
+has a ratio above 1. For example, a lattice whose outer vertices are moved onto a surface can need steps half
+as long."""
 
 RUBBER = Material(young=1e6, poisson=0.3, density=1000.0, damping_ratio=0.0)
 """Material for the comparison of a mesh with a lattice. The choice is arbitrary."""

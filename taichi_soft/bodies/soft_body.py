@@ -116,8 +116,8 @@ class Context:
     handles: Handles
     slots: Pools[SoftBody]
     layout: Scene
-    renew_substeps: Callable[[], None]  # must be called after a body's mesh or material has changed
-    # Makes the handle of a body for the next free slot of an asset.
+    renew_substeps: Callable[[], None]  # call this after a body's mesh or material has changed
+    # Function that makes the handle of a body for the next free slot of an asset.
     make_handle: Callable[[Any, SoftBodyAsset], SoftBody]
     slices: list[Slice] = field(default_factory=list)
     fields: Built | None = None  # set by `World.build`
@@ -144,8 +144,8 @@ class Slice:
     """Base class of an optional feature of a world, such as grabs. Only the slice uses the feature's data."""
 
     name = ""  # name of the slice's part of a snapshot
-    prevents_cuts = True  # True if a body that the slice constrains cannot be cut or torn
-    prevents_levels = True  # True if a body that the slice constrains cannot change its level
+    prevents_cuts = True  # True if the slice prevents cuts and tears of the bodies that it constrains
+    prevents_levels = True  # True if the slice prevents changes of level of the bodies that it constrains
 
     def __init__(self, context: Context) -> None:
         """Create an empty slice."""
@@ -219,7 +219,7 @@ class BodyRecord:
 
     description: BodyDescription  # description with the present mesh and material
     first_step: int  # step in which the body was added
-    present: BodyArrays | None = None  # arrays during a gradual change of material; else None
+    present: BodyArrays | None = None  # arrays while the material changes gradually; else None
     removed_in: int | None = None  # step in which the body was removed
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # computed at the first request
@@ -228,7 +228,8 @@ class BodyRecord:
     skin_meshes: tuple[Any, ...] | None = None  # created at the first request
     level: int = 0  # level of detail; 0 is the finest
     friction: float | None = None  # None: the asset's friction
-    held: NDArray[np.int64] | None = None  # vertices of the finest level pinned at the last change of level
+    # Pinned vertices at the last change of level, as vertices of the finest level.
+    held: NDArray[np.int64] | None = None
 
     def set_topology(self, part: CutMesh | None, level: int = 0) -> None:
         """Set the level of detail, and the part of the asset's mesh that cuts have left (None if uncut)."""
@@ -421,7 +422,7 @@ def context_of(body: SoftBody) -> Context:
 
 
 def belongs_to(body: SoftBody, context: Context) -> bool:
-    """True if a body was made in a context, even if the body was removed since."""
+    """True if a body was made in this context. The result stays True after the body is removed."""
     return body._context_ref() is context
 
 

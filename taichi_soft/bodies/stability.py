@@ -32,21 +32,23 @@ from taichi_soft.meshing import BodyMesh, TetMesh
 Floats = NDArray[np.float64]
 
 MARGIN = 0.9
-"""Recommended substep, relative to the limit for small motion. The margin is necessary, because compression
-makes elements stiffer than at rest."""
+"""Recommended substep, as a fraction of the largest stable substep for small motion. The margin is
+necessary, because compression makes elements stiffer than at rest."""
 
 _MAX_ITERATIONS = 120
 _MIN_ITERATIONS = 30
-"""Regular meshes have many nearly equal eigenvalues. With fewer iterations, the largest one can be missed."""
+"""Smallest number of iterations of Lanczos' method. Regular meshes have many nearly equal eigenvalues, so
+fewer iterations could miss the largest eigenvalue."""
 
 _RESIDUAL = 0.02
-"""Relative residual at which Lanczos' method ends. For safety, the eigenvalue is increased by this fraction,
-which shortens the step by 1 %."""
+"""Relative residual at which Lanczos' method ends. For safety, the eigenvalue is then increased by this
+fraction, which shortens the step by 1 %."""
 
 _DAMPING_PASSES = 8
 
 SLIVER_ANGLE = 15.0
-"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver; a regular tetrahedron has 70.5."""
+"""Dihedral angle [degrees] below which a tetrahedron counts as a sliver. A regular tetrahedron has
+dihedral angles of 70.5 degrees."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class StableStep:
     period: float  # [s], period of the fastest vibration
     stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges
     undamped: float = 0.0  # [s], limit without damping
-    slivers: int = 0  # number of flat tetrahedra whose limit is below half of the first percentile
+    slivers: int = 0  # number of flat tetrahedra with a limit below half of the limits' first percentile
     without_slivers: float = 0.0  # [s], approximate limit without slivers
     tets: int = 0  # number of tetrahedra of the body
 
@@ -175,7 +177,7 @@ def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tupl
     basis[0] = (start / np.linalg.norm(start)).ravel()
     for k in range(1, _MAX_ITERATIONS + 1):
         image = apply(basis[k - 1].reshape(shape)).ravel()
-        for _ in range(2):  # repeated, because round-off spoils the first orthogonalisation
+        for _ in range(2):  # twice, because round-off spoils the first orthogonalisation
             part = basis[:k] @ image
             image = image - part @ basis[:k]
             small[:k, k - 1] += part

@@ -1,22 +1,25 @@
 """Numbers in the fields of bodies that encode their status and control."""
 
 ACTIVE, FROZEN, ASLEEP, SKIPPING, ABSENT = 0, 1, 2, 3, 4
-"""Status of a body, in this order: it moves; it is frozen, because it became non-finite; it is asleep; it
-skips the next step; it is absent, and its slot is empty."""
+"""Values of `body_status`. ACTIVE: the body moves. FROZEN: it became non-finite and is frozen. ASLEEP: it
+sleeps. SKIPPING: it skips the next step. ABSENT: the slot is empty."""
 
 MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4, 8, 16, 32, 64
-"""Bits of `body_drives`, in this order: some pinned particles have targets; reactions of pinned particles are
-summed; `particle_push` acts in the next step; `body_damping` is not zero; wind does not act on the body; a
-grab pulls the body; a joint connects the body to another body."""
+"""Bits of `body_drives`. MOVES_PINS: a pinned particle has a target. FEELS_REACTION: reactions of pinned
+particles are summed. PUSHED: `particle_push` acts in the next step. DAMPED: `body_damping` is not zero.
+SHELTERED: wind does not act on the body. GRABBED: a grab pulls the body. JOINED: a joint connects the body
+to another body."""
 
 PLACED = -1000
-"""Value of `body_patience` after a body was placed. Its tetrahedra can then be inverted."""
+"""Value of `body_patience` directly after the caller set the shape of a body. The shape can have inverted
+tetrahedra."""
 
 CLEAR, JUST_PLACED, OVERLAPPING = range(3)
-"""Overlap of a body with other bodies in a world with soft contact. In this order: no overlap; unknown until
-the next step, because the body was just placed; an overlap that contact resolves."""
+"""Values of `body_overlap` in a world with soft contact. CLEAR: the body overlaps no other body.
+JUST_PLACED: the body was just placed, and the next step must check it. OVERLAPPING: contact is resolving
+an overlap."""
 
 STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
-"""Values of `particle_aim`, the motion of a pinned particle in the next step. In this order: it does not
-move; it moves to its target; it has reached its target, and its velocity must be cleared; it moves with a
-frame, whose number is added to the value."""
+"""Values of `particle_aim`, the motion of a pinned particle in the next step. STILL: the particle does not
+move. TO_TARGET: it moves to its target. ARRIVED: it has reached its target, and its velocity must be
+cleared. WITH_FRAME: it moves with a frame, whose number is added to the value."""

@@ -112,8 +112,8 @@ class TetVibration(Vibration):
         assert isinstance(mesh, TetMesh)
         quarters = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
         ratios = np.repeat((self.body.masses / quarters)[mesh.tets], 3, axis=1)[:, None, :]
-        # The floor keeps C positive definite in spite of round-off for Poisson's ratios near -1 and 1/2. The
-        # floor is negligible relative to the largest entry.
+        # Without this floor, round-off can make C indefinite for Poisson's ratios near -1 and 1/2. The floor
+        # is negligible relative to the largest entry.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
         gram = np.swapaxes(root, 1, 2) @ ((self.strains / ratios) @ np.swapaxes(self.strains, 1, 2)) @ root

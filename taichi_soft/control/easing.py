@@ -30,16 +30,15 @@ Floats = NDArray[np.float64]
 
 SHORTEST, PERIODS = 0.5, 8.0
 """SHORTEST is the smallest duration of a change [s]. PERIODS is the smallest product of the duration and
-the angular frequency of the slowest mode. A change has the smallest duration
-that satisfies both limits."""
+the angular frequency of the slowest mode. A change has the smallest duration that satisfies both limits."""
 
 HELD = 6.4
 """Frequency of a free beam, as a multiple of the frequency of the same beam held at one end. The value is
 (4.730 / 1.875)^2, from the roots of the bending equation."""
 
 FADING = 2.0
-"""Exponent in the damping of vibrations during a change. Vibrations are damped in proportion to
-k^-FADING, where k is the stiffness. The value 2 damps the slowest mode critically."""
+"""Exponent in the damping of vibrations during a change. Vibrations are damped in proportion to k^-FADING,
+where k is the stiffness. The value 2 damps the slowest mode critically."""
 
 TIMES_A_STEP = 8.0
 """Smallest number of times that vibrations are damped in each step of a change. See `kept_vibration`."""

@@ -8,13 +8,13 @@ from taichi_soft.core.math.triangle import solid_angle
 from taichi_soft.core.runtime import ti
 
 INSIDE = 6.283
-"""Solid angle [sr] above which a point counts as inside. For a closed surface, the angle is 4 pi inside and 0
-outside."""
+"""Solid angle of a body's surface, seen from a point, above which the point counts as inside [sr]. The
+solid angle of a closed surface is 4 pi from inside and 0 from outside."""
 
 
 @ti.func
 def face_count(state: ti.template(), body):
-    """Return the number of triangles of a body; without triangles, the number of vertices.
+    """Return the number of triangles of a body, or of vertices if the body has no triangles.
 
     An absent body has no faces.
     """

@@ -23,10 +23,10 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 _ITERATIONS = 12
-"""Number of iterations in `_excess`. At twice the yield strain, eight iterations are exact to float32."""
+"""Number of iterations in `_excess`. At twice the yield strain, eight iterations give float32 precision."""
 
 _MAX_STRAIN = 1e6
-"""Strain above which a tetrahedron does not flow, because its body is diverging."""
+"""Largest strain with which a tetrahedron flows. A larger strain means that the body is diverging."""
 
 
 @ti.func
@@ -49,7 +49,10 @@ def _equivalent(v):
 
 @ti.func
 def _excess(logarithms, limit):
-    """Return the fraction of the deviator of logarithmic strains above the yield strain `limit`, 0 to 1."""
+    """Return the fraction of the strain deviator that exceeds the yield strain `limit`, 0 to 1.
+
+    Args: logarithms: principal logarithmic strains.
+    """
     deviator = _deviator(logarithms)
     mean = logarithms - deviator
     kept = logarithms.x * 0.0 + 1.0

@@ -8,8 +8,9 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 RING, SMALL_RING = 9, 7
-"""Largest number of vertices in a ring around a render vertex, in any block and in the first blocks. Most
-render vertices have six triangles, which need seven vertices. Eight triangles need nine vertices."""
+"""RING is the largest number of entries of the ring around a render vertex. SMALL_RING is the largest
+number in the first blocks of the table. A closed ring repeats its first vertex, so eight triangles need
+nine entries. Most render vertices have six triangles, which need seven entries."""
 
 STRIDE = (1 + RING) * LANES
 """Number of entries of a block in the table of `render_table`."""
@@ -18,7 +19,8 @@ BLOCK_BITS = (1 << 24) - 1
 """Mask that leaves block numbers unchanged. It proves to the compiler that indices cannot overflow."""
 
 NO_LENGTH = 1e-37
-"""Squared norm [m^4] below which a sum of triangle normals counts as zero, near float32's limit."""
+"""Squared norm of a sum of triangle normals, below which the sum counts as zero [m^4]. It is near the
+smallest number of float32."""
 
 
 @ti.func
@@ -44,7 +46,10 @@ def _block_count(positions: ti.template()):
 
 @ti.func
 def _sum_of_ring(positions: ti.template(), table: ti.template(), place, length: ti.template()):
-    """Return the sum of normals of the triangles around a render vertex, each times twice the area [m^2]."""
+    """Return the sum of the normals of the triangles around a render vertex [m^2].
+
+    The length of each normal is twice the area of the triangle.
+    """
     a = _row(positions, table[place])
     one = _row(positions, table[place + LANES]) - a
     n = ti.Vector.zero(ti.f32, 3)

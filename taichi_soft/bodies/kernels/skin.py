@@ -6,8 +6,8 @@ from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
 FRAME = 12
-"""Number of values stored for each vertex of the body: the columns of the deformation gradient F, and
-x - F X / 2 with the position x and the rest position X."""
+"""Number of values stored for each vertex of the body: the columns of the deformation gradient F, and the
+vector x - F X / 2, where x is the position and X the rest position."""
 
 ROW = 10
 """Number of values per skin vertex: four weights, the position q (see `bodies.skin`), the normal at rest."""
@@ -16,7 +16,7 @@ LANES = 16
 """Number of skin vertices that are stored and computed together."""
 
 NO_LENGTH = 1e-30
-"""Squared norm below which a normal counts as zero, near float32's limit."""
+"""Squared norm below which a normal counts as zero. It is near the smallest number of float32."""
 
 
 def interleaved(rows: np.ndarray) -> np.ndarray:
