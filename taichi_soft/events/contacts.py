@@ -16,11 +16,12 @@ from taichi_soft.events.event_state import CONTACT_WIDTH, HandleLookup
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
 
 CONTACT_PAUSE = 0.05
-"""Time without an impulse [s] after which a contact ends. Single vertices of a body that rests, rolls or
-slides leave the ground and touch it again. A hop of this duration is 3 mm high."""
+"""Time without an impulse after which a contact ends [s]. It is longer than the hops of single vertices of
+a body that rests, rolls or slides. A hop of this duration is 3 mm high."""
 
 Key = tuple[int, int, int]
-"""Row of `read_touches`: index of a body, kind of the other object, index of the other object."""
+"""Key of a contact: index of a body, kind of the other object, index of the other object. See
+`read_touches`."""
 
 Vector = tuple[float, float, float]
 
@@ -31,8 +32,8 @@ class _Contact:
     b: Collider | SoftBody
     began: float  # [s], start of the first step with an impulse
     touched: float  # [s], end of the last step with an impulse or with both objects at rest
-    pause: float = 0.0  # [s] time since `touched` in which either object moved
-    impulse: Vector = (0.0, 0.0, 0.0)  # [N s]
+    pause: float = 0.0  # [s], time after `touched` during which one or both objects moved
+    impulse: Vector = (0.0, 0.0, 0.0)  # [N s], total impulse on the second object
 
     def add(self, impulse: Vector, time: float) -> None:
         """Add the impulse of the step that ends at `time` [s]."""
@@ -41,9 +42,9 @@ class _Contact:
         self.touched, self.pause = time, 0.0
 
     def skip(self, dt: float, time: float, is_moving: bool) -> None:
-        """Count a step without an impulse as pause if either object moves.
+        """Process a step without an impulse.
 
-        Otherwise, the contact continues.
+        The step is added to `pause` if one of the two objects moves. Otherwise, the contact continues.
         """
         if is_moving:
             self.pause += dt

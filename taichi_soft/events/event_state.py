@@ -20,8 +20,8 @@ from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
 
 CONTACT_WIDTH = 11
-"""Number of columns of a contact: key (3), serial numbers of both objects (2), `began`, `touched` and `pause`
-[s] (3), impulse [N s] (3)."""
+"""Number of columns of a contact in `EventState.contacts`: key (3), serial numbers of both objects (2),
+`began`, `touched` and `pause` [s] (3), impulse [N s] (3)."""
 
 _KINDS = {kind.__name__: kind for kind in STRESS_KINDS}
 

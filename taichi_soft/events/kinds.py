@@ -34,7 +34,7 @@ class Released(Event):
     """
 
     body: SoftBody  # body whose level of detail changed
-    handles: tuple[Attachment | Joint | Motor, ...]  # released handles, which are no longer alive
+    handles: tuple[Attachment | Joint | Motor, ...]  # the released handles, which are now invalid
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,9 @@ class ContactBegan(Event):
     `a` is always a soft body. `isinstance(event.b, Collider)` is True for a collider.
     """
 
-    a: SoftBody  # the body; of two bodies, the one with the smaller index
+    a: SoftBody  # the body; if two bodies touch, the body with the smaller index
     b: Collider | SoftBody  # the collider, or the other body
-    impulse: Floats  # (3,) impulse on `b` in that step [N s]; an impact can continue in the next step
+    impulse: Floats  # (3,) impulse on `b` in that step [N s]; an impact can last several steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +55,8 @@ class ContactEnded(Event):
 
     a: SoftBody  # as in `ContactBegan`
     b: Collider | SoftBody  # as in `ContactBegan`
-    impulse: Floats  # (3,) total impulse on `b` [N s], except impulses during sleep
-    duration: float  # [s] from the first to the last impulse, or to the end of a rest after the last impulse
+    impulse: Floats  # (3,) total impulse on `b` [N s], without impulses during sleep
+    duration: float  # [s] from the first to the last impulse, including a rest after it
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class StressExceeded(Event):
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) tetrahedra that newly exceed the stress, ascending
+    tetrahedra: Ints  # (k,) tetrahedra that began to exceed the stress in this step, ascending
     stress: Floats  # (k,) von Mises stress [Pa], see `Body.tet_stress`
 
 
@@ -80,9 +80,9 @@ class TearCandidates(Event):
     """
 
     body: SoftBody  # body of the tetrahedra
-    tetrahedra: Ints  # (k,) tetrahedra that newly exceed the stress, ascending
+    tetrahedra: Ints  # (k,) tetrahedra that began to exceed the stress in this step, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
-    normals: Floats  # (k, 3) direction of that stress, normal to the tear; the sign is arbitrary
+    normals: Floats  # (k, 3) direction of that stress, normal to the tear, with arbitrary sign
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ class EventLog:
         self._delivered = 0  # number of queued events that listeners have received
         self._listeners: list[Listener] = []
         self._is_draining = False
-        self._has_warned = False  # True if a loss was reported since the last drain
+        self._has_warned = False  # True if a loss was reported after the last drain
         self.dropped = 0
 
     def record(self, kinds: Iterable[type[Event]]) -> None:
@@ -184,7 +184,7 @@ class EventLog:
         """
         self._delivered += len(events)
         self._listeners = [listener for listener in self._listeners if listener.is_active]
-        listeners, errors = tuple(self._listeners), []  # new listeners receive only later events
+        listeners, errors = tuple(self._listeners), []  # listeners added now receive only later events
         for event in events:
             for listener in listeners:
                 if listener.is_active and isinstance(event, listener.kind):

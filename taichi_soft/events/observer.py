@@ -64,7 +64,7 @@ class Observer:
         self._status = self._read[:-2]  # status of the body in each slot after the last step
         self._pairs = np.zeros((rows, 3), dtype=np.int32)
         self._impulses = np.zeros((rows, 3), dtype=np.float32)
-        self.lost_touches = False  # True if too many pairs touched in the last step to record all of them
+        self.lost_touches = False  # True if more pairs touched in the last step than can be recorded
 
     @property
     def has_contacts(self) -> bool:
@@ -155,7 +155,7 @@ class Observer:
             self._contacts = Contacts()
         if saved.status is not None:
             self._status[:] = saved.status
-            # A body spawned after the last step can occupy the slot of a body that slept.
+            # The slot of a body that slept can now contain a body that was spawned after the last step.
             asleep = self._sleeping().items()
             self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
         elif kinds & (CONTACT_KINDS | SLEEP_KINDS):

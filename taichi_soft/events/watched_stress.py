@@ -19,9 +19,9 @@ from taichi_soft.events.event_state import HandleLookup, WatchEntry
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 
 RESET_FRACTION = 0.9
-"""Fraction of a threshold below which the stress of a tetrahedron must fall before the tetrahedron can exceed
-the threshold again. Otherwise, a tetrahedron that vibrates about the threshold would exceed the threshold in
-every other step."""
+"""Fraction of a threshold below which a tetrahedron's stress must fall before the tetrahedron can be
+reported again. Without this condition, a tetrahedron that vibrates about the threshold would be reported
+in every other step."""
 
 VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 """Columns of `read_stress`."""
@@ -66,7 +66,7 @@ class StressWatches:
             self._watches[kind, body] = _Watch(body, threshold, self._none_above(body))
         self._arrange()
         if len(self._blocks):
-            self._evaluate()  # compile the kernel now, not in the game's next step
+            self._evaluate()  # compiles the kernel now instead of in the next step of the game
 
     def _none_above(self, body: SoftBody) -> NDArray[np.bool_]:
         return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)

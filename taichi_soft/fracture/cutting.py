@@ -48,8 +48,8 @@ from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertice
 Floats = NDArray[np.float64]
 
 MIN_FRAGMENT = 0.02
-"""Smallest volume of a torn-off piece that becomes a new body, relative to the volume of the asset. Smaller
-pieces stay in the body."""
+"""Smallest volume with which a torn-off piece becomes a new body, as a fraction of the asset's volume.
+Smaller pieces remain parts of the torn body."""
 
 
 def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:

@@ -21,12 +21,12 @@ from taichi_soft.meshing.splitting import InnerFaces
 Floats = NDArray[np.float64]
 
 _WORST_FRACTION = 0.9
-"""Smallest stress of a face that tears in a step, relative to the largest stress. The other faces are checked
-again in the next step, after the tear has redistributed the load."""
+"""Smallest stress with which a face tears in a step, as a fraction of the largest stress of all faces. All
+other faces are checked again in the next step, when the tear has redistributed the load."""
 
 _TIP_FACTOR = 2.0
-"""Factor on the stress at the end of a tear, where the tetrahedra are too coarse to resolve the peak. Because
-of this factor, a tear continues before another tear begins."""
+"""Factor by which the stress at the end of a tear is multiplied, because the tetrahedra there are too
+coarse to resolve the peak of the stress. With this factor, a tear continues before another tear begins."""
 
 
 class Tears(Slice):

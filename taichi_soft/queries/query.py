@@ -15,7 +15,7 @@ from taichi_soft.core.errors import OptionError
 Floats = NDArray[np.float64]
 
 _UNLIMITED = 3e38
-"""Limit that replaces infinity [m or m^2]. The kernels do not handle infinity."""
+"""Largest distance [m] or squared distance [m^2]. It replaces infinity, which the kernels do not handle."""
 
 
 def as_max_distance(max_distance: float) -> float:
@@ -31,7 +31,7 @@ def as_max_distance(max_distance: float) -> float:
 def next_above(limit: float) -> float:
     """Return the next float32 above `limit`.
 
-    Kernels accept only distances below their limit, but a distance equal to `limit` must count too.
+    Kernels accept only distances below the limit that they get, but a distance equal to `limit` is valid.
     """
     return float(np.nextafter(np.float32(min(limit, _UNLIMITED)), np.float32(np.inf)))
 

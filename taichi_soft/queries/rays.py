@@ -115,8 +115,8 @@ def _hits(
 
 
 _MIN_PARALLEL_RAYS = 32
-"""Smallest number of rays for which several threads are used. Waking the threads takes as long as about 30
-rays."""
+"""Smallest number of rays for which several threads are used. Waking the threads takes as long as tracing
+about 30 rays."""
 
 
 def _unit_directions(rows: Floats, name: str) -> Floats:

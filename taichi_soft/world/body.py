@@ -107,7 +107,7 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def solve_residual(self) -> float | None:
-        """Largest residual of the last step's implicit solves, over the load on the body.
+        """Largest residual of the implicit solves of the last step, divided by the load on the body.
 
         None before the first step, and with integrators other than "implicit_euler".
         """

@@ -24,7 +24,8 @@ from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body import Body
 
 MOST_VERTICES = 10_000_000
-"""Largest number of vertices of a world. With more, the indices of element constants would exceed 32 bits."""
+"""Largest number of vertices of a world. With more vertices, indices of element constants would need more
+than 32 bits."""
 
 
 def require_open(context: WorldContext) -> None:

@@ -29,7 +29,7 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
 
 SHORTEST = 1e-6
-"""Length of a step in which no visible motion occurs [s]."""
+"""Length of a trial step [s]. It is so short that no visible motion occurs."""
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -134,7 +134,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.unpin([0])
     for each in context.slices:
         each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
-    carry([body], np.eye(3), place, place, keep=True)  # like `teleport`, but without its checks
+    carry([body], np.eye(3), place, place, keep=True)  # the kernels of `teleport`, without its checks
     body.set_motion(body.positions(), body.velocities())
 
 
@@ -144,7 +144,7 @@ def _measure(context: WorldContext, body: Body) -> None:
     if len(body.tets):
         body.tet_stress()
     if body.asset.plasticity is not None:
-        body.plastic_strains()  # compiles the kernel that stress and tearing also use
+        body.plastic_strains()  # compiles a kernel that stress and tearing also use
 
 
 def _ask(context: WorldContext) -> None:
@@ -152,7 +152,7 @@ def _ask(context: WorldContext) -> None:
     context.built.islands()
     state, slots, far = context.built.state, context.slots.slots, np.array([0.0, 0.0, 1e4])
     cast_ray(state, slots, far, -UP, math.inf, None, True)
-    for count in (1, 1000):  # a few rays are traced by one thread, many by all threads
+    for count in (1, 1000):  # one kernel traces few rays in one thread, another traces many in all threads
         cast_rays(state, slots, np.tile(far, (count, 1)), np.tile(-UP, (count, 1)), math.inf, None, True)
     find_closest_point(state, slots, far, math.inf, None)
     find_in_sphere(state, slots, far, 1.0, None)

@@ -39,7 +39,7 @@ from taichi_soft.world.world_queries import WorldQueries
 from taichi_soft.world.world_states import WorldStates
 
 MOST_RETRIES = 10
-"""Largest value of `retries`. It allows 1,024 times the requested substeps."""
+"""Largest value of `retries`. The last of 10 retries has 1,024 times the requested substeps."""
 
 
 class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
@@ -66,16 +66,16 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler" or "implicit_euler". "implicit_euler" is
             stable for every step, but solves a linear system per step, and its damping grows with the step.
             If an edge would change by more than half its length, the step is divided into 2 to 32 parts.
-        tolerance: largest residual of implicit solves, over the load on the body, 1e-6 to 0.5.
+        tolerance: largest residual of implicit solves, divided by the load on the body, 1e-6 to 0.5.
         most_iterations: largest number of iterations of an implicit solve. If a solve needs more, the last
             iterate is used, with a `SolverWarning`.
         schedule: "auto", "per_body" or "flat", the loop structure of the computation. It does not change the
             physics.
         soft_contact: True for contact between soft bodies. None means True if bodies can touch: if
             there is more than one slot for bodies, or an asset whose bodies touch themselves.
-        sleep_speed: largest speed for sleep [m/s]. A body falls asleep if its particles, and the particles of
-            all bodies that it can touch, were slower for 0.5 s. The body wakes when something approaches it
-            or acts on it. None means 0.02 m/s; 0 turns sleep off.
+        sleep_speed: largest speed for sleep [m/s]. A body falls asleep after its particles, and the particles
+            of all bodies that it can touch, have been slower for 0.5 s. The body wakes when something
+            approaches it or acts on it. None means 0.02 m/s; 0 turns sleep off.
         collider_room: least number of colliders that can be added after `build`. None means 15.
         sample_room: number of grid samples for colliders that are added after `build`. A `HeightFieldShape`
             or `MeshShape` uses `len(shape.samples)` of them while its collider exists.

@@ -31,7 +31,8 @@ from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
 
 SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears, Easings)
-"""Slices in the order in which a snapshot restores them. A slice comes after the slices that it needs."""
+"""Classes of all slices, in the order in which a snapshot restores them. Each slice comes after the slices on
+which it depends."""
 
 
 class WorldControl(WorldParts):
@@ -93,9 +94,9 @@ class WorldControl(WorldParts):
             position: position of the collider's origin, (3,) [m].
             rotation: rotation of the collider, matrix (3, 3) or quaternion (x, y, z, w).
             friction: Coulomb coefficient, 0 or more.
-            restitution: speed of a body's centre of mass after an impact over its speed before, 0 to 1, for
-                impacts faster than 0.5 m/s. The elasticity of the body limits the restitution; with None,
-                only the elasticity acts.
+            restitution: speed of a body's centre of mass after an impact, divided by its speed before the
+                impact, 0 to 1. It applies to impacts faster than 0.5 m/s. The elasticity of the body limits
+                the restitution; with None, only the elasticity acts.
             thickness: distance outside the shape at which contact begins [m].
             group, mask: groups as bits. A body and a collider collide if the mask of each contains a bit of
                 the other's group.

@@ -8,8 +8,9 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 26
-"""Number of columns of `read_motion`: position, velocity, position and velocity before the last step, inverse
-mass, collider contact, touch, mass, aim, target, external force, reaction."""
+"""Number of columns of `read_motion`. The columns are, in this order: position, velocity, position and
+velocity before the last step, inverse mass, collider contact, touch, mass, aim, target, external force,
+reaction."""
 
 
 @ti.func

@@ -6,7 +6,7 @@ from taichi_soft.core.runtime import ti
 
 POSITION, VELOCITY, EARLIER_POSITION, EARLIER_VELOCITY = 0, 3, 6, 9
 INV_MASS, MASS, AIM, TARGET, PUSH, REACTION = 12, 15, 16, 17, 20, 23
-"""First columns of the quantities in a row of `read_motion`. Columns before `INV_MASS` are interpolated."""
+"""First column of each quantity in a row of `read_motion`. Columns before `INV_MASS` are interpolated."""
 
 
 @ti.func
@@ -43,7 +43,7 @@ def _momenta(rows: ti.template(), x, v, center):
 def _rigid(rows: ti.template(), x, momentum, angular_momentum):
     """Return the rigid motion that has this momentum, and this angular momentum about the centre of mass.
 
-    If the arguments are a force and a torque instead, the results are accelerations instead of velocities.
+    If the arguments are a force and a torque instead, the results are the accelerations of a rigid motion.
 
     Returns: centre of mass [m]; velocity of the centre [m/s]; angular velocity [rad/s].
     """
@@ -54,7 +54,7 @@ def _rigid(rows: ti.template(), x, momentum, angular_momentum):
         mass += rows[i, MASS]
         inertia -= (rows[i, MASS] * arm).outer_product(arm)
     size = inertia[0, 0] + inertia[1, 1] + inertia[2, 2]
-    size += 1e-9 * size  # keeps the inertia regular if all particles lie on one line
+    size += 1e-9 * size  # keeps the inertia invertible if all particles lie on one line
     for k in ti.static(range(3)):
         inertia[k, k] -= size
     a = ti.Vector([inertia[0, k] for k in ti.static(range(3))])
