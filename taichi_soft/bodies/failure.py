@@ -13,7 +13,7 @@ class Failure:
     tetrahedron: int | None  # first tetrahedron that failed, in the caller's order; None if unknown
     step: int  # index of the step that was undone for this body, from 0
     substep: int | None  # substep in which the last attempt at that step failed; None if unknown
-    time: float  # [s], time of the last valid state, which the frozen body keeps
+    time: float  # [s], time of the last valid state; the frozen body stays in this state
     edge: tuple[int, int] | None = None  # first edge that failed, for a law along edges
 
 

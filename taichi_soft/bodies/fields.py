@@ -55,7 +55,8 @@ class BodyFields(FieldGroup):
     particle_velocity = declare(  # at a time half of `body_velocity_lag` before the position
         PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
     )
-    # Zero between steps. A force has four components, because the CPU loads and stores four floats at once.
+    # Force in a substep, zero between steps. The fourth component is always 0. It is stored because the CPU
+    # loads and stores four floats at once.
     particle_force = declare(PARTICLE, REAL, 4, unit="N", start=0)
     particle_mass = declare(PARTICLE, REAL, unit="kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True)
     particle_inv_mass = declare(  # 0 if pinned
@@ -371,8 +372,8 @@ def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=
     """Concatenate the rows of all bodies. Zeros pad the rows of each body to the length of its range.
 
     Args:
-        counted_from: kind of rows of the body to which the result of `rows_of` refers. These numbers are
-            converted to rows of the world.
+        counted_from: kind of rows that the result of `rows_of` contains as indices within the body. These
+            indices are converted to rows of the world.
         columns: number of leading columns to convert; None for all columns.
     """
     parts = []

@@ -177,7 +177,7 @@ _cached: dict[bool, StaticBody] = {}
 
 @in_turn
 def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
-    """Evaluate forces [N]. Reuse the static body of the last call for the same body."""
+    """Evaluate forces [N]. Reuse the static body of the last call if the body is the same."""
     double = positions.dtype == np.float64
     cached = _cached.get(double)
     if cached is not None:

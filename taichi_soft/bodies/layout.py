@@ -269,7 +269,10 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
 
 
 def _directed_edges(edges: Ints, particle_count: int) -> Ints:
-    """Orient the edges so that, for most particles, `HALF` divides the number of edges from the particle."""
+    """Orient the edges so that the number of edges that start at a particle is a multiple of `HALF`.
+
+    This is possible for most particles.
+    """
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
     owner = edge_owners(in_order, particle_count, HALF)

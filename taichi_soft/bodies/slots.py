@@ -33,8 +33,8 @@ class Pools(Generic[Kind]):
     def __init__(self) -> None:
         self.assets: list[SoftBodyAsset] = []  # asset of each slot
         self.slots: list[Kind | None] = []  # body in each slot
-        self.starts: dict[int, NDArray[np.float32]] = {}  # start rows of bodies added before build, by slot
-        self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # assets made by add_body, by content
+        self.starts: dict[int, NDArray[np.float32]] = {}  # initial rows of bodies from `add_body`, by slot
+        self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # assets that `add_body` made, by content
         self._free: dict[SoftBodyAsset, list[int]] = {}  # free slots of each asset, as heaps
         self._occupants: tuple[Kind, ...] | None = ()
 

@@ -71,10 +71,10 @@ class Built(Protocol):
         """Wake the body in a slot, or all bodies if `slot` is -1."""
 
     def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
-        """Wake sleeping bodies within range of a box, given by two opposite corners [m]."""
+        """Wake sleeping bodies near the box with the corners `lower` and `upper` [m]."""
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the present bounding box of a body and its skin, as two opposite corners [m]."""
+        """Return the present bounding box of a body and its hull, as lower and upper corner [m]."""
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
         """Return vertex positions, (n, 3) [m], interpolated by `alpha` between the last two steps."""
@@ -89,7 +89,7 @@ class Built(Protocol):
         """Return the present A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
-        """Check that no collider crushes points of a body's surface, (k, 3) [m]. Raises: OptionError."""
+        """Raise an OptionError if a point of a body's surface, (k, 3) [m], is too deep inside a collider."""
 
     def mark_joints_changed(self) -> None:
         """Record that joints between bodies have changed."""
@@ -273,12 +273,12 @@ class SoftBody(Handle):
 
     @property
     def index(self) -> int:
-        """Number of the body's slot in the world. After `World.despawn`, another body can get it."""
+        """Number of the body's slot in the world. `World.despawn` frees the number for another body."""
         return self._index
 
     @property
     def is_alive(self) -> bool:
-        """False once `World.despawn` has removed the body; reading its state then raises StateError."""
+        """False after `World.despawn` has removed the body. Reading its state then raises StateError."""
         return self._record.removed_in is None
 
     @property

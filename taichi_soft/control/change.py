@@ -62,7 +62,7 @@ def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles
 
 
 def mass_of(body: SoftBody, vertices: NDArray[np.int32]) -> float:
-    """Return the total mass of `vertices` [kg]. The masses are added in order, as in the native library."""
+    """Return the total mass of `vertices` [kg]. The order of addition is that of the native library."""
     return float(np.cumsum(body.masses[vertices])[-1])
 
 

@@ -116,7 +116,10 @@ class Froze(Event):
 
 @dataclass(frozen=True, eq=False)
 class Torn(Event):
-    """A body with `Tearing` tore after a step. `Body.cut` sends no event: its caller knows of the cut."""
+    """A body with `Tearing` tore after a step.
+
+    `Body.cut` sends no event, because its caller knows of the cut.
+    """
 
     body: SoftBody  # the largest piece; see `Body.topology_version`
     pieces: tuple[SoftBody, ...]  # new bodies, the largest first; () if the body stays connected

@@ -271,14 +271,14 @@ def refill_slot(
     arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
-    _write_kind(state, slot, asset)  # the last body in the slot can have had another material
+    _write_kind(state, slot, asset)  # the fields can contain another material, from the slot's previous body
     context.layout.bodies[slot] = arrays
 
 
 def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    """Write the constants of an asset into a slot, if they can differ from those of the slot's last body.
+    """Write the constants of an asset into a slot, if the slot can contain other constants.
 
-    They can differ if the asset has several levels of detail or can be cut.
+    A slot can contain other constants if the asset has several levels of detail or can be cut.
     """
     if context.slots.assets[slot].coarser or asset.spare_vertices:
         _write_kind(state, slot, asset)
@@ -310,7 +310,7 @@ def write_slot(
         motion: rows of the body's vertices, see `read_motion`.
         status: status of the body, such as `ACTIVE`.
         model_of: see `write_body`.
-        inverses: current inverse rest shapes, (m, 3, 3), if plasticity can have changed them; otherwise None.
+        inverses: current inverse rest shapes of a body with plasticity, (m, 3, 3); otherwise None.
     """
     write_body(state, slot, status, model_of, motion, *body_rows(arrays, inverses))
     write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)

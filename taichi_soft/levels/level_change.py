@@ -2,9 +2,9 @@
 
 `Passage` maps the positions and velocities before and after the last step to the new mesh, by the same scheme
 as a skin. If the body is free, its positions are then shifted and a rigid motion is added to its velocities.
-This preserves centre of mass, momentum and angular momentum to round-off. Deformation that is finer than the
-new mesh is lost with its energy. A body that is held stays held at the corresponding vertices of the new
-mesh.
+The shift and the rigid motion preserve centre of mass, momentum and angular momentum to round-off.
+Deformation that is finer than the new mesh is lost with its energy. A body that is held stays held at the
+corresponding vertices of the new mesh.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _reattach(
         if each.prevents_levels and isinstance(each, Numbered):
             released += each.holding(body)
             each.release_body(body)
-    while True:  # each release unpins vertices, so that other attachments can lose all vertices
+    while True:  # repeat, because a release can leave other attachments without vertices
         finest = _finest_held(body)
         held = _nearest_at(body, finest, level)
         reattachments = reattachments_at(body, over, held)

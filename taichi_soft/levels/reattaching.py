@@ -44,7 +44,7 @@ def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats) ->
     """Write the targets and the reactions of attached vertices to `rows`.
 
     A target is a position in the frame of the attachment. The total reaction of an attachment in the last
-    step is divided evenly among its new vertices. This preserves the force exactly and the torque
+    step is divided evenly among its new vertices. The division preserves the force exactly and the torque
     approximately.
     Args: motion, rows: rows of `read_motion` for the old and the new mesh.
     """

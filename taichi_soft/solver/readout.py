@@ -74,7 +74,7 @@ class Readout:
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0
-            # Velocities of touching vertices already include contact.
+            # Do not advance the velocities of touching vertices, which already include contact.
             acceleration[self._is_carried(body)] = 0.0
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows

@@ -80,8 +80,9 @@ class BodyMeasures(SoftBody):
         return measures.strains(self)
 
     def plastic_strains(self) -> Floats:
-        """Permanent (plastic) logarithmic strain of each tetrahedron, as equivalent von Mises strain,
-        (m,).
+        """Equivalent (von Mises) plastic strain of each tetrahedron, (m,).
+
+        Plastic strain is permanent, and is measured as logarithmic strain.
         """
         return measures.plastic_strains(self)
 

@@ -212,8 +212,8 @@ class WorldBodies(WorldParts):
         """Islands, that is, groups of bodies that came near each other in the last step or are joined.
 
         Bodies can also be connected through other bodies. Each body is in exactly one island, and islands are
-        sorted by slot. With `soft_contact=False` only joints form islands. A body spawned since the last step
-        is a separate island.
+        sorted by slot. With `soft_contact=False` only joints form islands. A body that was spawned after the
+        last step is a separate island.
         Raises: StateError before `build`.
         """
         return cast("list[tuple[Body, ...]]", self._built.islands())

@@ -196,7 +196,7 @@ class WorldControl(WorldParts):
         """Add a motor, which rotates a part of a body about an axis or pushes the part along the axis.
 
         The motor accelerates the particles as a rigid part, up to a target speed; the rest of the body
-        follows by its elasticity. The torque or force is external, as from a shaft in the level: no other
+        follows by its elasticity. The torque or force is external, as from a shaft in the level. No other
         body receives a reaction. The motor does not keep the body on the axis. With implicit Euler, elastic
         forces act after the motor, so heavily loaded particles stay below the target speed; more substeps
         reduce the difference.

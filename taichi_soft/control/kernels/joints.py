@@ -41,8 +41,9 @@ CLOSE = 30.0
 higher rate, such rows would shake light bodies."""
 
 MOST_SHIFT = 0.5
-"""Largest change of the weights of a point, by which its impulse acts at the position of the held
-particle. If a gap requires a larger change, the joint does not conserve angular momentum exactly."""
+"""Largest change of a point's weights. Weights are changed so that the impulse on the point acts at the
+position of the held particle. If a gap requires a larger change, the joint does not conserve angular
+momentum exactly."""
 
 
 MOST_WEIGHT = 1e3

@@ -9,8 +9,8 @@ of h seconds:
     v += J / I d
 
 The pattern is a rigid motion, so a motor deforms only the region between its particles and the rest of the
-body. After the forces of the substep, the particles have the target speed, unless this needs more than the
-limit. An axis that rotates with the particles is fixed in the rest shape.
+body. After the forces of the substep, the particles have the target speed, unless the limit is too low. An
+axis that rotates with the particles is fixed in the rest shape.
 
 Groups of fields: writes motors.
 """

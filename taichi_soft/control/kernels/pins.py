@@ -181,7 +181,7 @@ def aim_pinned(
 
 @ti.func
 def _aim(state: ti.template(), p, dt, frames: ti.template()):
-    """Set the velocity of one pinned particle. Return 1 if the particle needs a call after the step."""
+    """Set the velocity of one pinned particle. Return 1 if the next step needs `aim_pinned`."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
     if aim >= WITH_FRAME:

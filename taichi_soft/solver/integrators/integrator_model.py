@@ -22,7 +22,8 @@ class IntegratorModel:
     drive_time: Any
     """(h, s, substeps) -> time for which external forces act before substep `s` [s].
 
-    If `s` equals `substeps`, the result is the time for which they act after the last substep."""
+    If `s` equals `substeps`, the result is the time for which external forces act after the last
+    substep."""
     hold: Any
     """(state, program, body, h, felt): add internal forces at the old positions, reactions of pins, and
     forces of grabs."""

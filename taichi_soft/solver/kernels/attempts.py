@@ -1,7 +1,7 @@
 """Save and restore bodies in attempts at a step, and decide whether an attempt had short enough substeps.
 
-The number of substeps is chosen for small deformation, and raised for bodies whose shape is stiffer. An
-impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces in one
+The number of substeps is chosen for small deformation, and raised for bodies that are stiffer than at rest.
+An impact faster than sound flattens tetrahedra, which makes them stiffer. An attempt fails if forces in one
 substep change a velocity by more than `MAX_VELOCITY_CHANGE`, or if the result is not finite. The island is
 then restored, and the step is retried with twice as many substeps. The last attempt damps vibrations
 strongly, but conserves momentum and angular momentum.

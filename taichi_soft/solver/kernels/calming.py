@@ -48,8 +48,8 @@ def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """Damp the fast vibrations of a slow body in substep `s` of `substeps`.
 
     Each edge is damped once per step, but the edges of a particle are damped in different substeps. If all
-    were damped in one substep, a vibration with the period of the step would always be damped at its turning
-    point. For `kick` and `h`, see `fade_vibration`.
+    edges were damped in one substep, a vibration with the period of the step would always be damped at its
+    turning point. For `kick` and `h`, see `fade_vibration`.
     """
     if state.islands.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)

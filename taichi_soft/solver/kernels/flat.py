@@ -133,7 +133,7 @@ def _is_damped_now(state: ti.template(), body, h, s, substeps):
 
 @ti.func
 def _gather_phase(state: ti.template(), p, h, s, substeps):
-    """If a particle's body is damped in this substep, write its force to the field that damping reads."""
+    """Write the force on a particle to the field that damping reads, if its body is damped now."""
     if _is_damped_now(state, state.particle_body[p], h, s, substeps):
         state.particle_force[p] = widened(gathered_force(state, p))
 

@@ -1,7 +1,7 @@
 """Find islands: groups of bodies that can touch in a step or are joined, directly or through other bodies.
 
 One thread owns an island, so that impulses between its bodies have a fixed order (see `jobs.py`). A body that
-cannot touch others is a separate island.
+cannot touch other bodies is a separate island.
 
 Groups of fields: reads hull, joints; writes islands.
 """

@@ -137,8 +137,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
 def kick_by_forces(state: ti.template(), program: ti.template(), body, job, kick):
     """Compute velocities after forces act for `kick` [s], and positions after the job's `drift_time`.
 
-    Returns: the highest speed [m/s]; the highest and the mean possible impact speed, if the body has pairs;
-    and 1 if forces changed no velocity by too much.
+    Returns: the highest speed of a particle [m/s]; the highest and the mean possible impact speed, if bodies
+        can touch; and 1, or 0 if forces changed a velocity by too much.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]
@@ -175,7 +175,7 @@ def _store_body_speeds(
 def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: Job, felt: ti.f32) -> ti.i32:
     """Compute new velocities of one body after forces have acted for `felt` [s], and store its speeds.
 
-    Returns: 1 if forces changed no velocity by too much.
+    Returns: 1, or 0 if forces changed a velocity by too much.
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):

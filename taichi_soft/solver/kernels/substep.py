@@ -9,7 +9,8 @@
     each body              drift: new positions
 
 Contact changes velocities before particles move. In the next substep, joints correct the effect of
-contact on them. A body alone in its island drifts in the same pass as its kick, and collides afterwards.
+contact on joined particles. A body alone in its island drifts in the same pass as its kick, and collides
+afterwards.
 
 Groups of fields: reads colliders, soft; writes islands.
 """
@@ -207,7 +208,7 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
 
 @ti.func
 def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
-    """Collide the body of an island, if the kick has moved it. Returns: 1 if the body has drifted."""
+    """If the kick has moved the body of an island, collide the body. Returns: 1 if the body has drifted."""
     has_moved = 0
     body = state.islands.body[state.islands.first[island]]
     if drift_time > 0.0 and state.body_status[body] == ACTIVE:
