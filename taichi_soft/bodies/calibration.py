@@ -78,8 +78,8 @@ def _fitted(target: Floats, mass: float, coarse: BodyDescription) -> Material:
         if error < TOLERANCE:
             break
         sensitivities = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
-        # The factor common to all modes is applied to all tetrahedra alike, because the least-squares
-        # solution would distribute it unevenly.
+        # Apply the factor that all modes share equally to all tetrahedra. The least-squares solution would
+        # distribute this factor unevenly.
         common = gaps.mean()
         factors += common + np.linalg.pinv(sensitivities, rcond=RCOND) @ (gaps - common)
         median = np.median(factors)

@@ -63,7 +63,7 @@ class BodyFields(FieldGroup):
         PARTICLE, REAL, unit="1/kg", start=LOADED, keep=PARTICLE, most=FINITE, native=True
     )
     particle_body = declare(PARTICLE, ti.i32, start=LOADED)
-    particle_of_vertex = declare(PARTICLE, ti.i32, start=LOADED)  # particle of each of the caller's vertices
+    particle_of_vertex = declare(PARTICLE, ti.i32, start=LOADED)  # particle of each vertex of the caller
     # State before the last fixed step.
     prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
     prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
@@ -104,11 +104,11 @@ class BodyFields(FieldGroup):
     edge_vertices = declare(EDGE, ti.i32, 2, start=LOADED, layout=ti.Layout.SOA)
     edge_blocks = declare(EDGE, ti.i32, 2, start=LOADED)  # first row and number of edges of each block
     edge_damping = declare(EDGE, REAL, unit="N s/m", start=LOADED)
-    edge_bond = declare(  # see `laws.bonds.Bonds`
+    edge_bond = declare(  # constants of the edge's bond, see `Bonds`
         EDGE, REAL, 4, start=LOADED, when="rings", layout=ti.Layout.SOA
     )
     edge_ring = declare(EDGE, ti.i32, 2, start=LOADED, when="rings")  # range of rows in the ring fields
-    ring_members = declare(  # particles, or slots of tetrahedra
+    ring_members = declare(  # particles or, for laws with expansion, tetrahedra
         RING, ti.i32, 4, start=LOADED, when="rings"
     )
     ring_weights = declare(RING, REAL, 4, start=LOADED, when="rings")
@@ -157,7 +157,7 @@ class BodyFields(FieldGroup):
     solver = declare(WORLD, REAL, 2, when="implicit")  # tolerance, largest number of iterations
 
     # The following fields are only for the schedule `flat`.
-    corner_force = declare(  # corner by corner in each block
+    corner_force = declare(  # stored corner by corner in each block
         BLOCK, REAL, 4, unit="N", each=4 * LANES, when="parallel"
     )
     edge_force = declare(EDGE, REAL, 3, unit="N", when="parallel")
@@ -190,7 +190,7 @@ class BodyFields(FieldGroup):
     # Bounding box that the last query computed.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
-    body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness, mean edge [m]
+    body_surface = declare(BODY, REAL, 3, start=LOADED, native=True)  # friction, thickness [m], mean edge [m]
     # Overlap with other bodies, in a world with soft contact: CLEAR, JUST_PLACED or OVERLAPPING.
     body_overlap = declare(BODY, ti.i32, start=CLEAR, keep=BODY)
     # Bounding box: of the body's path in a step while islands are searched, of its surface while contacts are

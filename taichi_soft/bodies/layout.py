@@ -49,7 +49,7 @@ class BodyArrays:
     """One body in kernel order."""
 
     order: Ints  # (n,) caller's index of each particle
-    rank: Ints  # (n,) particle of each of the caller's vertices
+    rank: Ints  # (n,) particle of each vertex, in the caller's order
     rest_position: Floats  # (n, 3) [m]
     mass: Floats  # (n,) [kg]
     tet_vertices: Ints  # (m, 4) particles of this body

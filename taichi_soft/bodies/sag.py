@@ -30,7 +30,7 @@ def sag(asset: SoftBodyAsset, gravity: float) -> float:
     is_pinned = len(asset.description.pinned) == len(mesh.vertices)
     if is_pinned or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
         return 0.0
-    solid = mesh.volumes * mesh.fill  # the constants of the solid do not depend on the fill
+    solid = mesh.volumes * mesh.fill  # volume without the empty part of each tetrahedron
     weights = solid / solid.sum()
     softness = weights @ (mesh.fill / asset.description.per_tet("young"))
     density = weights @ (asset.description.per_tet("density") / mesh.fill)

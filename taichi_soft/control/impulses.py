@@ -24,7 +24,7 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
 LARGEST_IMPULSE = 1e20
-"""Largest valid impulse [N s] and force [N]."""
+"""Limit of impulses [N s] and of forces [N]. Calls with larger values are rejected."""
 
 
 def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | None) -> None:

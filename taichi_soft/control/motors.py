@@ -38,7 +38,7 @@ from taichi_soft.core.math.rotations import length_of
 from taichi_soft.core.serialisation import below, indices_below, vector_of
 
 LARGEST_LIMIT = 1e12
-"""Largest valid limit of a motor's torque [N m] or force [N]."""
+"""Largest torque [N m] or force [N] that a caller can set as the limit of a motor."""
 
 
 @dataclass

@@ -41,7 +41,7 @@ class WatchEntry:
     kind: type[Event]
     serial: int  # serial number of the body
     threshold: float  # [Pa]
-    is_above: bytes  # one bit for each tetrahedron in kernel order, 1 above the threshold
+    is_above: bytes  # one bit for each tetrahedron in kernel order; 1: above the threshold
 
 
 @dataclass

@@ -24,7 +24,8 @@ reported again. Without this condition, a tetrahedron that vibrates about the th
 in every other step."""
 
 VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
-"""Columns of `read_stress`."""
+"""Columns of `read_stress`: von Mises stress, largest principal stress, and direction of the principal
+stress."""
 
 
 @dataclass(eq=False)

@@ -167,7 +167,7 @@ def _select_faces(
     corners = _corners(tets, faces)
     x = positions[corners[overloaded]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)  # a degenerate face has no normal
+    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)  # avoids a division by 0 for a degenerate face
     alignment = np.abs(np.einsum("fa,fa->f", normal, axis[overloaded])) / length
     chosen: list[int] = []
     used: set[int] = set()

@@ -66,7 +66,7 @@ def _weights(
     neighbours, first, gradients = gradient_rows(mesh)
     n, corner = len(mesh.vertices), corners.ravel().astype(np.int64)
     counts = np.diff(first)[corner]
-    pair = np.repeat(np.arange(len(corner)), counts)  # corner of each pair of a corner and a neighbour
+    pair = np.repeat(np.arange(len(corner)), counts)  # row in `corner` of each pair (corner, neighbour)
     gradient_row = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + first[corner[pair]]
     along = (gradients[gradient_row] * (coordinates[:, :, None] * offsets).reshape(-1, 3)[pair]).sum(axis=1)
     own = coordinates.ravel() - np.bincount(pair, along, len(corner))

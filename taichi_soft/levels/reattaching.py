@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 POSITION, TARGET, REACTION = slice(0, 3), slice(17, 20), slice(23, 26)
-"""Columns of `read_motion`."""
+"""Columns of `read_motion`: position, target of a pinned vertex, and reaction."""
 
 Reattachments = list[tuple[Any, NDArray[np.int32]]]
 """Attachments of a body, each with the vertices that it will hold."""

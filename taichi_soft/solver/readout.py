@@ -31,7 +31,7 @@ class Readout:
     ) -> None:
         self.settings = settings
         self._state, self._program, self._scene, self._joints = state, program, scene, joints
-        # Positions of all particles.
+        # Cached positions of all particles.
         self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)
         self._alpha: float | None = None  # interpolation factor of `_rows`; None if `_rows` is outdated
 

@@ -38,7 +38,8 @@ FRAME = 1 / 60
 """Length of the step for which `World.build` checks the number of substeps [s]."""
 
 TET_TIME = 15e-9
-"""Approximate time per tetrahedron and substep on one thread [s] (`taichi-soft profile --baseline`)."""
+"""Approximate time per tetrahedron and substep on one thread [s]. `taichi-soft profile --baseline`
+measures it."""
 
 
 class Substeps:

@@ -30,7 +30,8 @@ force."""
 
 
 ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
-"""Names of groups of rows in a snapshot."""
+"""Groups of rows in a snapshot: all grabs, the grabs up to the last one in use, and the patches of these
+grabs."""
 
 
 class GrabFields(FieldGroup):

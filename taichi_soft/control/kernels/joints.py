@@ -50,7 +50,7 @@ MOST_WEIGHT = 1e3
 """Largest valid weight of a particle in the rows of a snapshot."""
 
 ALL_JOINTS, USED_JOINT_ROWS, JOINT_ENDS = "joints", "rows of joints", "ends of joints"
-"""Names of groups of rows in a snapshot."""
+"""Groups of rows in a snapshot: all joints, the rows in use, and the particles of these rows."""
 
 
 class JointFields(FieldGroup):
@@ -63,7 +63,7 @@ class JointFields(FieldGroup):
     bodies = declare(  # indices plus 1, 0 if unused
         MOST_JOINTS, ti.i32, 2, start=0, keep=ALL_JOINTS, below=Below(BODY, 1), native=True
     )
-    rows = declare(  # range of rows
+    rows = declare(  # range of the joint's rows
         MOST_JOINTS, ti.i32, 2, keep=ALL_JOINTS, below=Below(beside=JOINT_ROWS + 1), native=True
     )
     # Largest closing speed of a gap.
@@ -72,7 +72,8 @@ class JointFields(FieldGroup):
     impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
-    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)  # fraction of the impulse
+    # Fraction of the row's impulse that acts on the particle.
+    share = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS)
     # Impulse on the held particle in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap

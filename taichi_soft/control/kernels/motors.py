@@ -28,7 +28,8 @@ MOST_MOTORS, MOTOR_ROWS = 64, 16384
 that all motors drive together."""
 
 ALL_MOTORS, USED_MOTORS, MOTOR_PARTICLES = "motors", "used motors", "particles of motors"
-"""Names of groups of rows in a snapshot."""
+"""Groups of rows in a snapshot: all motors, the motors up to the last one in use, and the particles of all
+motors."""
 
 MOST_CHANGE = 0.25
 """Largest change of a particle's velocity by a motor in one substep, as a fraction of the speed of sound

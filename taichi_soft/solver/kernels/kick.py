@@ -106,8 +106,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
     velocities = ti.Matrix.zero(state.real, LANES, 3)
     speed2, striking2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    # Store only to local arrays. The compiler cannot know that fields do not overlap, and would not
-    # vectorise the loop.
+    # Store only to local arrays. The compiler does not vectorise loops that store to fields, because it
+    # cannot know that fields do not overlap.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
@@ -158,8 +158,8 @@ def _store_body_speeds(
     state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
 ):
     """Store the speeds of a body for its island and for the search for contacts."""
-    # Do not write unchanged values: bodies in adjacent slots share a cache line, and a write would take it
-    # from other threads.
+    # Write a flag only if it has changed. Bodies in adjacent slots share a cache line, and each write takes
+    # the line from other threads.
     state.islands.body_speed[body] = speed
     if state.islands.is_stable[body] != is_stable:
         state.islands.is_stable[body] = is_stable

@@ -42,7 +42,7 @@ ALL_SLEEP = -1
 """Result of `step_islands` if no body is awake. Another step would then change nothing."""
 
 UNFINISHED = -2
-"""Result of `step_islands` if the step needs more calls."""
+"""Result of `step_islands` if the step needs further calls."""
 
 DONE = -1
 """Value of `Progress.attempt` for an island that has completed the step."""

@@ -120,8 +120,8 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
             p = first + lane
-            # Rows beyond the last particle belong to another body. They are replaced, because 0 times a
-            # non-finite number is NaN.
+            # Rows beyond the last particle belong to another body. A mass of 0 is not enough to exclude them,
+            # because 0 times a non-finite number is NaN.
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
