@@ -12,7 +12,7 @@ ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 
 
 LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
-"""Smallest value of each attribute. "colliders" and "samples" are attributes of worlds with contact."""
+"""Smallest capacity of a world, by attribute. "colliders" and "samples" exist only in worlds with contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 

@@ -80,9 +80,9 @@ class BodyDescription:
     def sound_speed(self) -> float:
         """Speed of the fastest waves at rest [m/s].
 
-        The speed is the largest sqrt((lambda + 2 mu) / density) of the tetrahedra. For a `SpringMaterial`, it
-        is the largest a sqrt(k / m) of the edges, where a is the length of an edge, k its spring constant and
-        m the smaller mass of its two ends.
+        The speed is the largest value of sqrt((lambda + 2 mu) / density) in all tetrahedra. For a
+        `SpringMaterial`, it is the largest value of L sqrt(k / m) in all edges, where L is the length of an
+        edge, k its spring constant, and m the smaller mass of its two ends.
         """
         mesh, material = self.mesh, self.material
         if isinstance(material, SpringMaterial):

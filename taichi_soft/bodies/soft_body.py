@@ -74,7 +74,7 @@ class Built(Protocol):
         """Wake sleeping bodies near the box with the corners `lower` and `upper` [m]."""
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the present bounding box of a body and its hull, as lower and upper corner [m]."""
+        """Return the box around a body, its hull and its contact layer, as lower and upper corner [m]."""
 
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
         """Return vertex positions, (n, 3) [m], interpolated by `alpha` between the last two steps."""
@@ -95,7 +95,10 @@ class Built(Protocol):
         """Record that joints between bodies have changed."""
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:
-        """Return the first failure of the body in a slot, which became non-finite in the step `failed`."""
+        """Return the first failure of a body in the step `failed`, in which the body became non-finite.
+
+        `slot` is the slot of the body.
+        """
 
     def on_cut(self, body: SoftBody) -> None:
         """Record that a cut has changed the vertices of a body."""

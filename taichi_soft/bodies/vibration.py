@@ -89,7 +89,7 @@ class TetVibration(Vibration):
     def energies(self, displaced: Floats) -> Floats:
         """Return twice the elastic energy of each tetrahedron, (k, m) [J].
 
-        Args: displaced: k displacements, unscaled, (k, n, 3) [m].
+        Args: displaced: k displacements, not scaled by masses, (k, n, 3) [m].
         """
         corners = displaced[:, self._tets.rows].reshape(len(displaced), -1, 12)
         return np.asarray(np.einsum("kti,tij,ktj->kt", corners, self._matrices, corners, optimize=True))

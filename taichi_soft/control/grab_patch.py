@@ -76,7 +76,7 @@ def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
 def wave_speed(body: BodyDescription) -> float:
     """Return a lower bound of the wave speed in a body [m/s].
 
-    The bound is sqrt(mu / density). For springs, it is a sqrt(k / m), with the mean edge length a and the
+    The bound is sqrt(mu / density). For springs, it is L sqrt(k / m), with the mean edge length L and the
     mean mass m.
     """
     mesh: Any = body.mesh

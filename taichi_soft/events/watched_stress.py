@@ -1,4 +1,4 @@
-"""Find the tetrahedra of watched bodies whose stress newly exceeds a threshold in a step."""
+"""Find the tetrahedra of watched bodies whose stress begins to exceed a threshold in a step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class _Watch:
     is_above: NDArray[np.bool_]  # (m,) True for tetrahedra above the threshold, in kernel order
 
     def newly_above(self, stress: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Return the rows of the tetrahedra that newly exceed the threshold, and update `is_above`.
+        """Return the rows of the tetrahedra that have begun to exceed the threshold, and update `is_above`.
 
         Args: stress: (m,) [Pa].
         """
@@ -75,7 +75,7 @@ class StressWatches:
     def renew(self, body: SoftBody) -> None:
         """Reset the watches of a body that lost tetrahedra.
 
-        Tetrahedra that are still above a threshold count as newly above the threshold.
+        If tetrahedra are still above a threshold, the next step reports them again.
         """
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:
@@ -93,7 +93,7 @@ class StressWatches:
     def restore(self, entries: list[WatchEntry], lookup: HandleLookup) -> None:
         """Restore the watches of an earlier state. Watches that were set later remain.
 
-        Tetrahedra above the threshold of a later watch count as newly above the threshold.
+        If tetrahedra are above the threshold of a later watch, the next step reports them again.
         """
         if not entries and not self._watches:
             return

@@ -56,7 +56,7 @@ class Tears(Slice):
                 self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
-        """Check a body in later steps if it can tear, in place of the previous body of its slot."""
+        """If a body can tear, check the body in later steps. It replaces the previous body of its slot."""
         if not self.is_active:
             return
         tearing = body.asset.tearing
@@ -156,7 +156,7 @@ def _select_faces(
     axis: Floats,
     most: int,
 ) -> list[int]:
-    """Return the rows of the faces that tear: those with the largest normal stress, without common vertices.
+    """Return the rows of the faces that tear. They have the largest normal stresses and share no vertex.
 
     Args:
         pull: (f,) largest principal stress [Pa], zero for faces that must not tear.

@@ -155,7 +155,7 @@ def _mapped_rows(over: Passage, motion: Floats, masses: Floats, held: Ints) -> F
 
 
 def _finest_held(body: SoftBody) -> Ints | None:
-    """Return the vertices of the finest level that correspond to the pinned vertices; None without any."""
+    """Return the vertices of the finest level that correspond to the pinned vertices; None without pins."""
     record, present = record_of(body), body.pinned.astype(np.int64)
     if not len(present):
         return None

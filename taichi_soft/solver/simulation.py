@@ -229,7 +229,7 @@ class Simulation:
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the lower and upper corner of the box around a body and its hull, plus thickness [m]."""
+        """Return the box around a body, its hull and its contact layer, as lower and upper corner [m]."""
         lower, upper = body.aabb()
         asset = present_asset(body)
         if asset.hull is not None:

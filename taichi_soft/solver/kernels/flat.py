@@ -1,7 +1,7 @@
 """Schedule `flat`: in each substep, process all tetrahedra of all bodies in parallel, then all particles.
 
-This schedule is for bodies too large for one thread. Forces are stored per corner and per edge. Each particle
-adds its forces in a fixed order, so the result does not depend on the number of threads.
+This schedule is for bodies too large for one thread. Forces are stored per corner and per edge. The forces on
+each particle are added in a fixed order, so the result does not depend on the number of threads.
 
 On a CPU, all substeps run inside one kernel call: one task per thread, synchronised by a spinning barrier.
 Starting a parallel loop costs 5 to 90 us, a barrier less than 1 us. All tasks of a loop run at the same time,

@@ -28,8 +28,8 @@ TOLERANCE = 0.003
 larger, the system is solved again."""
 
 MAX_REVERSAL = 0.1
-"""Limit of the correction of a sliding particle's velocity if friction was too strong, as a fraction of that
-velocity. Without the limit, corrections would prevent bodies from coming to rest."""
+"""Largest increase of a sliding velocity if friction was too strong, as a fraction of that velocity. Larger
+increases would prevent bodies from coming to rest."""
 
 
 @ti.func

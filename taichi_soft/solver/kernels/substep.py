@@ -187,10 +187,10 @@ def is_alone(state: ti.template(), program: ti.template(), island):
 def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
     """Combine the results of the bodies' kicks: speeds, and stability of the attempt.
 
-    Returns: the highest speed of a particle [m/s]; and the speed, relative to the mean velocity of the
-        island, that an impact can give a body [m/s], or 0 if the displacement at this speed is at most
-        `MAX_IMPULSE_STEP`. The second result ignores exploding bodies, which would cause a new search in
-        every substep.
+    Returns: two speeds [m/s]. The first is the highest speed of a particle. The second is the speed that an
+        impact can give a body, relative to the mean velocity of the island. It is 0 if a body would move by
+        at most `MAX_IMPULSE_STEP` at this speed. It ignores exploding bodies, because they would cause a new
+        search in every substep.
     """
     highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     least_edge = ti.cast(NO_CONTACT, ti.f32)
