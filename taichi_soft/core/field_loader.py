@@ -66,9 +66,9 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        # Taichi compiles serial loops into one function. With many fields, this function takes much longer
-        # to compile than one function per field. With the few fields of a collider, starting threads would
-        # take longer than the loops.
+        # Write a few fields, such as those of a collider, serially: starting threads would take longer than
+        # the loops. Write many fields in parallel: Taichi compiles serial loops into one function, which then
+        # takes much longer to compile than one function per field.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

@@ -19,13 +19,13 @@ class Settings:
 
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height of the floor [m]; None for no floor
-    restitution: float | None  # restitution of the floor; None for the elasticity of the bodies
+    restitution: float | None  # restitution coefficient of the floor; None for the elasticity of the bodies
     friction: float  # friction coefficient of the floor
     integrator: Integrator  # integrator of all bodies
     tolerance: float  # residual at which an implicit solve ends, relative to the load
     most_iterations: int  # largest number of iterations of an implicit solve
-    retries: int  # maximum retries of a failed step, each with twice the substeps
-    schedule: Schedule  # schedule that `World.build` has chosen; before the build, the argument
+    retries: int  # largest number of retries of a failed step; each retry doubles the number of substeps
+    schedule: Schedule  # argument of `World`; after `World.build`, the schedule that it chose
 
 
 DEFAULT_SLEEP_SPEED = 0.02

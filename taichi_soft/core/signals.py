@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 _QUICK: Any = import_module("_signal")
-"""C module behind `signal`. `signal` converts results to enumerations, which would slow down each step."""
+"""The C module that the module `signal` wraps. `signal` converts results to enumerations. This conversion
+would slow down each step."""
 
 INTERRUPTED, TERMINATED = 130, 143
-"""Exit codes for signals: 128 plus the number of the signal, as in shells."""
+"""Exit codes after Ctrl-C (SIGINT) and after SIGTERM: 128 plus the number of the signal, as in shells."""
 
 
 def watch_imports() -> None:

@@ -14,7 +14,7 @@ from taichi_soft.core.errors import StateError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _taichi = threading.RLock()
-_left_in: int | None = None  # id of the process with Taichi from which this process was forked, if any
+_left_in: int | None = None  # id of the parent process if it ran Taichi before the fork; else None
 
 
 def thread_name(ident: int) -> str:

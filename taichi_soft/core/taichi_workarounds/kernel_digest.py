@@ -25,8 +25,9 @@ class UnknownPartError(Exception):
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Return a digest of the package's own files, the interpreter and NumPy, which determine how a kernel's
-    source is processed.
+    """Return a digest of everything that determines how a kernel's source is processed.
+
+    This is the package's own files, the interpreter and NumPy.
     """
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -40,8 +41,8 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
     Args:
         function: Python function of the kernel.
         options: Taichi's options that change code, as text.
-        arguments: a pair for each argument. A template argument has its value and True. Any other argument
-            has its features, for which Taichi compiles separate kernels, and False.
+        arguments: a pair for each argument. For a template argument, the pair is the value and True. For any
+            other argument, the pair is the features for which Taichi compiles separate kernels, and False.
     Raises: UnknownPartError if an argument has no digest.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]

@@ -36,7 +36,8 @@ kernels = ti.lang.kernel_impl
 Make = Callable[..., None]
 
 INDEX = "taichi_soft.json"
-"""Name of the file with the digests of known kernels, next to Taichi's own files."""
+"""Name of the file that contains the digests of known kernels. The file is in the folder of Taichi's own
+files."""
 
 FLAG = "__flag"
 """Name of the flag in the source of the short body. The flag is a field that the short body sets."""
@@ -142,7 +143,7 @@ class FirstLaunches:
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # compiles the kernel that reads the flag, which the next process needs
+            _ = self._flag[None]  # compiles the kernel that reads the flag: the next process needs it
 
     def keep(self) -> None:
         """Store the code of kernels that were created from their source in the files of their short bodies.

@@ -171,7 +171,7 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 def stored_frame_of(state: ti.template(), law: ti.template(), e):
     """Return the result of `bond_frame_of`.
 
-    With implicit integration, laws with planes read the result that the last evaluation of forces stored.
+    With implicit integration, laws with planes read the stored result of the last evaluation of forces.
     """
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)

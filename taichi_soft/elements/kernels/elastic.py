@@ -14,7 +14,8 @@ from taichi_soft.elements.laws.damping import tet_mean_damping_forces
 from taichi_soft.elements.laws.force_model import flipped_forces, upright_forces
 
 BLOCK_BITS = (1 << 22) - 1
-"""Mask for block numbers. It changes no block number, because memory cannot hold 33 million tetrahedra."""
+"""Mask that leaves every block number unchanged. A larger block number would need 33 million tetrahedra, more
+than memory can hold."""
 
 
 @ti.func
@@ -159,7 +160,7 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                # Taichi would copy the selected matrix to a variable for every lane, so there is no variable.
+                # Do not store the selected matrix in a variable: Taichi would copy the matrix for every lane.
                 force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
                 # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force

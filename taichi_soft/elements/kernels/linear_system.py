@@ -3,8 +3,9 @@
 K = - df/dx and D = - df/dv are both projected to be positive semi-definite. Only particles that share an edge
 interact, so every law fills the same blocks, and a product with the matrix is one pass over the edges. The
 rows of K and D sum to zero, so a product needs only `particle_inertia` and the velocity differences along
-edges. If all particles have the same velocity, the products of stiff blocks and velocities would cancel and
-leave only rounding errors. Only the preconditioner uses the diagonal blocks.
+edges. A product with the diagonal blocks would be less exact: if all particles have the same velocity, the
+large products of blocks and velocities would cancel and leave only rounding errors. Only the preconditioner
+uses the diagonal blocks.
 """
 
 from taichi_soft.core.constants import LANES
