@@ -25,26 +25,27 @@ from taichi_soft.meshing.surfaces import read_surfaces
 Ints = NDArray[np.int64]
 
 MIN_POINTS, MAX_POINTS = 12, 20_000
-"""Range of the number of points of a hull."""
+"""Smallest and largest number of points of a hull."""
 
 POINTS_PER_VERTEX = 2.0
 """Default number of hull points per outer vertex of the tetrahedra. With this number, round shapes penetrate
 by 2 % of their size."""
 
 VOXELS = 64
-"""Voxels along the longest side of the grid that separates inside and outside."""
+"""Number of voxels along the longest side of the grid that separates inside and outside."""
 
 STEPS = 1.0, 2.0, 3.0
-"""Distances in front of and behind a triangle, in voxels. The fills at these distances are averaged, because
-single voxels can be wrong near triangles of wrong orientation."""
+"""Distances from a triangle at which fills are read in front of and behind it, in voxels. The fills on each
+side are averaged, because single voxels can be wrong near triangles of wrong orientation."""
 
 INNER, FLIP_MARGIN = 0.95, 0.25
-"""A triangle is dropped if the mean fill is at least INNER on both sides. It is flipped if the fill in front
-exceeds the fill behind by more than FLIP_MARGIN."""
+"""Limits of the mean fill at the sides of a triangle. INNER: the triangle is dropped if the fill is at least
+this value on both sides. FLIP_MARGIN: the triangle is flipped if the fill in front exceeds the fill behind by
+more than this value."""
 
 DIRECTIONS = 0.5
-"""Number of directions, relative to the number of hull points. The farthest vertex in each direction becomes
-a hull point."""
+"""Number of directions in which the farthest vertex becomes a hull point, divided by the number of hull
+points."""
 
 HALVINGS = 14
 """Number of bisection steps in the search for the cell size."""

@@ -30,13 +30,13 @@ ACCEPTS = {
     "tetgen": "closed surfaces that do not cross themselves",
     "ftetwild": "surfaces that enclose something",
 }
-"""Surfaces that each method accepts."""
+"""Description of the surfaces that each method accepts."""
 
 TIME_LIMIT = 120.0
-"""Default time limit [s]."""
+"""Default time limit of a mesher [s]."""
 
 GRACE = 3.0
-"""A mesher's process that was not killed at the time limit ends itself after this additional time [s]."""
+"""Time after the time limit at which a mesher's process ends itself, if it was not killed before [s]."""
 
 INSIDE = 0.5
 """Winding number above which a region is solid."""

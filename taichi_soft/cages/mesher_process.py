@@ -15,8 +15,8 @@ from types import ModuleType
 from typing import Any
 
 RADIUS_TO_EDGE, MIN_ANGLE = 1.4, 10
-"""Targets for TetGen: largest ratio of circumradius to shortest edge, and smallest dihedral angle
-[degrees]."""
+"""Targets for TetGen. RADIUS_TO_EDGE is the largest ratio of circumradius to shortest edge. MIN_ANGLE is the
+smallest dihedral angle [degrees]."""
 
 ENVELOPE = 0.05
 """Largest distance of fTetWild's result from the surface, in cells. A smaller distance would add small

@@ -41,9 +41,9 @@ class Solid:
     spacing: float  # edge of a voxel [m]
     fill: FloatArray  # (nx, ny, nz), fraction of each voxel that is inside, 0 to 1
     center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the voxel's corner
-    surface: FloatArray  # (nx, ny, nz, 3), mean position of a voxel's crossings [m]; NaN without crossings
-    open_fraction: float  # fraction of the rays through the surface whose crossing count does not return to 0
-    is_simple: bool  # True if all counts return to 0 and no parts overlap, so that triangles give the volume
+    surface: FloatArray  # (nx, ny, nz, 3), mean ray crossing in each voxel [m]; NaN without crossings
+    open_fraction: float  # fraction of the rays through the surface whose final winding number is not 0
+    is_simple: bool  # True if all rays end with winding number 0 and no parts of the surface overlap
 
     @property
     def volume(self) -> float:

@@ -16,7 +16,8 @@ MAX_STEPS = 64
 """Largest number of steps of a walk towards a point. If the walk does not arrive, the surface is searched."""
 
 INSIDE = -1e-9
-"""Smallest barycentric coordinate of a point that counts as inside a tetrahedron."""
+"""A point counts as inside a tetrahedron if no barycentric coordinate is below this value. The value is
+slightly negative to allow for rounding."""
 
 CHUNK = 1 << 20
 """Number of pairs of points and elements that are processed at once."""

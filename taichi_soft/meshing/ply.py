@@ -55,7 +55,7 @@ class _List:
     counts: Ints
 
 
-Columns = dict[str, Any]  # arrays (n,) or lists of an element's properties, by name
+Columns = dict[str, Any]  # properties of an element by name, each an array (n,) or a `_List`
 
 
 def read_ply(path: Path) -> list[Surface]:

@@ -34,10 +34,11 @@ default of common exporters: OpenSCAD and FreeCAD for .off files, and Blender fo
 files."""
 
 DEFINED = (".glb", ".gltf")
-"""Formats that define which axis points up."""
+"""Suffixes of the formats whose specification defines which axis points up."""
 
 MAX_SPACING = 1e-4
-"""Largest spacing of float32 numbers at a surface's distance from the origin, relative to its size."""
+"""Largest spacing of float32 numbers at a surface, as a fraction of the size of the surface. The spacing
+grows with the distance from the origin. If it is larger, `read_surfaces` adds a note."""
 
 
 def read_surfaces(
@@ -68,7 +69,7 @@ def read_surfaces(
 
 
 def assumed_up(source: Any) -> str:
-    """Return a sentence on the axis that is assumed to point up in a file, or "" if no axis is assumed."""
+    """Return a message that names the axis assumed to point up in a file, or "" if no axis is assumed."""
     suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""

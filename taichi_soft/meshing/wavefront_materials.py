@@ -19,7 +19,7 @@ def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[
         path: path of the .obj file.
         libraries: arguments of the file's `mtllib` statements.
         used: names of the materials that the file uses.
-    Returns: materials by name, and sentences on missing materials and textures.
+    Returns: materials by name, and messages about missing materials and textures.
     """
     looks: dict[str, Look] = {}
     notes: list[str] = []

@@ -36,8 +36,8 @@ SHAPELESS = (
 """Prefixes of extensions that do not change shapes. Files that require these extensions are read."""
 
 MAX_ROWS = 10_000_000
-"""Largest sum of all vertices and triangles. Even a small file can exceed this sum, if many nodes show the
-same mesh."""
+"""Largest total number of vertices and triangles in a scene. Even a small file can exceed this number, if
+many nodes show the same mesh."""
 
 
 @dataclass(frozen=True, eq=False)
