@@ -48,7 +48,7 @@ def fitted(
     smallest = MIN_FRACTION * lumped
     multipliers, masses = np.zeros(len(equations)), lumped
     residual = required - equations @ masses
-    for _ in range(ROUNDS):  # Newton's method on the dual problem, whose gradient is the residual of the sums
+    for _ in range(ROUNDS):  # Newton's method on the dual problem; the residual is its gradient
         if np.abs(residual).max() <= TOLERANCE * mass:
             break
         weighted = equations * np.where(masses > smallest, lumped, 0.0)

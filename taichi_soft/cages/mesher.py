@@ -60,7 +60,7 @@ def mesher_mesh(
     points, corners = welded(vertices, triangles)
     if len(corners) == 0:
         raise MeshError("the surface has no area: it encloses nothing")
-    # Scale the surface to size 1 near the origin, so that the meshers' absolute tolerances do not matter.
+    # Scale the surface to size 1 near the origin, because the meshers have absolute tolerances.
     low, longest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     points = (points - low) / longest
     arrays = _run_mesher(method, points, corners, cell_size / longest, time_limit)

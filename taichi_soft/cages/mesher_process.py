@@ -56,7 +56,7 @@ def main() -> None:
     method, seconds, *sys.path[:] = sys.argv[1:]
     # This timer is a C thread. It works even if the mesher blocks the interpreter or the game has ended.
     faulthandler.dump_traceback_later(float(seconds), exit=True)
-    # Both packages import pyvista, which is slow to load, only for plots. An empty module replaces it.
+    # Both packages import pyvista only for plots, and pyvista is slow to load. Use an empty module instead.
     sys.modules["pyvista"] = ModuleType("pyvista")
     import numpy as np
 

@@ -55,7 +55,7 @@ ROOT_DISTANCE = 0.2
 """Distance from the cage, in cells, beyond which a point of a limb is outside the cage."""
 
 RAYS = 256
-"""Largest number of rays that measure one thickness."""
+"""Largest number of rays in one measurement of a thickness."""
 
 QUANTILE = 0.1
 """The thickness of a limb is this quantile of the lengths measured near the limb. The quantile is low because
@@ -150,7 +150,7 @@ class MissedParts:
     """Parts of a surface that a cage should cover but does not."""
 
     cubes: Bools  # True for cubes with surface but no cage, and for cubes in which a limb leaves the cage
-    bare: Bools  # True for those of `cubes` that contain no vertex of the cage
+    bare: Bools  # True for each of `cubes` that contains no vertex of the cage
     thickness: FloatArray  # thickness of the limb or sheet in each cube [m]; infinity in other cubes
     points: FloatArray  # (k, 3), points of the surface in or next to `cubes` [m]
 

@@ -209,7 +209,7 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # excluded, because a product could overflow
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # reject early: a product could overflow
     sound = matrices[~bad]
     gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
     bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)

@@ -25,7 +25,7 @@ EXTRAS = {
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }
-"""Modules of each extra, with the package that provides each module, as in pyproject.toml."""
+"""For each extra in pyproject.toml, the modules that it needs and the package that provides each module."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:

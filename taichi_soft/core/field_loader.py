@@ -1,6 +1,6 @@
 """Write NumPy arrays to many fields with one kernel.
 
-Writing fields separately would compile one kernel per field, which takes longer than compiling the step.
+Compiling a separate kernel for each field would take longer than compiling the step.
 """
 
 from typing import Any
@@ -40,7 +40,7 @@ class Loader:
         self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
 
     def write(self) -> None:
-        """Write all fields that `fill` and `fill_all` have set."""
+        """Write all fields that `fill` and `fill_all` have prepared."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
         pieces, sizes = [], [1, 1]
         for field, rows in self._waiting:

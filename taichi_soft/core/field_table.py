@@ -32,7 +32,7 @@ FINITE = float(np.finfo(np.float32).max)
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
-"""Values of `rows`, which name the thing that a row of a field belongs to. A WORLD field has a single row. A
+"""Values of `rows`. They name the thing that a row of a field belongs to. A WORLD field has a single row. A
 row of an OUTER field belongs to a particle of a surface. A row of a CONTACT field belongs to a pair of a body
 and a collider."""
 
@@ -155,7 +155,7 @@ def declare(
         size: number of numbers per row; (rows, columns) for a matrix.
         unit: SI unit of the numbers.
         each: number of rows per thing.
-        beyond: number of spare rows at the end of the field, which kernels can read.
+        beyond: number of spare rows at the end of the field. Kernels can read these rows.
         start: initial number in all rows; LOADED if the numbers depend on the bodies; None if a step writes
             the rows before it reads them.
         keep: group of fields in a snapshot to which the field belongs; "" if snapshots omit the field,

@@ -88,7 +88,7 @@ def handles_of(handle: Handle) -> Handles:
 
 
 def keep(world: Handle) -> bytes | None:
-    """Take a snapshot before the changes of the next step, and return it for `undo`.
+    """Return a snapshot for `undo`. Call this function before the changes for the next step.
 
     Return None if the world never refuses a step, because `undo` is then not needed.
     """

@@ -25,7 +25,7 @@ INTERRUPTED, TERMINATED = 130, 143
 
 
 def watch_imports() -> None:
-    """Make Ctrl-C end the command line with one line of text during the imports, which take 1 s to 2 s."""
+    """Make Ctrl-C end the command line with one line of text during the imports (1 s to 2 s)."""
     name = sys.argv[0] if getattr(sys, "argv", None) else ""
     is_command = Path(name).stem == "taichi-soft" or (name == "-m" and "taichi_soft" in sys.orig_argv)
     is_ours = is_command and multiprocessing.parent_process() is None and _is_main_thread()

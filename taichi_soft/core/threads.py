@@ -55,7 +55,7 @@ def one_thread(method: Function) -> Function:
     @wraps(method)
     def call(
         self: Any, *arguments: Any, **options: Any
-    ) -> Any:  # without helper functions, because games make hundreds of calls per frame
+    ) -> Any:  # no helper functions: games make hundreds of calls per frame
         turn, here = self._handles.turn, get_ident()
         if turn.holder == here:
             return method(self, *arguments, **options)

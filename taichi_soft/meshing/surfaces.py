@@ -171,7 +171,9 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 @contextlib.contextmanager
 def _silent(log: logging.Logger) -> Iterator[None]:
-    """Silence a logger. Without scipy, trimesh logs a traceback before it computes normals without scipy."""
+    """Silence a logger. If scipy is missing, trimesh logs a traceback, and then computes normals without
+    scipy.
+    """
     was, log.disabled = log.disabled, True
     try:
         yield
@@ -247,7 +249,7 @@ def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[
 
 
 def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """Return the surface with those of `notes` added that it does not have yet."""
+    """Return the surface with `notes` added. Notes that the surface already has are not repeated."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 

@@ -66,7 +66,7 @@ class VoronoiGraph:
 def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
     """Return the clipped Voronoi graph of a mesh.
 
-    The graph is computed once for each mesh, which takes about 1 s for 1,000 tetrahedra.
+    The graph is computed once for each mesh. The computation takes about 1 s for 1,000 tetrahedra.
     Args:
         mesh: Delaunay mesh, such as `delaunay_mesh` returns.
     Raises: MeshError if the mesh is not Delaunay; OptionError if scipy is missing.

@@ -4,7 +4,7 @@ from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Lower limit of divisors, which prevents a division by zero. If a divisor is smaller, a length is zero in
+"""Lower limit of divisors, to prevent a division by zero. If a divisor is smaller, a length is zero in
 float32, so the numerator is also zero."""
 
 

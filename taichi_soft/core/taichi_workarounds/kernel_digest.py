@@ -1,4 +1,4 @@
-"""Digests of kernels, which cover everything that the code of a kernel depends on.
+"""Digests of kernels. A digest covers everything that the code of a kernel depends on.
 
 This file is part of `known_kernels`, and is unnecessary once `known_kernels` is unnecessary.
 """

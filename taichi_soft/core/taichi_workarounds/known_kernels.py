@@ -5,7 +5,8 @@ processes the source of each kernel at every start. With a full cache, this take
 
 Here, a known kernel is created with a short body instead. The short body contains a digest of everything that
 the kernel's code depends on. When the process that compiled the kernel ends, the kernel's code is stored in
-the file of the short body. Taichi finds that file by the hash of the short body, which is quick to compute.
+the file of the short body. Taichi finds that file by the hash of the short body. This hash is quick to
+compute.
 
 If Taichi does not find the file, it compiles the short body itself. The short body only sets a flag. If the
 flag is set after the launch, the kernel is created from its source and launched.

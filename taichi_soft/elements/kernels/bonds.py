@@ -27,7 +27,7 @@ def lane_pressure(state: ti.template(), block, lane):
 
 @ti.func
 def store_block_pressures(state: ti.template(), number):
-    """Store the pressures of a block's tetrahedra, which `ring_tension` reads."""
+    """Store the pressures of a block's tetrahedra for `ring_tension`."""
     block = number & BLOCK_BITS
     pressure = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):

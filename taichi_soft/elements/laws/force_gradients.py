@@ -41,7 +41,6 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
     alpha is half the sum of the stiffness against shear and the stiffness against rotation. beta is half the
     difference, shear minus rotation.
-
     Args:
         sa, sb: stretches along the two axes, with sa >= |sb| as `signed_svd` orders them.
         pa, pb: principal stresses along the two axes [Pa].
