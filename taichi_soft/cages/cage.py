@@ -35,8 +35,9 @@ MAX_FILL = 1.5
 outside the cage. The limit bounds the stiffness that these parts add."""
 
 MIN_LUMPED_FRACTION = 0.9
-"""Smallest volume of a vertex, as a fraction of a quarter of the solid in the tetrahedra around the vertex.
-Stiffness grows with the fill, so a lighter vertex would vibrate fast and shorten the stable step."""
+"""Smallest volume of a vertex, as a fraction of its lumped volume. The lumped volume is a quarter of the
+solid in the tetrahedra around the vertex. Stiffness grows with the fill, so a lighter vertex would vibrate
+fast and shorten the stable step."""
 
 MAX_PEELS = 4
 """Largest number of layers of flat tetrahedra that are removed."""
@@ -50,7 +51,7 @@ class Cage:
     solid: Solid
     part: Ints  # (m,), component of the solid that each tetrahedron belongs to
     octave: Ints  # (m,), number of halvings of the cells at each tetrahedron
-    thin: Thin | None = None  # limbs and sheets that are too thin for the requested cells, if there are any
+    thin: Thin | None = None  # parts that are too thin for the requested cells; None if there are none
 
 
 def cage_in(

@@ -17,7 +17,7 @@ HALVINGS = 5
 the move is dropped."""
 
 SHARPEST, FLATTEST = 20.0, 145.0
-"""Smallest and largest dihedral angle allowed [degrees]."""
+"""Smallest and largest valid dihedral angle of a tetrahedron [degrees]."""
 
 MAX_STIFFNESS = 3.0
 """Largest sum of squared gradients of a tetrahedron's shape functions, as a multiple of the same sum in the
@@ -25,8 +25,8 @@ lattice. With the masses that vertices have in the lattice, this limit keeps the
 lattice's stable step."""
 
 FLAT = 0.25
-"""A tetrahedron is removed if less than this fraction of its volume is left when its vertices lie on the
-surface."""
+"""A tetrahedron is removed if moving its vertices onto the surface leaves less than this fraction of its
+volume."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
 """Radii of successive searches around the voxel of a vertex, in voxels. The search stops as soon as it finds

@@ -26,7 +26,7 @@ LAYER = 2
 a tetrahedron outside the layer."""
 
 MAX_FRAGMENT = 2
-"""Largest number of tetrahedra in a fragment that can be dropped."""
+"""Fragments of at most this number of tetrahedra are dropped."""
 
 ROUNDS = 3
 """Largest number of rounds in which `mark` adds tetrahedra at hinges, and in which `without_flat` restores

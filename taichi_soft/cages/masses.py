@@ -18,7 +18,8 @@ HALVINGS = 12
 halved."""
 
 TOLERANCE = 1e-9
-"""Tolerance of the required sum and moments, relative to the mass."""
+"""Largest valid error of the sum and the moments of the masses, as a fraction of the total mass. Moments are
+computed with lengths relative to the size of the cage."""
 
 
 def fitted(

@@ -37,8 +37,8 @@ FINE_PITCH = 1 / 24
 """Distance between sample points on the missed parts of the surface, in cells."""
 
 MISSED_DISTANCE = 1.25
-"""Distance from the cage, in cells, beyond which a point counts as missed. Corners that the cage rounds off
-are nearer."""
+"""Distance from the cage, in cells, beyond which a point counts as missed. Points at corners that the cage
+rounds off are nearer."""
 
 MAX_CUBES = 64
 """Largest number of cubes that are tested a second time, because the rays found no solid in them. The second
@@ -150,7 +150,7 @@ class MissedParts:
     """Parts of a surface that a cage should cover but does not."""
 
     cubes: Bools  # True for cubes with surface but no cage, and for cubes in which a limb leaves the cage
-    bare: Bools  # True for each of `cubes` that contains no vertex of the cage
+    bare: Bools  # True for cubes in `cubes` that contain no vertex of the cage
     thickness: FloatArray  # thickness of the limb or sheet in each cube [m]; infinity in other cubes
     points: FloatArray  # (k, 3), points of the surface in or next to `cubes` [m]
 

@@ -25,7 +25,7 @@ MAX_OPEN_FRACTION = 0.5
 again."""
 
 FLATTEST = 1e-6
-"""Largest enclosed volume, relative to the volume of the bounding box, that counts as a rounding error."""
+"""Enclosed volumes below this fraction of the volume of the bounding box count as rounding errors."""
 
 
 def volume_within(corners: FloatArray) -> float:

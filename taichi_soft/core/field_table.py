@@ -18,8 +18,8 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""Value of `number` for a field that is float32 in a world, and float64 if forces are evaluated in double
-precision."""
+"""Value of `number` for a field of real numbers. They are float32 in a world, and float64 if forces are
+evaluated in double precision."""
 
 LOADED = "loaded"
 """Value of `start` for a field whose initial numbers depend on the bodies. The method `load` of the group

@@ -82,7 +82,7 @@ class Device:
 
     arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
     threads: int  # number of CPU worker threads; 1 on a GPU, because the host code is serial there
-    reason: str  # reason for the choice, one line
+    reason: str  # reason for choosing this device, in one line
     cores: tuple[int, ...] = ()  # core of each worker thread; () if the threads are not bound
 
     @property

@@ -33,7 +33,7 @@ for _face in range(4):
 class Cavities(NamedTuple):
     """Sets of tetrahedra, and replacements with the same boundary. All arrays are sorted by cavity."""
 
-    removed: Ints  # (r,) rows of the mesh that are removed
+    removed: Ints  # (r,) rows of the removed tetrahedra in the mesh
     removed_of: Ints  # (r,) cavity of each removed row
     added: Ints  # (a, 4) vertices of the new tetrahedra
     added_of: Ints  # (a,) cavity of each new tetrahedron

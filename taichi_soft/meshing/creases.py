@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 DEFAULT_CREASE = 60.0
-"""Default largest angle between the normals of neighbouring triangles that are shaded smoothly [degrees].
-With this value, an icosahedron (42 degrees) looks round, and a box (90 degrees) keeps its edges."""
+"""By default, two neighbouring triangles are shaded smoothly if the angle between their normals is at most
+this value [degrees]. An icosahedron (42 degrees) looks round, and a box (90 degrees) keeps its edges."""
 
 _COSINE_TOLERANCE = 1e-9
 """Tolerance for comparing the cosine of an angle with the cosine of the crease angle. Without it, rounding

@@ -13,7 +13,8 @@ from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 Ints = NDArray[np.int64]
 
 MAX_STEPS = 64
-"""Largest number of steps of a walk towards a point. If the walk does not arrive, the surface is searched."""
+"""Largest number of steps of a walk towards a point. If a walk needs more steps, the surface is searched
+instead."""
 
 INSIDE = -1e-9
 """A point counts as inside a tetrahedron if no barycentric coordinate is below this value. The value is

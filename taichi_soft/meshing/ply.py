@@ -30,7 +30,7 @@ TYPES = {
 
 COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("s0", "t0"))
-"""Names of texture coordinates in files of various programs."""
+"""Names of the two texture coordinates in files of various programs."""
 
 
 @dataclass

@@ -130,7 +130,7 @@ READERS: dict[str, Callable[[Path], list[Surface]]] = {
     ".ply": read_ply,
     ".stl": read_stl,
 }
-"""Reader of each format, which returns surfaces in the axes and units of the file."""
+"""Reader of each format. A reader returns surfaces in the axes and units of the file."""
 
 
 def _surfaces(source: Any, name: str) -> list[Surface]:

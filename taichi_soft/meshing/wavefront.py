@@ -35,9 +35,9 @@ class _Content:
     vertices: list[list[bytes]] = field(default_factory=list)
     texcoords: list[list[bytes]] = field(default_factory=list)
     normals: list[list[bytes]] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows in the lists above, or NONE
+    corners: list[tuple[int, int, int]] = field(default_factory=list)  # vertex, texcoord and normal, or NONE
     counts: list[int] = field(default_factory=list)  # number of corners of each face
-    material: list[int] = field(default_factory=list)  # material of each face
+    material: list[int] = field(default_factory=list)  # material number of each face
     materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # material numbers by name
     libraries: list[bytes] = field(default_factory=list)
     objects: set[str] = field(default_factory=set)

@@ -9,7 +9,7 @@ from taichi_soft.meshing.text import as_ascii, decoded, is_number
 from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image
 
 MAX_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
-"""Largest number of arguments of a texture's options. Options that are not listed have one argument."""
+"""Largest number of arguments of each option of a texture. Options that are not listed have one argument."""
 
 
 def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[dict[str, Look], list[str]]:

@@ -44,7 +44,8 @@ FLAG = "__flag"
 """Name of the flag in the source of the short body. The flag is a field that the short body sets."""
 
 HEADER = 1 << 17
-"""Number of bytes at the start of a kernel's file that contain the names of the kernel's functions."""
+"""Number of bytes that are read from the start of a kernel's file. They contain the names of the kernel's
+functions."""
 
 
 class KnownKernels:

@@ -48,7 +48,7 @@ def _is_in_class(level_of_class_stackframe: int) -> bool:
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `look_up` with a cache. The cache keeps the result for an object as long as the object exists."""
+    """Return `look_up` with a cache that keeps the result for an object as long as the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:

@@ -34,7 +34,8 @@ from taichi_soft.elements.laws.springs import along, spring_tension
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
 EDGES = ((0, 0, 1), (1, 0, 2), (2, 0, 3), (3, 1, 2), (4, 1, 3), (5, 2, 3))
-"""Six edges of a tetrahedron: index of the edge in `state.tet_edges`, first corner and second corner."""
+"""The six edges of a tetrahedron. Each entry has the index of the edge in `state.tet_edges`, the first corner
+and the second corner."""
 
 
 @ti.func
