@@ -131,9 +131,9 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
     """Return for each vertex the index in `chosen` of the chosen vertex that is nearest along edges, (n,).
 
-    If no path leads to a chosen vertex, the result is the number in `patch`. Triangles between nearest chosen
-    vertices are well oriented. Triangles between patches would fold over if the chosen vertex of a patch lies
-    at the patch's rim.
+    If no path leads to a chosen vertex, the result is the number in `patch`. With this assignment, the
+    triangles between hull points are well oriented. With `patch` as the assignment, triangles would fold over
+    if the chosen vertex of a patch lies at the rim of the patch.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)

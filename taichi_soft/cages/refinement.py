@@ -54,7 +54,7 @@ def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
 
 
 def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int) -> Ints:
-    """Return the number of halvings of each cube that keep the missed parts, with the shape `lattice.cubes`.
+    """Return how often each cube must be halved to keep the missed parts, with the shape `lattice.cubes`.
 
     The number is 0 for cubes without missed parts, and for parts that `refine` halvings do not keep.
     """

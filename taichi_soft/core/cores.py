@@ -27,7 +27,7 @@ def can_bind() -> bool:
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
-    """Check that `cores` are distinct numbers of the cores `there`, and return them. Raises: OptionError."""
+    """Check that `cores` are distinct numbers from `there`, and return them. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"

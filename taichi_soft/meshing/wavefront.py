@@ -98,8 +98,9 @@ def read_obj(path: Path) -> list[Surface]:
 
 
 def _remove_missing(rows: Ints, texcoords: int, normals: int) -> list[str]:
-    """Replace rows of texture coordinates and normals that do not exist by NONE. Returns: notes with counts.
+    """Replace rows of texture coordinates and normals that do not exist by NONE.
 
+    Returns: notes with the number of replaced rows.
     Args:
         rows: vertex, texture coordinate and normal of each corner, (k, 3), changed in place.
         texcoords, normals: number of texture coordinates and of normals in the file.

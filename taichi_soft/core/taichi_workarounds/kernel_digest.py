@@ -65,7 +65,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Append everything in a template argument that can change code to `parts`."""
+    """Append to `parts` everything in a template argument that can change code."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))

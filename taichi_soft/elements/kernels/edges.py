@@ -10,7 +10,7 @@ from taichi_soft.elements.laws.springs import damped_pull, spring_tension
 
 @ti.func
 def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_velocity, tension):
-    """Force of a spring, an additional `tension` [N], and damping on the first end of an edge [N].
+    """Sum of the spring force, an additional `tension` [N] and the damping on the first end of an edge [N].
 
     For laws without bonds, the force contains only the damping.
     """

@@ -21,7 +21,8 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 PRINTED = 1 / 8
-"""Ratio of two values of c: (1/4) beta / (2 pi), which eq. 4.12 prints, and beta / pi, which the law uses."""
+"""Ratio of two values of c: (1/4) beta / (2 pi), which eq. 4.12 prints, and beta / pi, which the corrected
+law uses."""
 
 
 @ti.func

@@ -74,7 +74,7 @@ def read_gltf(path: Path) -> list[Surface]:
 class _Reader:
     def __init__(self, document: Document) -> None:
         self.document, self.looks = document, Looks(document)
-        self.counts: Counter[str] = Counter()  # numbers for the notes
+        self.counts: Counter[str] = Counter()  # numbers that the notes report
         self.joints: set[int] = set()
         self.primitives: dict[tuple[int, int], Primitive] = {}
         self.remaining_rows = MAX_ROWS
