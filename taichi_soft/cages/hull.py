@@ -270,7 +270,7 @@ def _distinct_triangles(corners: Ints) -> Ints:
 def _without_fins(triangles: Ints) -> Ints:
     """Remove triangles that share all corners with another triangle: such pairs enclose nothing.
 
-    If no triangle would be left, return all.
+    If no triangle would be left, return all triangles.
     """
     corners = np.sort(triangles, axis=1)
     _, number, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)

@@ -16,8 +16,8 @@ Show = Callable[[str], object]
 _log = logging.getLogger(__name__)
 
 PATIENCE = 1.0
-"""Total compile time after which the terminal shows the progress [s]. Loading the kernels of a small world
-from the cache takes less time, so it shows nothing."""
+"""Total time of compiling and loading kernels after which the terminal shows the progress [s]. Loading the
+kernels of a small world takes less time, so the terminal then shows nothing."""
 
 PAUSE = 5.0
 """Time without kernels after which `Burst` resets its count and its total time [s]."""

@@ -1,8 +1,8 @@
 """Remove the few tetrahedra that force small time steps, by flips, collapses and vertex moves.
 
 Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity.
-The round then applies the changes with the largest gains, as far as they have no vertex in common. The
-smallest size in the mesh therefore never decreases.
+The round then applies the changes with the largest gains that have no vertex in common. The smallest size in
+the mesh therefore never decreases.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Read and write Gmsh, VTK and Medit files through meshio, which `taichi-soft[io]` installs."""
+"""Read and write Gmsh, VTK and Medit files through meshio (extra `taichi-soft[io]`)."""
 
 from __future__ import annotations
 

@@ -49,7 +49,9 @@ class _Element:
 
 @dataclass(frozen=True, eq=False)
 class _List:
-    """A property with a list in each row: the numbers of all lists in sequence, and each list's length."""
+    """A property with a list in each row. It stores the numbers of all lists in sequence, and the length of
+    each list.
+    """
 
     values: FloatArray
     counts: Ints

@@ -16,7 +16,7 @@ the diagonal, even in float64."""
 
 @ti.func
 def symmetric_eigen(columns):
-    """Return the eigenvalues in descending order, and the unit eigenvectors, which form a right-handed set.
+    """Return the eigenvalues in descending order, and a right-handed set of unit eigenvectors.
 
     Args:
         columns: symmetric 3x3 matrix as columns.

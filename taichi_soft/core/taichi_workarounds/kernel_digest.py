@@ -27,7 +27,7 @@ class UnknownPartError(Exception):
 def digest_of_sources() -> str:
     """Return a digest of everything that determines how a kernel's source is processed.
 
-    This is the package's own files, the interpreter and NumPy.
+    The digest covers the package's own files, the interpreter and NumPy.
     """
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):

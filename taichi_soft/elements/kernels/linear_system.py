@@ -156,7 +156,7 @@ def volume_pull(state: ti.template(), t):
 def _add_volume_stiffness(state: ti.template(), body, scale):
     """Add the stiffness of tetrahedra that pull the ends of their edges together.
 
-    The stiffness of a tetrahedron is w g^T (`volume_pull`), of which only the positive part is added. The
+    The stiffness of a tetrahedron is w g^T (`volume_pull`). This function adds only the positive part. The
     symmetric part of w g^T has the eigenvalues (w.g +- |w||g|) / 2. The positive eigenvalue belongs to the
     direction w/|w| + g/|g|.
     """

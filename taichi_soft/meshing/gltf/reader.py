@@ -42,7 +42,7 @@ many nodes show the same mesh."""
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One primitive as the scene shows it, with all its instances, in the file's axes."""
+    """All instances of one primitive in the scene, in the file's axes."""
 
     name: str
     vertices: FloatArray  # (n, 3) [m]
