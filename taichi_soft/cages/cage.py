@@ -24,17 +24,20 @@ from taichi_soft.meshing.locating import Locator
 Ints = NDArray[np.int64]
 
 SMALLEST_PART = 1e-3
-"""Fraction of the solid's volume below which a component is discarded."""
+"""A component is discarded if its volume is below this fraction of the solid's volume."""
 
 MIN_FILL = 0.05
-"""Smallest fill of a tetrahedron. Neighbours would accelerate a much lighter tetrahedron too strongly."""
+"""Smallest fill of a tetrahedron. Lower fills are raised to this value, because the neighbours of a very
+light tetrahedron would accelerate it too strongly."""
 
 MAX_FILL = 1.5
-"""Largest fill of a tetrahedron. This limits the stiffness that parts of the solid outside the cage add."""
+"""Largest fill of a tetrahedron. It can exceed 1, because tetrahedra also carry the parts of the solid
+outside the cage. The limit bounds the stiffness that these parts add."""
 
 MIN_LUMPED_FRACTION = 0.9
-"""Smallest volume of a vertex, relative to a quarter of the solid in the tetrahedra around the vertex.
-Stiffness grows with the fill, so a lighter vertex would vibrate fast and shorten the stable step."""
+"""Smallest volume of a vertex, as a fraction of its lumped volume. The lumped volume is a quarter of the
+solid in the tetrahedra around the vertex. Stiffness grows with the fill, so a lighter vertex would vibrate
+fast and shorten the stable step."""
 
 MAX_PEELS = 4
 """Largest number of layers of flat tetrahedra that are removed."""
@@ -48,7 +51,7 @@ class Cage:
     solid: Solid
     part: Ints  # (m,), component of the solid that each tetrahedron belongs to
     octave: Ints  # (m,), number of halvings of the cells at each tetrahedron
-    thin: Thin | None = None  # limbs and sheets that are too thin for the requested cells, if there are any
+    thin: Thin | None = None  # parts that are too thin for the requested cells; None if there are none
 
 
 def cage_in(

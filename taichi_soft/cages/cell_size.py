@@ -9,7 +9,8 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 
 DEFAULT_CELLS = 10
-"""Default number of cells along the longest side. It leads to a few thousand tetrahedra, enough for games."""
+"""Default number of cells along the longest side. It gives a few thousand tetrahedra, which are enough for
+games."""
 
 MAX_CELLS = 150_000
 """Largest number of cells in the bounding box of the surface."""

@@ -13,29 +13,31 @@ Ints = NDArray[np.int64]
 
 PASSES = 8
 HALVINGS = 5
-"""Largest number of halvings of a move that makes a tetrahedron invalid. After these, the move is dropped."""
+"""A move that makes a tetrahedron invalid is halved. If it is still invalid after this number of attempts,
+the move is dropped."""
 
 SHARPEST, FLATTEST = 20.0, 145.0
-"""Smallest and largest dihedral angle allowed [degrees]."""
+"""Smallest and largest valid dihedral angle of a tetrahedron [degrees]."""
 
 MAX_STIFFNESS = 3.0
-"""Largest sum of squared gradients of a tetrahedron's shape functions, relative to this sum in the lattice.
-If the vertices kept their masses in the lattice, the stable step would stay above 0.58 of the lattice's
-step."""
+"""Largest sum of squared gradients of a tetrahedron's shape functions, as a multiple of the same sum in the
+lattice. With the masses that vertices have in the lattice, this limit keeps the stable step above 0.58 of the
+lattice's stable step."""
 
 FLAT = 0.25
-"""A tetrahedron is removed if less than this fraction of its volume is left when its vertices lie on the
-surface."""
+"""A tetrahedron is removed if moving its vertices onto the surface leaves less than this fraction of its
+volume."""
 
 SEARCH_RADII = (2.83, 6.0, 12.0)
-"""Radii of successive searches around a vertex's voxel, in voxels. The search stops at the first radius at
-which it finds a point no farther than the radius minus the diagonal of a voxel."""
+"""Radii of successive searches around the voxel of a vertex, in voxels. The search stops as soon as it finds
+a point that is no farther away than the radius minus the diagonal of a voxel."""
 
 CHUNK = 1 << 20
 """Number of pairs of a vertex and a voxel that are processed at once."""
 
 SEARCH_RANGE = 0.75
-"""Distance from a vertex within which surface points are searched, relative to the edge of a cube."""
+"""Largest distance from a vertex at which surface points are searched, as a fraction of the edge of a
+cube."""
 
 
 def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: float) -> FloatArray:

@@ -25,8 +25,8 @@ Kind = TypeVar("Kind", bound=np.generic)
 
 SECTORS = ((0, 1), (0, 0), (1, 1), (1, 0))
 """Sectors of a face, in the order of `Lattice.tet_at`. A sector is the triangle between the face's centre and
-one edge. The first number tells which of the face's two axes points to the edge. The second number is 1 if
-the edge lies in the positive direction of this axis, otherwise 0."""
+one edge. The first number selects one of the face's two axes: the axis that points to the edge. The second
+number is 1 if the edge lies in the positive direction of this axis, otherwise 0."""
 
 
 class GradedLattice:

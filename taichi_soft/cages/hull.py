@@ -25,26 +25,27 @@ from taichi_soft.meshing.surfaces import read_surfaces
 Ints = NDArray[np.int64]
 
 MIN_POINTS, MAX_POINTS = 12, 20_000
-"""Range of the number of points of a hull."""
+"""Smallest and largest number of points of a hull."""
 
 POINTS_PER_VERTEX = 2.0
 """Default number of hull points per outer vertex of the tetrahedra. With this number, round shapes penetrate
 by 2 % of their size."""
 
 VOXELS = 64
-"""Voxels along the longest side of the grid that separates inside and outside."""
+"""Number of voxels along the longest side of the grid that separates inside and outside."""
 
 STEPS = 1.0, 2.0, 3.0
-"""Distances in front of and behind a triangle, in voxels. The fills at these distances are averaged, because
-single voxels can be wrong near triangles of wrong orientation."""
+"""Distances from a triangle at which fills are read in front of and behind it, in voxels. The fills on each
+side are averaged, because single voxels can be wrong near triangles of wrong orientation."""
 
 INNER, FLIP_MARGIN = 0.95, 0.25
-"""A triangle is dropped if the mean fill is at least INNER on both sides. It is flipped if the fill in front
-exceeds the fill behind by more than FLIP_MARGIN."""
+"""Limits of the mean fill at the sides of a triangle. INNER: the triangle is dropped if the fill is at least
+this value on both sides. FLIP_MARGIN: the triangle is flipped if the fill in front exceeds the fill behind by
+more than this value."""
 
 DIRECTIONS = 0.5
-"""Number of directions, relative to the number of hull points. The farthest vertex in each direction becomes
-a hull point."""
+"""Number of directions in which the farthest vertex becomes a hull point, divided by the number of hull
+points."""
 
 HALVINGS = 14
 """Number of bisection steps in the search for the cell size."""
@@ -130,9 +131,9 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
     """Return for each vertex the index in `chosen` of the chosen vertex that is nearest along edges, (n,).
 
-    If no path leads to a chosen vertex, the result is the number in `patch`. Triangles between nearest chosen
-    vertices are well oriented. Triangles between patches would fold over if the chosen vertex of a patch lies
-    at the patch's rim.
+    If no path leads to a chosen vertex, the result is the number in `patch`. With this assignment, the
+    triangles between hull points are well oriented. With `patch` as the assignment, triangles would fold over
+    if the chosen vertex of a patch lies at the rim of the patch.
     """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
@@ -269,7 +270,7 @@ def _distinct_triangles(corners: Ints) -> Ints:
 def _without_fins(triangles: Ints) -> Ints:
     """Remove triangles that share all corners with another triangle: such pairs enclose nothing.
 
-    If no triangle would be left, return all.
+    If no triangle would be left, return all triangles.
     """
     corners = np.sort(triangles, axis=1)
     _, number, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)

@@ -18,19 +18,19 @@ MIN_FILL = 0.4
 vertices move inwards more easily than outwards."""
 
 TRACE = 0.02
-"""Solid fraction at which a tetrahedron is selected if it lies at a limb or sheet that is thinner than a cube
-and would otherwise be missed."""
+"""Smallest solid fraction at which a tetrahedron is selected at a limb or sheet that is thinner than a cube.
+With the limit `MIN_FILL`, the cage would miss such limbs and sheets."""
 
 LAYER = 2
-"""A layer of tetrahedra is thin if at most this many steps across faces lead from each of its tetrahedra out
-of the layer."""
+"""A layer of tetrahedra is thin if each of its tetrahedra is at most this many steps, across faces, away from
+a tetrahedron outside the layer."""
 
 MAX_FRAGMENT = 2
-"""Largest number of tetrahedra in a fragment that can be dropped."""
+"""Fragments of at most this number of tetrahedra are dropped."""
 
 ROUNDS = 3
-"""Largest number of rounds that add tetrahedra at hinges, and of rounds that restore flat tetrahedra. Hinges
-are vertices at which tetrahedra are connected only by an edge or by the vertex."""
+"""Largest number of rounds in which `mark` adds tetrahedra at hinges, and in which `without_flat` restores
+flat tetrahedra. Hinges are vertices at which tetrahedra are connected only by an edge or by the vertex."""
 
 
 def mark(

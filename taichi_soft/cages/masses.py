@@ -8,16 +8,18 @@ from taichi_soft.core.residue import kept
 from taichi_soft.meshing.arrays import FloatArray
 
 MIN_FRACTION = 0.5
-"""Smallest mass of a vertex, relative to its lumped mass. Lighter vertices would vibrate fast and shorten the
-stable step."""
+"""Smallest mass of a vertex, as a fraction of its lumped mass. Lighter vertices would vibrate fast and
+shorten the stable step."""
 
 ROUNDS = 50
 
 HALVINGS = 12
-"""Largest number of halvings of a step that does not reduce the residual."""
+"""Largest number of lengths that are tried for a Newton step. A step that does not reduce the residual is
+halved."""
 
 TOLERANCE = 1e-9
-"""Tolerance of the required sum and moments, relative to the mass."""
+"""Largest valid error of the sum and the moments of the masses, as a fraction of the total mass. Moments are
+computed with lengths relative to the size of the cage."""
 
 
 def fitted(
@@ -27,7 +29,7 @@ def fitted(
 
     Masses lumped at vertices have too much inertia, because a vertex lies farther out than the volume that it
     represents. The solution minimises the sum of squared changes, each divided by the lumped mass. If there
-    is no solution, the result meets the requirements approximately.
+    is no solution, the result satisfies the requirements only approximately.
 
     Args:
         points: positions of the vertices, (n, 3) [m].
@@ -47,7 +49,7 @@ def fitted(
     smallest = MIN_FRACTION * lumped
     multipliers, masses = np.zeros(len(equations)), lumped
     residual = required - equations @ masses
-    for _ in range(ROUNDS):  # Newton's method on the dual problem, whose gradient is the residual of the sums
+    for _ in range(ROUNDS):  # Newton's method on the dual problem; the residual is its gradient
         if np.abs(residual).max() <= TOLERANCE * mass:
             break
         weighted = equations * np.where(masses > smallest, lumped, 0.0)
@@ -58,6 +60,6 @@ def fitted(
             if np.linalg.norm(new_residual) < np.linalg.norm(residual):
                 break
         else:
-            break  # no masses meet the equations: keep the current masses, which are close
+            break  # no masses satisfy all equations: keep the masses of the last step
         multipliers, masses, residual = multipliers + factor * step, tried, new_residual
     return kept(masses * (mass / masses.sum()))

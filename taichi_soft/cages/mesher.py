@@ -30,13 +30,13 @@ ACCEPTS = {
     "tetgen": "closed surfaces that do not cross themselves",
     "ftetwild": "surfaces that enclose something",
 }
-"""Surfaces that each method accepts."""
+"""Description of the surfaces that each method accepts."""
 
 TIME_LIMIT = 120.0
-"""Default time limit [s]."""
+"""Default time limit of a mesher [s]."""
 
 GRACE = 3.0
-"""A mesher's process that was not killed at the time limit ends itself after this additional time [s]."""
+"""Time after the time limit at which a mesher's process ends itself, if it was not killed before [s]."""
 
 INSIDE = 0.5
 """Winding number above which a region is solid."""
@@ -60,7 +60,7 @@ def mesher_mesh(
     points, corners = welded(vertices, triangles)
     if len(corners) == 0:
         raise MeshError("the surface has no area: it encloses nothing")
-    # Scale the surface to size 1 near the origin, so that the meshers' absolute tolerances do not matter.
+    # Scale the surface to size 1 near the origin, because the meshers have absolute tolerances.
     low, longest = points.min(axis=0), float(np.ptp(points, axis=0).max())
     points = (points - low) / longest
     arrays = _run_mesher(method, points, corners, cell_size / longest, time_limit)

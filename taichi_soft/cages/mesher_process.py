@@ -15,8 +15,8 @@ from types import ModuleType
 from typing import Any
 
 RADIUS_TO_EDGE, MIN_ANGLE = 1.4, 10
-"""Targets for TetGen: largest ratio of circumradius to shortest edge, and smallest dihedral angle
-[degrees]."""
+"""Targets for TetGen. RADIUS_TO_EDGE is the largest ratio of circumradius to shortest edge. MIN_ANGLE is the
+smallest dihedral angle [degrees]."""
 
 ENVELOPE = 0.05
 """Largest distance of fTetWild's result from the surface, in cells. A smaller distance would add small
@@ -56,7 +56,7 @@ def main() -> None:
     method, seconds, *sys.path[:] = sys.argv[1:]
     # This timer is a C thread. It works even if the mesher blocks the interpreter or the game has ended.
     faulthandler.dump_traceback_later(float(seconds), exit=True)
-    # Both packages import pyvista, which is slow to load, only for plots. An empty module replaces it.
+    # Both packages import pyvista only for plots, and pyvista is slow to load. Use an empty module instead.
     sys.modules["pyvista"] = ModuleType("pyvista")
     import numpy as np
 

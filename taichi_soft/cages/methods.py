@@ -25,7 +25,7 @@ class Tetrahedra(NamedTuple):
 
     mesh: TetMesh
     cell_size: float  # requested edge of a cell [m]
-    notes: tuple[str, ...] = ()  # sentences on limbs and sheets that are too thin for cells of this size
+    notes: tuple[str, ...] = ()  # messages about limbs and sheets that are too thin for cells of this size
     is_refined: bool = False  # True if some limbs or sheets have smaller cells
 
 

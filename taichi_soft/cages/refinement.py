@@ -18,14 +18,15 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 REFINE = 1
-"""Default of the largest number of halvings. Each halving halves the stable step."""
+"""Default largest number of times that cells are halved at thin limbs and sheets. Each halving halves the
+stable step."""
 
 MIN_SHEET_FILL = 0.003
-"""A limb or sheet is kept, even if it is far thinner than a cube, if at least this fraction of the cubes
+"""The cage keeps a limb or sheet that is far thinner than a cube if at least this fraction of the cubes
 around it is solid."""
 
 TRACE = 1e-3
-"""Fill of a voxel that contains a point of the surface, if rays found no solid in the voxel."""
+"""Smallest fill of a voxel that contains a point of the surface. Rays can miss the solid in such a voxel."""
 
 
 def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
@@ -53,7 +54,7 @@ def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
 
 
 def octaves_for(lattice: Lattice, solid: Solid, missed: MissedParts, refine: int) -> Ints:
-    """Return the number of halvings of each cube that keep the missed parts, with the shape `lattice.cubes`.
+    """Return how often each cube must be halved to keep the missed parts, with the shape `lattice.cubes`.
 
     The number is 0 for cubes without missed parts, and for parts that `refine` halvings do not keep.
     """

@@ -41,9 +41,9 @@ class Solid:
     spacing: float  # edge of a voxel [m]
     fill: FloatArray  # (nx, ny, nz), fraction of each voxel that is inside, 0 to 1
     center: FloatArray  # (nx, ny, nz, 3), centroid of the inner part, in voxels from the voxel's corner
-    surface: FloatArray  # (nx, ny, nz, 3), mean position of a voxel's crossings [m]; NaN without crossings
-    open_fraction: float  # fraction of the rays through the surface whose crossing count does not return to 0
-    is_simple: bool  # True if all counts return to 0 and no parts overlap, so that triangles give the volume
+    surface: FloatArray  # (nx, ny, nz, 3), mean ray crossing in each voxel [m]; NaN without crossings
+    open_fraction: float  # fraction of the rays through the surface whose final winding number is not 0
+    is_simple: bool  # True if all rays end with winding number 0 and no parts of the surface overlap
 
     @property
     def volume(self) -> float:
@@ -130,7 +130,7 @@ class _Rays:
 
 
 def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> FloatArray:
-    """Return the sign of each crossing, (k,): 1 into the solid, -1 out of it, 0 within it.
+    """Return the sign of each crossing, (k,): 1 into the solid, -1 out of it, 0 inside it.
 
     Overlapping parts of the surface therefore count once.
     """
@@ -150,9 +150,9 @@ def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> Flo
 def _fill(rows: list[_Rays]) -> tuple[FloatArray, FloatArray]:
     """Compute the part of each voxel that is inside, from the three rays through the voxel.
 
-    Among closed rays, the ray most perpendicular to the surface decides. This ray has the most crossings in
-    the voxel and its neighbours. (The crossings in the voxel alone would favour rays that happen to be
-    inside.)
+    Among rays whose winding number returns to 0, the ray most perpendicular to the surface decides. This ray
+    has the most crossings in the voxel and its neighbours. (The crossings in the voxel alone would favour
+    rays that happen to be inside.)
     Returns: fraction of the voxel, (nx, ny, nz), and centroid of the part, (nx, ny, nz, 3), in voxels from
         the voxel's corner.
     """

@@ -27,33 +27,35 @@ SAFE_ROD_RATIO = 8.0
 """Largest ratio of a cube's edge to a rod's thickness at which every rod is kept without halving cubes."""
 
 MAX_REFINE = 3
-"""Largest number of halvings."""
+"""Largest valid value of the argument `refine`: the number of times that cells can be halved at thin limbs
+and sheets."""
 
 PITCH = 0.25
-"""Distance between sample points of the surface, in cells."""
+"""Distance between sample points on the whole surface, in cells."""
 
 FINE_PITCH = 1 / 24
-"""Distance between sample points at missed parts, in cells."""
+"""Distance between sample points on the missed parts of the surface, in cells."""
 
 MISSED_DISTANCE = 1.25
-"""Distance from the cage, in cells, beyond which a point counts as missed. Corners that the cage rounds off
-are nearer."""
+"""Distance from the cage, in cells, beyond which a point counts as missed. Points at corners that the cage
+rounds off are nearer."""
 
 MAX_CUBES = 64
-"""Largest number of cubes in which lines test whether the surface encloses anything."""
+"""Largest number of cubes that are tested a second time, because the rays found no solid in them. The second
+test follows lines along the normals of the surface."""
 
 INSIDE = 0.5
 """Winding number above which a point is inside the solid."""
 
 OWN_DISTANCE = 1e-6
-"""Distance from a point to a triangle, relative to the size of the surface, below which the point counts as
-lying on the triangle."""
+"""A point counts as lying on a triangle if their distance is below this fraction of the size of the
+surface."""
 
 ROOT_DISTANCE = 0.2
 """Distance from the cage, in cells, beyond which a point of a limb is outside the cage."""
 
 RAYS = 256
-"""Largest number of rays that measure one thickness."""
+"""Largest number of rays in one measurement of a thickness."""
 
 QUANTILE = 0.1
 """The thickness of a limb is this quantile of the lengths measured near the limb. The quantile is low because
@@ -120,9 +122,9 @@ class Thin:
     octaves: int  # largest number of halvings of a cell
 
     def notes(self, cell_size: float) -> tuple[str, ...]:
-        """Return a sentence on the limbs and sheets that are kept, and a sentence on parts that are left out.
+        """Return messages about the limbs and sheets that are kept, and about those that are left out.
 
-        If there are no such parts, the sentence is omitted.
+        A message is omitted if there are no such parts.
         Args: cell_size: requested edge of a cell [m].
         """
         notes = []
@@ -148,7 +150,7 @@ class MissedParts:
     """Parts of a surface that a cage should cover but does not."""
 
     cubes: Bools  # True for cubes with surface but no cage, and for cubes in which a limb leaves the cage
-    bare: Bools  # True for those of `cubes` that contain no vertex of the cage
+    bare: Bools  # True for cubes in `cubes` that contain no vertex of the cage
     thickness: FloatArray  # thickness of the limb or sheet in each cube [m]; infinity in other cubes
     points: FloatArray  # (k, 3), points of the surface in or next to `cubes` [m]
 

@@ -14,17 +14,18 @@ VOXELS_PER_CUBE = 8
 MIN_VOXELS_PER_CUBE, MAX_VOXELS_PER_CUBE = 3, 16
 
 MAX_VOXELS = 1 << 22
-"""Number of voxels above which coarser voxels are used, down to `MIN_VOXELS_PER_CUBE`."""
+"""Largest number of voxels of a solid. If it is exceeded, voxels are made coarser, down to
+`MIN_VOXELS_PER_CUBE` along the edge of a cube."""
 
 MAX_FINE_VOXELS = 1 << 21
-"""Number of voxels above which coarser voxels are used in the search for missed limbs."""
+"""Largest number of voxels in the search for missed limbs. If it is exceeded, voxels are made coarser."""
 
 MAX_OPEN_FRACTION = 0.5
 """A surface counts as an open sheet if more than this fraction of the rays that enter it do not leave it
 again."""
 
 FLATTEST = 1e-6
-"""Largest enclosed volume, relative to the volume of the bounding box, that counts as a rounding error."""
+"""Enclosed volumes below this fraction of the volume of the bounding box count as rounding errors."""
 
 
 def volume_within(corners: FloatArray) -> float:

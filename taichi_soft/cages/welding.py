@@ -10,8 +10,8 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 WELD = 1e-7
-"""Distance, relative to the longest side, below which vertices are merged. Files in float32 have rounding
-errors of this size."""
+"""Distance below which vertices are merged, as a fraction of the longest side of their bounding box. Files in
+float32 have rounding errors of this size."""
 
 
 def places_of(vertices: FloatArray, size: float) -> Ints:

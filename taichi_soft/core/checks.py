@@ -19,17 +19,18 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 LARGEST_COUNT = 1_000_000
-"""Largest number of substeps, bodies or pixels. Larger numbers would take too long or exceed 32 bits."""
+"""Default upper limit of counts, such as substeps, bodies, pixels or frames. Larger counts would take too
+long to compute or overflow 32 bits."""
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Range of the length of fixed steps [s]. A shorter step vanishes in float32; a longer step would
-take days to compute."""
+"""Shortest and longest valid fixed step [s]. A shorter step would be lost to float32 rounding. A longer step
+would take days to compute."""
 
 
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
     """Convert `value` to a float, and check that it is in [low, high].
 
-    Raises: OptionError. The message describes valid values by `text`, or by the range if `text` is empty.
+    Raises: OptionError. The message states the valid values as `text`, or as the range if `text` is empty.
     """
     wanted = text or f"a number from {low:g} to {high:g}"
     if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
@@ -208,7 +209,7 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # excluded, because a product could overflow
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # reject early: a product could overflow
     sound = matrices[~bad]
     gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
     bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)

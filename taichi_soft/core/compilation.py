@@ -16,11 +16,11 @@ Show = Callable[[str], object]
 _log = logging.getLogger(__name__)
 
 PATIENCE = 1.0
-"""Time of compilation after which a terminal shows the progress [s]. Loading the kernels of a small
-world takes less time."""
+"""Total time of compiling and loading kernels after which the terminal shows the progress [s]. Loading the
+kernels of a small world takes less time, so the terminal then shows nothing."""
 
 PAUSE = 5.0
-"""Pause between two kernels after which the count of kernels starts again at 0 [s]."""
+"""Time without kernels after which `Burst` resets its count and its total time [s]."""
 
 
 def _show_on_terminal(text: str) -> None:

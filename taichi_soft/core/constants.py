@@ -15,8 +15,8 @@ nine edges, and it is the first particle of only some of them. Few particles wou
 eight edges, but most particles fill a half of four edges."""
 
 ROW_BITS = (1 << 28) - 1
-"""Mask that leaves every row number of a field unchanged. The mask proves to the compiler that adding a lane
-number to a row number does not overflow, which vectorisation requires."""
+"""Mask that leaves every row number of a field unchanged. The compiler vectorises a loop only if adding a
+lane number to a row number cannot overflow. The mask proves this to the compiler."""
 
 POSITION_LIMIT = 1.0e7
 """Largest valid coordinate [m]. At this distance, the spacing of float32 is 1 m, too coarse for a body. A

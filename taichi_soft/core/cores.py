@@ -27,7 +27,7 @@ def can_bind() -> bool:
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
-    """Check that `cores` are distinct numbers of the cores `there`, and return them. Raises: OptionError."""
+    """Check that `cores` are distinct numbers from `there`, and return them. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"
@@ -59,13 +59,13 @@ def number_now() -> int:
 
 
 def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None:
-    """Bind the threads that started last to one core each, in the order in which the threads started.
+    """Bind the last `len(cores)` threads that started to one core each, in the order in which they started.
 
     Args:
         threads: ids of threads that started after the thread `since`.
         since: id of an earlier thread, see `number_now`.
-        cores: core of each thread to bind.
-    Raises: DeviceError if the system refuses. All bindings are then as before the call.
+        cores: one core for each thread to bind.
+    Raises: DeviceError if the system refuses. The function then restores all bindings.
     """
     masks: dict[int, set[int]] = {}
     try:

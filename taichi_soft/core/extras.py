@@ -25,7 +25,7 @@ EXTRAS = {
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }
-"""Modules of each extra, with the package that provides each module, as in pyproject.toml."""
+"""For each extra in pyproject.toml, the modules that it needs and the package that provides each module."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
@@ -59,7 +59,8 @@ def require_extra(extra: str, what: str, *modules: str) -> None:
     """Raise a MissingExtraError if a package of the extra is missing.
 
     Args:
-        what: start of the error message: the feature that needs the extra, and a verb, as in "a film needs".
+        what: start of the error message, such as "a film needs": the feature that needs the extra, and a
+            verb.
         modules: required modules; by default all modules of the extra.
     """
     missing = missing_packages(extra, *modules)

@@ -1,6 +1,6 @@
 """Write NumPy arrays to many fields with one kernel.
 
-Writing fields separately would compile one kernel per field, which takes longer than compiling the step.
+Compiling a separate kernel for each field would take longer than compiling the step.
 """
 
 from typing import Any
@@ -40,7 +40,7 @@ class Loader:
         self._waiting.append((field, rows.astype(np.int32 if field.dtype == ti.i32 else np.float64)))
 
     def write(self) -> None:
-        """Write all fields that `fill` and `fill_all` have set."""
+        """Write all fields that `fill` and `fill_all` have prepared."""
         reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
         pieces, sizes = [], [1, 1]
         for field, rows in self._waiting:
@@ -66,9 +66,9 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        # Taichi compiles serial loops into one function. With many fields, this function takes much longer
-        # to compile than one function per field. With the few fields of a collider, starting threads would
-        # take longer than the loops.
+        # Write a few fields, such as those of a collider, serially: starting threads would take longer than
+        # the loops. Write many fields in parallel: Taichi compiles serial loops into one function, which then
+        # takes much longer to compile than one function per field.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):

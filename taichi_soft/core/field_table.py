@@ -18,32 +18,34 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 REAL = "real"
-"""Value of `number` for a field that is float32 in a world, and float64 if forces are evaluated in double
-precision."""
+"""Value of `number` for a field of real numbers. They are float32 in a world, and float64 if forces are
+evaluated in double precision."""
 
 LOADED = "loaded"
-"""Value of `start` for a field whose initial numbers depend on the bodies. The group's `load` fills the
-field."""
+"""Value of `start` for a field whose initial numbers depend on the bodies. The method `load` of the group
+fills the field."""
 
 ANY = float("inf")
 FINITE = float(np.finfo(np.float32).max)
-"""Values of `most` for a field whose numbers can be any float (ANY), or any finite float (FINITE)."""
+"""Values of `most`. ANY allows every float, including infinity and NaN. FINITE allows every finite float."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
-"""Values of `rows`: the thing that a row of a field belongs to. A contact is a pair of a body and a collider.
-OUTER means the particles of surfaces. A field of WORLD has a single row."""
+"""Values of `rows`. They name the thing that a row of a field belongs to. A WORLD field has a single row. A
+row of an OUTER field belongs to a particle of a surface. A row of a CONTACT field belongs to a pair of a body
+and a collider."""
 
 SHAPE = "shape"
-"""Value of `keep` for the rest shapes of tetrahedra, which change only if the body is plastic."""
+"""Value of `keep` for the rest shapes of tetrahedra. Only plastic bodies change their rest shapes, so
+snapshots of worlds without plastic bodies omit these fields."""
 
 
 @dataclass(frozen=True)
 class Below:
-    """Bounds of integers: from 0 up to, but not including, the number of `things` plus `beside`."""
+    """Bounds of integers: at least 0, and less than the number of `things` plus `beside`."""
 
-    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; if "", `beside` is the upper bound
+    things: str = ""  # PARTICLE, BODY, COLLIDER or FRAME; "" counts as 0 things
     beside: int = 0
 
 
@@ -71,9 +73,9 @@ class Declaration:
     layout: Any
 
     def __get__(self, group: object, kind: type) -> Any:
-        """Return this declaration for a class. For a group, raise an AttributeError.
+        """Return this declaration if it is read from a class. For an object, raise an AttributeError.
 
-        Python calls this method only for groups without the field.
+        For an object, Python calls this method only if the group has not allocated the field.
         """
         if group is None:
             return self
@@ -91,7 +93,7 @@ class Declaration:
         return isinstance(self.number, ti.lang.struct.StructType)
 
     def count(self, counts: Mapping[str, int]) -> int:
-        """Return the number of rows of the field, from the number of each kind of thing."""
+        """Return the number of rows of the field. `counts` contains the number of each kind of thing."""
         rows = self.rows if isinstance(self.rows, int) else counts[self.rows]
         return rows * self.each + self.beyond
 
@@ -153,18 +155,19 @@ def declare(
         size: number of numbers per row; (rows, columns) for a matrix.
         unit: SI unit of the numbers.
         each: number of rows per thing.
-        beyond: number of spare rows after the rows of the last thing. Code can read spare rows.
+        beyond: number of spare rows at the end of the field. Kernels can read these rows.
         start: initial number in all rows; LOADED if the numbers depend on the bodies; None if a step writes
             the rows before it reads them.
-        keep: group of rows in a snapshot that contains the field; "" if the next step does not depend on the
-            field.
-        native_keep: value of `keep` for snapshots of the C library. Python stores the same data with the
-            handles.
+        keep: group of fields in a snapshot to which the field belongs; "" if snapshots omit the field,
+            because the next step does not depend on it.
+        native_keep: value of `keep` in snapshots of the C library, for data that Python stores with the
+            handles instead.
         below: bounds of integers in a snapshot; for rows with members, a dictionary of bounds by member.
         most: largest absolute value of floats in a snapshot.
         native: True if the C library reads or writes the field between steps.
         inherited: True if each piece of a cut body gets the values of the body.
-        when: attribute of the capacity that is true if the group has the field; "" if it always has it.
+        when: attribute of the capacity that is true if the group has the field; "" if every group has the
+            field.
         layout: a `ti.Layout`; None for Taichi's default.
     """
     return Declaration(

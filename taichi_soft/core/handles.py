@@ -1,4 +1,4 @@
-"""Handles of a world. In worlds with the same history, the same handles have the same serial numbers."""
+"""Handles of a world. Worlds with the same history assign the same serial numbers to their handles."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def handles_of(handle: Handle) -> Handles:
 
 
 def keep(world: Handle) -> bytes | None:
-    """Return a snapshot for `undo`, taken before changes for the next step.
+    """Return a snapshot for `undo`. Call this function before the changes for the next step.
 
     Return None if the world never refuses a step, because `undo` is then not needed.
     """

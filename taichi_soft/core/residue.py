@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SHARE = 1e-12
-"""Numbers below this fraction of the largest number count as rounding errors."""
+"""Numbers below this fraction of the largest number count as rounding errors and are set to zero."""
 
 
 def rounded(value: float) -> float:

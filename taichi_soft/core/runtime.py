@@ -69,7 +69,8 @@ __all__ = [
 Result = TypeVar("Result")
 
 DEBUG = "TAICHI_SOFT_DEBUG"
-"""Environment variable. The value 1 turns on index checks in kernels. Use the slow checks in tests only."""
+"""Name of the environment variable that turns on index checks in kernels if its value is 1. The checks are
+slow, so use them only in tests."""
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
@@ -80,9 +81,9 @@ class Device:
     """Device chosen by `init`."""
 
     arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
-    threads: int  # CPU worker threads (1 on a GPU, where the host code is serial)
-    reason: str  # reason for the choice, one line
-    cores: tuple[int, ...] = ()  # cores to which the worker threads are bound, one each; () if unbound
+    threads: int  # number of CPU worker threads; 1 on a GPU, because the host code is serial there
+    reason: str  # reason for choosing this device, in one line
+    cores: tuple[int, ...] = ()  # core of each worker thread; () if the threads are not bound
 
     @property
     def is_gpu(self) -> bool:
@@ -95,7 +96,7 @@ _log = logging.getLogger(__name__)
 _device: Device | None = None
 _process = 0  # id of the process that started Taichi
 _checked_kernels: str | None = None  # folder of compiled kernels if index checks are on
-_first_field: Any = None  # field of the first layout, because Taichi cannot export an empty layout
+_first_field: Any = None  # a field for the first layout: Taichi cannot export an empty layout
 
 
 @in_turn
@@ -133,7 +134,7 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     there = available_cores()
     taken = (
         () if _device is None else _device.cores
-    )  # these cores stay valid if the caller has since moved its own threads to others
+    )  # these cores stay valid if the caller moves its own threads to other cores
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(
@@ -205,7 +206,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             offline_cache_max_size_of_files=1
             << 29,  # the default of 100 MB is too small for a game with many kinds of worlds
             enable_fallback=False,
-            cfg_optimization=False,  # off: halves the compile time, and kernels are as fast
+            cfg_optimization=False,  # if on, compilation takes twice as long and kernels are no faster
             detect_read_only=False,  # if on, kernels on a GPU might not see writes of real functions
             make_cpu_multithreading_loop=False,  # if on, one thread would run up to 512 bodies
             unrolling_limit=0,  # turns off a warning
@@ -219,7 +220,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if has_known:
         FIRST_LAUNCHES.make_flag()
     _first_field = ti.field(ti.i32, ())
-    ti.lang.impl.get_runtime().materialize()  # otherwise the first kernel call would do this, in any thread
+    ti.lang.impl.get_runtime().materialize()  # otherwise, the first kernel call would do this in any thread
     if has_known:
         keep_kernels_apart(VERSION)
         FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), code_options()))
@@ -236,7 +237,7 @@ def kernel_folder() -> Path:
 
 
 def _end() -> None:
-    """Store the compiled kernels and shut Taichi down, because Taichi's own shutdown has no fixed order."""
+    """Store the compiled kernels and shut Taichi down. Taichi's own shutdown has no fixed order."""
     if os.getpid() == _process:
         with contextlib.suppress(Exception):  # a failure only makes later starts slower
             FIRST_LAUNCHES.close()

@@ -131,7 +131,7 @@ def digest_of(value: Any) -> str:
     return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()
 
 
-# Checks of data that may be damaged.
+# The functions below check data that can be damaged.
 
 
 def below(number: Any, limit: int) -> int:

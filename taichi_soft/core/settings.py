@@ -19,13 +19,13 @@ class Settings:
 
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height of the floor [m]; None for no floor
-    restitution: float | None  # restitution of the floor; None for the elasticity of the bodies
+    restitution: float | None  # restitution coefficient of the floor; None for the elasticity of the bodies
     friction: float  # friction coefficient of the floor
     integrator: Integrator  # integrator of all bodies
-    tolerance: float  # residual at which an implicit solve ends, relative to the load
+    tolerance: float  # an implicit solve ends when its residual is below this fraction of the load
     most_iterations: int  # largest number of iterations of an implicit solve
-    retries: int  # maximum retries of a failed step, each with twice the substeps
-    schedule: Schedule  # schedule that `World.build` has chosen; before the build, the argument
+    retries: int  # largest number of retries of a failed step; each retry doubles the number of substeps
+    schedule: Schedule  # argument of `World`; after `World.build`, the schedule that it chose
 
 
 DEFAULT_SLEEP_SPEED = 0.02
@@ -35,18 +35,18 @@ At this speed, a body of 0.1 m to 10 m can stop without a visible jump: it moves
 between two frames. With a lower value, bodies would tremble longer before they fall asleep."""
 
 DEFAULT_COLLIDER_ROOM = 15
-"""Default `collider_room`. Together with the floor, these colliders fill 16 rows. The number of rows is
-always rounded up to a power of two."""
+"""Default `collider_room`. Worlds round the number of rows up to a power of two. These colliders and the
+floor fill 16 rows, so no row is unused."""
 
 
 @dataclass(frozen=True)
 class ContactSettings:
     """Contact and sleep settings."""
 
-    soft: bool  # True for contact between soft bodies
+    soft: bool  # True if soft bodies can touch each other
     sleep_speed: float  # speed below which bodies fall asleep [m/s]; 0 turns sleep off
     collider_room: int  # number of colliders that can be added after `World.build`
-    sample_room: int  # number of grid samples for colliders that are added after `World.build`
+    sample_room: int  # number of grid samples reserved for colliders that are added after `World.build`
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,15 @@ from pathlib import Path
 from typing import Any
 
 _QUICK: Any = import_module("_signal")
-"""C module behind `signal`. `signal` converts results to enumerations, which would slow down each step."""
+"""The C module that the module `signal` wraps. `signal` converts results to enumerations. This conversion
+would slow down each step."""
 
 INTERRUPTED, TERMINATED = 130, 143
-"""Exit codes for signals: 128 plus the number of the signal, as in shells."""
+"""Exit codes after Ctrl-C (SIGINT) and after SIGTERM: 128 plus the number of the signal, as in shells."""
 
 
 def watch_imports() -> None:
-    """Make Ctrl-C end the command line with one line of text during the imports, which take 1 s to 2 s."""
+    """Make Ctrl-C end the command line with one line of text during the imports (1 s to 2 s)."""
     name = sys.argv[0] if getattr(sys, "argv", None) else ""
     is_command = Path(name).stem == "taichi-soft" or (name == "-m" and "taichi_soft" in sys.orig_argv)
     is_ours = is_command and multiprocessing.parent_process() is None and _is_main_thread()

@@ -14,7 +14,7 @@ from taichi_soft.core.errors import StateError
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _taichi = threading.RLock()
-_left_in: int | None = None  # id of the process with Taichi from which this process was forked, if any
+_left_in: int | None = None  # id of the parent process if it ran Taichi before the fork; else None
 
 
 def thread_name(ident: int) -> str:
@@ -55,7 +55,7 @@ def one_thread(method: Function) -> Function:
     @wraps(method)
     def call(
         self: Any, *arguments: Any, **options: Any
-    ) -> Any:  # without helper functions, because games make hundreds of calls per frame
+    ) -> Any:  # no helper functions: games make hundreds of calls per frame
         turn, here = self._handles.turn, get_ident()
         if turn.holder == here:
             return method(self, *arguments, **options)

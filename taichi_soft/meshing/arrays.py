@@ -16,8 +16,8 @@ IntArray: TypeAlias = NDArray[np.int32]
 LARGEST_COORDINATE = 1e30
 
 MAX_TETS = 10_000_000
-"""Largest number of tetrahedra in a built-in shape. Larger shapes would take minutes and tens of
-gigabytes."""
+"""Largest number of tetrahedra in a built-in shape. A larger shape would take minutes to build, and tens of
+gigabytes of memory."""
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Base class of all meshes of bodies, which consist of particles and the edges between them."""
+"""Base class of all meshes of bodies. A mesh consists of particles and the edges between them."""
 
 from __future__ import annotations
 

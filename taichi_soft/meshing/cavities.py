@@ -22,7 +22,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 OUTSIDE = 0
-LARGEST_RING = 7  # largest number of tetrahedra around an edge that a flip removes (42 triangulations)
+LARGEST_RING = 7  # largest number of tetrahedra around a removable edge; a ring of 7 has 42 triangulations
 # Entry (i, j) has the other two corners k and l, in the order that makes (i, j, k, l) an even permutation.
 _OPPOSITE = np.zeros((4, 4, 2), dtype=np.int64)
 for _face in range(4):
@@ -33,11 +33,11 @@ for _face in range(4):
 class Cavities(NamedTuple):
     """Sets of tetrahedra, and replacements with the same boundary. All arrays are sorted by cavity."""
 
-    removed: Ints  # (r,) rows of the mesh that are removed
+    removed: Ints  # (r,) rows of the removed tetrahedra in the mesh
     removed_of: Ints  # (r,) cavity of each removed row
     added: Ints  # (a, 4) vertices of the new tetrahedra
     added_of: Ints  # (a,) cavity of each new tetrahedron
-    parent: Ints  # (a,) row that each new tetrahedron replaces, -1 if it replaces several
+    parent: Ints  # (a,) row that each new tetrahedron replaces; -1 if it replaces several rows
 
     @property
     def total(self) -> int:
@@ -156,7 +156,7 @@ def volumes(x: FloatArray, tets: Ints) -> FloatArray:
 
 
 def is_flat(x: FloatArray, tets: Ints) -> Bools:
-    """True for tetrahedra (k, 4) that `TetMesh` rejects as flat or almost rejects."""
+    """True for tetrahedra (k, 4) that are so flat that `TetMesh` rejects or nearly rejects them."""
     ends = x[tets[:, LOCAL_EDGES]]
     longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
     flat = volumes(x, tets) <= 2 * FLATTEST * longest**3

@@ -16,7 +16,8 @@ NONE = -1
 """Value in `Attribute.at` for a corner without the attribute."""
 
 BEFORE_FIRST = 1 << 40
-"""Value for an index that counts back past the first row. The value is larger than any table."""
+"""Row number for a negative index that points before the first row. It is larger than any table, so checks
+reject it like any other row beyond the table."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 DEFAULT_CREASE = 60.0
-"""Default angle up to which neighbouring triangles are shaded smoothly [degrees]. It is larger than the angle
-between faces of an icosahedron (42) and smaller than the angle between faces of a box (90)."""
+"""By default, two neighbouring triangles are shaded smoothly if the angle between their normals is at most
+this value [degrees]. An icosahedron (42 degrees) looks round, and a box (90 degrees) keeps its edges."""
 
 _COSINE_TOLERANCE = 1e-9
-"""Tolerance of the cosine. Rounding must not split triangles that bend by exactly the crease angle."""
+"""Tolerance for comparing the cosine of an angle with the cosine of the crease angle. Without it, rounding
+could split triangles that meet at exactly the crease angle."""
 
 
 def split_at_creases(

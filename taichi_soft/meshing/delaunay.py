@@ -14,9 +14,9 @@ from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 TOLERANCE = 1e-6
-"""Largest depth of a vertex inside a circumsphere, as the power of the vertex divided by the squared longest
-edge of the tetrahedron. The tolerance allows for rounding if more than four vertices lie on a sphere, such as
-the eight corners of a cube."""
+"""Largest valid depth of a vertex inside the circumsphere of a tetrahedron. The depth is the power of the
+vertex with respect to the sphere, divided by the squared longest edge of the tetrahedron. The tolerance
+allows for rounding if more than four vertices lie on a sphere, such as the eight corners of a cube."""
 
 
 def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:

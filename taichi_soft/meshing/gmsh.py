@@ -8,8 +8,8 @@ from pathlib import Path
 from taichi_soft.core.errors import MeshError
 
 NEEDED = ("MeshFormat", "Nodes", "Elements")
-"""Sections that are passed to meshio. On other sections, such as names and data, meshio fails even if the
-file is valid."""
+"""Sections that are passed to meshio. Other sections, such as names and data, are dropped, because meshio can
+fail on them even if the file is valid."""
 
 OPENING = re.compile(rb"\s*\$(\w+)[ \t]*(?:\r\n?|\n)")
 

@@ -1,8 +1,8 @@
 """Remove the few tetrahedra that force small time steps, by flips, collapses and vertex moves.
 
 Each round finds, for every bad tetrahedron, the changes that enlarge the smallest tetrahedron of a cavity.
-The round then applies the changes with the largest gains, as far as they have no vertex in common. The
-smallest size in the mesh therefore never decreases.
+The round then applies the changes with the largest gains that have no vertex in common. The smallest size in
+the mesh therefore never decreases.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from taichi_soft.meshing.cavities import OUTSIDE, Bools, Cavities, ClosedMesh, I
 from taichi_soft.meshing.topology import LOCAL_EDGES
 
 SMALL = 0.3
-"""Fraction of the median size below which tetrahedra are improved. Such tetrahedra need more than three times
-as many substeps as a tetrahedron of median size."""
+"""Tetrahedra below this fraction of the median size are improved. They need more than three times as many
+substeps as a tetrahedron of median size."""
 
 _ROUNDS = 100
-_GENTLE_ROUNDS = 3  # number of rounds at the start without collapses, so that all vertices stay
-_MAX_IDLE_ROUNDS = 6  # number of rounds without a change after which the search stops
-_MIN_GAIN = 1.02  # factor by which the smallest size of a cavity must grow, so that the rounds end
-_VOLUME_TOLERANCE = 0.01  # total change of volume at the surface, relative to the body's volume
-_MIN_NORMAL_COSINE = 0.77  # between a new surface normal and the most similar old surface normal
-_DRIFT_PENALTY = 0.9  # relative reduction of a gain that uses the full surface tolerance
-_FLAT = 0.05  # relative eigenvalue of the normals' second moment below which a surface vertex can slide
-_GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # trial moves, relative to the step to the target size
+_GENTLE_ROUNDS = 3  # number of rounds at the start that use no collapses, so that all vertices stay
+_MAX_IDLE_ROUNDS = 6  # the search stops after this number of successive rounds without a change
+_MIN_GAIN = 1.02  # a change must enlarge a cavity's smallest size by this factor, so that the rounds end
+_VOLUME_TOLERANCE = 0.01  # largest total change of the body's volume, as a fraction of this volume
+_MIN_NORMAL_COSINE = 0.77  # smallest cosine between a new surface normal and the nearest old normal
+_DRIFT_PENALTY = 0.9  # fraction by which a gain is reduced if the change uses the full surface tolerance
+_FLAT = 0.05  # a surface vertex slides along axes with normal moments below this fraction of the largest
+_GRADIENT_STEPS = (1.5, 1.0, 0.5, 0.2, 0.05)  # factors of the step that would reach the target size
 _RANDOM_STEPS = (
     0.1,
     0.1,
     0.03,
     0.01,
-)  # trial moves in random directions, relative to the tetrahedron's extent
+)  # lengths of trial moves in random directions, as fractions of the tetrahedron's extent
 
 
 class Improved(NamedTuple):

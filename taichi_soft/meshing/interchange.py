@@ -1,4 +1,4 @@
-"""Read and write Gmsh, VTK and Medit files through meshio, which `taichi-soft[io]` installs."""
+"""Read and write Gmsh, VTK and Medit files through meshio (extra `taichi-soft[io]`)."""
 
 from __future__ import annotations
 
@@ -88,8 +88,9 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
 
 
 def _declared_cells(path: Path, name: str, content: bytes) -> int:
-    """Return the number of cells that a VTK file declares, used to detect skipped cells and truncated files.
+    """Return the number of cells that a VTK file declares.
 
+    This number reveals skipped cells and truncated files.
     Raises: MeshError if the file is truncated or has several pieces. (meshio reads only the last piece.)
     """
     if name == "vtu":

@@ -14,8 +14,8 @@ from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0), (0, 2))}
-"""Kinds of springs in a cloth. A kind is a list of steps over the grid, (columns, rows), that its springs
-span."""
+"""Kinds of springs in a cloth. The values are the steps over the grid, (columns, rows), from one end of a
+spring to the other end."""
 
 
 def rope(length: float, segments: int, mass: float) -> ParticleMesh:

@@ -13,10 +13,12 @@ from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 Ints = NDArray[np.int64]
 
 MAX_STEPS = 64
-"""Largest number of steps of a walk towards a point. If the walk does not arrive, the surface is searched."""
+"""Largest number of steps of a walk towards a point. If a walk needs more steps, the surface is searched
+instead."""
 
 INSIDE = -1e-9
-"""Smallest barycentric coordinate of a point that counts as inside a tetrahedron."""
+"""A point counts as inside a tetrahedron if no barycentric coordinate is below this value. The value is
+slightly negative to allow for rounding."""
 
 CHUNK = 1 << 20
 """Number of pairs of points and elements that are processed at once."""

@@ -61,7 +61,7 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     """Choose which end owns each edge, so that most vertices own a multiple of `group` edges.
 
     The method is greedy. First, every vertex takes as many full groups as its edges allow. Then the vertex
-    with the most unowned edges takes all of these edges, again and again, until every edge has an owner.
+    with the most unowned edges takes all of these edges. This step is repeated until every edge has an owner.
     Finally, the edges of partly full groups move to other vertices whose groups have free places. Groups are
     much fuller than if the end with the lower number owned every edge.
     Args:

@@ -8,13 +8,14 @@ from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.cavities import OUTSIDE, Ints, ranges
 from taichi_soft.meshing.topology import LOCAL_FACES
 
-# Sample points of a triangle for distances, in barycentric coordinates, a quarter of a side apart.
+# Points of a triangle at which distances are computed, in barycentric coordinates. Neighbouring points are a
+# quarter of a side apart.
 _SAMPLES = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4.0
 _SAMPLING_FACTOR = 4 / 3
-"""Upper bound of the largest distance, divided by the largest distance at a sample. The distance is largest
-at a corner or at a point where two sides cross. From there, the distance falls at most linearly towards the
-end of the side. The nearest sample is at most an eighth of the side away, so the distance at this sample is
-at least three quarters of the largest distance."""
+"""The largest distance between two patches is at most this factor times the largest distance at a sample. The
+distance is largest at a corner or at a point where two sides cross. From there, the distance falls at most
+linearly towards the end of the side. The nearest sample is at most an eighth of the side away, so the
+distance at this sample is at least three quarters of the largest distance."""
 _TINY = 1e-300  # [m^2], avoids division by zero for degenerate triangles
 
 

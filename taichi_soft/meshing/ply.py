@@ -30,7 +30,7 @@ TYPES = {
 
 COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("s0", "t0"))
-"""Names of texture coordinates in files of various programs."""
+"""Names of the two texture coordinates in files of various programs."""
 
 
 @dataclass
@@ -49,13 +49,15 @@ class _Element:
 
 @dataclass(frozen=True, eq=False)
 class _List:
-    """A property with a list in each row: the numbers of all lists in sequence, and each list's length."""
+    """A property with a list in each row. It stores the numbers of all lists in sequence, and the length of
+    each list.
+    """
 
     values: FloatArray
     counts: Ints
 
 
-Columns = dict[str, Any]  # arrays (n,) or lists of an element's properties, by name
+Columns = dict[str, Any]  # properties of an element by name, each an array (n,) or a `_List`
 
 
 def read_ply(path: Path) -> list[Surface]:

@@ -9,8 +9,9 @@ import numpy as np
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
 
-# Volume divided by the cube of the longest edge (0.118 for a regular tetrahedron). Below this value, a
-# tetrahedron degenerates in float32, the precision of the simulation (rounding 1.2e-7).
+# Smallest valid volume of a tetrahedron, divided by the cube of its longest edge (0.118 for a regular
+# tetrahedron). A flatter tetrahedron would degenerate in the float32 numbers of the simulation (rounding
+# 1.2e-7).
 FLATTEST = 1e-7
 
 

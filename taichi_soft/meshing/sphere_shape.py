@@ -104,7 +104,8 @@ def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
     """
     step = lattice[:, :3].sum(axis=1)
     angle = np.arccos(face[0] @ face[1])
-    # Sines of fractions of the angle space points evenly on a great circle, identically in adjacent faces.
+    # With sines of fractions of the angle, points are evenly spaced on a great circle. Adjacent faces get
+    # equal points on their common edge.
     weights = np.sin(lattice[:, :3] / np.maximum(step, 1)[:, None] * angle)
     direction = (weights[:, :, None] * face).sum(axis=1)  # summed in a fixed order on every machine
     length = np.linalg.norm(direction, axis=1)

@@ -17,7 +17,7 @@ class InnerFaces(NamedTuple):
     """Faces between two tetrahedra."""
 
     tets: NDArray[np.int64]  # (f, 2) tetrahedra that share each face, the lower number first
-    corners: NDArray[np.int64]  # (f, 2, 3) vertices as local corners of both tetrahedra, in the same order
+    corners: NDArray[np.int64]  # (f, 2, 3) the face's local corners in both tetrahedra, in the same order
 
 
 def inner_faces(tets: IntArray) -> InnerFaces:

@@ -15,7 +15,8 @@ from taichi_soft.meshing.triangulation import triangulated
 from taichi_soft.meshing.visuals import visual_of
 
 HEADER = 84
-"""Bytes before the first triangle: a comment of 80 bytes and the number of triangles."""
+"""Number of bytes before the first triangle. They contain a comment of 80 bytes and the number of
+triangles."""
 
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
 

@@ -20,7 +20,7 @@ class Surface:
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
     visual: Any = None  # trimesh visual with texture coordinates, material or colours, or None
-    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or skipped
+    notes: tuple[str, ...] = ()  # messages about what the reader assumed, repaired or skipped
 
 
 def surface_of(

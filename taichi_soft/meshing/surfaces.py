@@ -34,10 +34,11 @@ default of common exporters: OpenSCAD and FreeCAD for .off files, and Blender fo
 files."""
 
 DEFINED = (".glb", ".gltf")
-"""Formats that define which axis points up."""
+"""Suffixes of the formats whose specification defines which axis points up."""
 
 MAX_SPACING = 1e-4
-"""Largest spacing of float32 numbers at a surface's distance from the origin, relative to its size."""
+"""Largest spacing of float32 numbers at a surface, as a fraction of the size of the surface. The spacing
+grows with the distance from the origin. If it is larger, `read_surfaces` adds a note."""
 
 
 def read_surfaces(
@@ -68,7 +69,7 @@ def read_surfaces(
 
 
 def assumed_up(source: Any) -> str:
-    """Return a sentence on the axis that is assumed to point up in a file, or "" if no axis is assumed."""
+    """Return a message that names the axis assumed to point up in a file, or "" if no axis is assumed."""
     suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""
@@ -129,7 +130,7 @@ READERS: dict[str, Callable[[Path], list[Surface]]] = {
     ".ply": read_ply,
     ".stl": read_stl,
 }
-"""Reader of each format, which returns surfaces in the axes and units of the file."""
+"""Reader of each format. A reader returns surfaces in the axes and units of the file."""
 
 
 def _surfaces(source: Any, name: str) -> list[Surface]:
@@ -170,7 +171,9 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 @contextlib.contextmanager
 def _silent(log: logging.Logger) -> Iterator[None]:
-    """Silence a logger. Without scipy, trimesh logs a traceback before it computes normals without scipy."""
+    """Silence a logger. If scipy is missing, trimesh logs a traceback, and then computes normals without
+    scipy.
+    """
     was, log.disabled = log.disabled, True
     try:
         yield
@@ -246,7 +249,7 @@ def _placed(surfaces: tuple[Surface, ...], center: bool, scale: float) -> tuple[
 
 
 def _with_notes(surface: Surface, notes: tuple[str, ...]) -> Surface:
-    """Return the surface with those of `notes` added that it does not have yet."""
+    """Return the surface with `notes` added. Notes that the surface already has are not repeated."""
     new = tuple(note for note in notes if note not in surface.notes)
     return replace(surface, notes=(*surface.notes, *new)) if new else surface
 

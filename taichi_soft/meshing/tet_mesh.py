@@ -87,7 +87,7 @@ class TetMesh(BodyMesh):
         return mesh
 
     def _inherit(self, original: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
-        """Copy data other than geometry from `original` to this part of it.
+        """Copy data other than geometry from `original` to this mesh, which is a part of `original`.
 
         The arguments `vertices` and `rows` are those of `part`.
         """

@@ -10,7 +10,8 @@ from taichi_soft.meshing.arrays import FloatArray
 Ints = NDArray[np.int64]
 
 FOLDED = 1e-9
-"""Fraction of a polygon's area below which a triangle of opposite orientation counts as flat."""
+"""A triangle of opposite orientation counts as flat if its area is below this fraction of the polygon's
+area."""
 
 
 def triangulated(corners: FloatArray, counts: Ints) -> tuple[Ints, Ints]:

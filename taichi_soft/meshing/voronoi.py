@@ -18,11 +18,11 @@ from taichi_soft.meshing.topology import LOCAL_FACES
 Ints = NDArray[np.int64]
 
 PERTURBATION = 1e-9
-"""Random shift of the Voronoi faces, relative to an edge. Without this shift, faces in regular meshes would
-coincide with faces of tetrahedra and would belong to both neighbours or to none."""
+"""Largest random shift of a Voronoi face, as a fraction of the shortest edge. Without this shift, faces in
+regular meshes would coincide with faces of tetrahedra and would belong to both neighbours or to none."""
 
 SMALLEST_FACE = 1e-7
-"""Area of a face, relative to the squared length of its edge, below which the face is an artefact of
+"""Smallest valid area of a face, divided by the squared length of its edge. A smaller face is an artefact of
 `PERTURBATION`."""
 
 
@@ -66,7 +66,7 @@ class VoronoiGraph:
 def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
     """Return the clipped Voronoi graph of a mesh.
 
-    The graph is computed once for each mesh, which takes about 1 s for 1,000 tetrahedra.
+    The graph is computed once for each mesh. The computation takes about 1 s for 1,000 tetrahedra.
     Args:
         mesh: Delaunay mesh, such as `delaunay_mesh` returns.
     Raises: MeshError if the mesh is not Delaunay; OptionError if scipy is missing.

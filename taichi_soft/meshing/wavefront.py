@@ -35,9 +35,9 @@ class _Content:
     vertices: list[list[bytes]] = field(default_factory=list)
     texcoords: list[list[bytes]] = field(default_factory=list)
     normals: list[list[bytes]] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)  # rows in the lists above, or NONE
+    corners: list[tuple[int, int, int]] = field(default_factory=list)  # vertex, texcoord and normal, or NONE
     counts: list[int] = field(default_factory=list)  # number of corners of each face
-    material: list[int] = field(default_factory=list)  # material of each face
+    material: list[int] = field(default_factory=list)  # material number of each face
     materials: dict[str, int] = field(default_factory=lambda: {"": 0})  # material numbers by name
     libraries: list[bytes] = field(default_factory=list)
     objects: set[str] = field(default_factory=set)
@@ -98,8 +98,9 @@ def read_obj(path: Path) -> list[Surface]:
 
 
 def _remove_missing(rows: Ints, texcoords: int, normals: int) -> list[str]:
-    """Replace rows of texture coordinates and normals that do not exist by NONE. Returns: notes with counts.
+    """Replace rows of texture coordinates and normals that do not exist by NONE.
 
+    Returns: notes with the number of replaced rows.
     Args:
         rows: vertex, texture coordinate and normal of each corner, (k, 3), changed in place.
         texcoords, normals: number of texture coordinates and of normals in the file.

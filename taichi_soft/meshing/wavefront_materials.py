@@ -9,7 +9,7 @@ from taichi_soft.meshing.text import as_ascii, decoded, is_number
 from taichi_soft.meshing.visuals import Look, find_referenced_file, read_image
 
 MAX_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
-"""Largest number of arguments of a texture's options. Options that are not listed have one argument."""
+"""Largest number of arguments of each option of a texture. Options that are not listed have one argument."""
 
 
 def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[dict[str, Look], list[str]]:
@@ -19,7 +19,7 @@ def read_materials(path: Path, libraries: list[bytes], used: set[str]) -> tuple[
         path: path of the .obj file.
         libraries: arguments of the file's `mtllib` statements.
         used: names of the materials that the file uses.
-    Returns: materials by name, and sentences on missing materials and textures.
+    Returns: materials by name, and messages about missing materials and textures.
     """
     looks: dict[str, Look] = {}
     notes: list[str] = []

@@ -10,12 +10,13 @@ SWEEPS = 6
 """Number of sweeps. Convergence is quadratic: four sweeps are enough for float32, six for float64."""
 
 NOTHING = 1e-17
-"""Relative size below which an off-diagonal entry does not change the diagonal, even in float64."""
+"""Off-diagonal entries below this fraction of the diagonal entries are skipped. A rotation would not change
+the diagonal, even in float64."""
 
 
 @ti.func
 def symmetric_eigen(columns):
-    """Return the eigenvalues in descending order, and the unit eigenvectors, which form a right-handed set.
+    """Return the eigenvalues in descending order, and a right-handed set of unit eigenvectors.
 
     Args:
         columns: symmetric 3x3 matrix as columns.

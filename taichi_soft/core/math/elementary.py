@@ -19,10 +19,10 @@ class _Kind:
     whole: Any  # integer type of the same width
     fraction: int  # number of bits of the fraction
     bias: int  # bias of the exponent
-    root_half: int  # bits of the square root of 1/2
+    root_half: int  # bit pattern of the square root of 1/2
     largest: float  # largest x for which e^x and e^-x are normal numbers
     ln2: tuple[float, float]  # log(2) in two parts; the product of the first part and any exponent is exact
-    terms: tuple[int, int, int, int]  # lengths of the series of exp, log, cosine and sine, arctangent
+    terms: tuple[int, int, int, int]  # number of terms for exp, for log, for cosine and sine, for atan
 
 
 _SINGLE = _Kind(
@@ -49,8 +49,8 @@ _LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
 _HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
 """pi / 2 in two parts. In 64 bits, the product of the first part with any integer below 2^20 is exact."""
 
-# Coefficients of the series after the first terms: 1 + x for exp, 2 s for log, 1 for cosine, x for sine and
-# arctangent.
+# Coefficients of the series without their first terms. The first terms are 1 + x for exp, 2 s for log, 1 for
+# cosine, and x for sine and arctangent.
 _EXP = [1.0 / math.factorial(k) for k in range(2, 14)]
 _LOG = [2.0 / (2 * k + 1) for k in range(1, 12)]
 _COS = [(-1.0) ** k / math.factorial(2 * k) for k in range(1, 10)]

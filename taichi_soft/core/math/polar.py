@@ -13,8 +13,8 @@ def orthogonal_factor(F):
     """Return the orthogonal matrix nearest to F, as columns: a rotation, or a reflection if F mirrors.
 
     The method is Newton's iteration for the polar decomposition, scaled by norms (Higham 1986), but with
-    cofactors instead of inverses. F and cof F have the same singular vectors, and the singular values of
-    their sum are closer together. Flat matrices need no branch, so the code can be vectorised. For a matrix
+    cofactors instead of inverses. F and cof F have the same singular vectors, and their sum has singular
+    values that are closer together. Flat matrices need no branch, so the code can be vectorised. For a matrix
     of rank 1, the result is finite but arbitrary.
     """
     a, b, c = F[0], F[1], F[2]

@@ -14,7 +14,7 @@ SWEEPS = 30
 """Number of Jacobi sweeps over all pairs of axes. Pairs whose off-diagonal entry is zero are skipped."""
 
 RESIDUE = 1e-12
-"""Numbers below this fraction of the largest number count as rounding errors."""
+"""Numbers below this fraction of the largest number count as rounding errors and are set to zero."""
 
 
 @ti.func

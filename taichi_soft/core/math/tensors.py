@@ -1,7 +1,7 @@
 """3x3 matrices as tuples of their three columns.
 
 Taichi 1.7 expands `ti.Matrix` products into scalars early, but vector operations late. Algebra that is
-written column by column therefore halves the compile time of every law, and the laws are as fast.
+written column by column therefore halves the compile time of every law without slowing the laws down.
 """
 
 from taichi_soft.core.runtime import ti

@@ -4,8 +4,8 @@ from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
-"""Lower limit of divisors. If a divisor is smaller, a length is zero in float32, and the numerator is zero
-too."""
+"""Lower limit of divisors, to prevent a division by zero. If a divisor is smaller, a length is zero in
+float32, so the numerator is also zero."""
 
 
 @ti.func
@@ -13,8 +13,8 @@ def closest_point_on_triangle(x, a, b, c):
     """Return the barycentric coordinates of the point of a triangle that is closest to x, vec3.
 
     The candidates are the projection of x onto the plane, if it is inside the triangle, and the closest point
-    of each edge. With any rounding errors, all candidates are points of the triangle. Degenerate triangles
-    are therefore no special case.
+    of each edge. Rounding errors cannot move a candidate out of the triangle, so degenerate triangles need no
+    special case.
     Args:
         x, a, b, c: vec3 [m].
     Returns: weights of a, b and c, each from 0 to 1, with sum 1.

@@ -15,13 +15,16 @@ import time
 from pathlib import Path
 
 LONGEST_HELD = 30.0
-"""Age from which a lock counts as abandoned [s]. The age allows for small differences between clocks."""
+"""Age of a lock file from which the lock counts as abandoned [s]. The value allows for clocks that differ by
+a few seconds."""
 
 LOCK = "ticache.lock"
 
 
 def folder_of(default: str) -> Path:
-    """Return the folder in which Taichi stores kernels: the folder named by the environment, or `default`."""
+    """Return the folder in which Taichi stores kernels: the folder that an environment variable names, or
+    `default`.
+    """
     return Path(os.environ.get("TI_OFFLINE_CACHE_FILE_PATH") or default)
 
 

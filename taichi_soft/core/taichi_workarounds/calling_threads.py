@@ -48,7 +48,7 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
         make(self, snode)
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
-    accessor.__init__ = make_in_turn  # uses a list of kernels that Taichi extends with the GIL released
+    accessor.__init__ = make_in_turn  # accessors read a list of kernels that Taichi extends without the GIL
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
 

@@ -41,10 +41,10 @@ def let_whole_numbers_overflow() -> None:
     plain = program.compile_kernel
 
     def compiled(self: Any, config: Any, *arguments: Any) -> Any:
-        config.debug = False  # all checks depend on this option, except for the bounds check
+        config.debug = False  # turns off all checks except the bounds check
         try:
             return plain(self, config, *arguments)
         finally:
-            config.debug = True  # needed at the launch, which raises errors of the bounds check
+            config.debug = True  # otherwise, the launch would not raise errors of the bounds check
 
     program.compile_kernel = compiled

@@ -1,4 +1,4 @@
-"""Digests of kernels, which cover everything that the code of a kernel depends on.
+"""Digests of kernels. A digest covers everything that the code of a kernel depends on.
 
 This file is part of `known_kernels`, and is unnecessary once `known_kernels` is unnecessary.
 """
@@ -25,8 +25,9 @@ class UnknownPartError(Exception):
 
 @functools.cache
 def digest_of_sources() -> str:
-    """Return a digest of the package's own files, the interpreter and NumPy, which determine how a kernel's
-    source is processed.
+    """Return a digest of everything that determines how a kernel's source is processed.
+
+    The digest covers the package's own files, the interpreter and NumPy.
     """
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
@@ -40,8 +41,8 @@ def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) ->
     Args:
         function: Python function of the kernel.
         options: Taichi's options that change code, as text.
-        arguments: a pair for each argument. A template argument has its value and True. Any other argument
-            has its features, for which Taichi compiles separate kernels, and False.
+        arguments: a pair for each argument. For a template argument, the pair is the value and True. For any
+            other argument, the pair is the features for which Taichi compiles separate kernels, and False.
     Raises: UnknownPartError if an argument has no digest.
     """
     parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
@@ -64,7 +65,7 @@ def _feature(value: Any) -> str:
 
 
 def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
-    """Append everything in a template argument that can change code to `parts`."""
+    """Append to `parts` everything in a template argument that can change code."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
         parts.append(repr(value))

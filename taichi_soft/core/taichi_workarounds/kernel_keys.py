@@ -16,7 +16,8 @@ from typing import Any
 from taichi_soft.core.taichi_workarounds.importing import ti
 
 _MOST_THREADS = 1 << 20
-"""Number of threads that a kernel can use: more than any machine has."""
+"""Number of threads that is compiled into each loop. It is larger than the number of threads of any
+machine."""
 
 
 def let_any_number_of_threads_run() -> None:
@@ -30,7 +31,8 @@ def let_any_number_of_threads_run() -> None:
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            # The bounds of a loop can call a real function. Compiling it begins other loops first.
+            # The bounds of a loop can call a real function. Taichi then compiles the loops of that function
+            # first.
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:

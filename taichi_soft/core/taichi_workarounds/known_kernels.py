@@ -5,7 +5,8 @@ processes the source of each kernel at every start. With a full cache, this take
 
 Here, a known kernel is created with a short body instead. The short body contains a digest of everything that
 the kernel's code depends on. When the process that compiled the kernel ends, the kernel's code is stored in
-the file of the short body. Taichi finds that file by the hash of the short body, which is quick to compute.
+the file of the short body. Taichi finds that file by the hash of the short body. This hash is quick to
+compute.
 
 If Taichi does not find the file, it compiles the short body itself. The short body only sets a flag. If the
 flag is set after the launch, the kernel is created from its source and launched.
@@ -36,13 +37,15 @@ kernels = ti.lang.kernel_impl
 Make = Callable[..., None]
 
 INDEX = "taichi_soft.json"
-"""Name of the file with the digests of known kernels, next to Taichi's own files."""
+"""Name of the file that contains the digests of known kernels. The file is in the folder of Taichi's own
+files."""
 
 FLAG = "__flag"
 """Name of the flag in the source of the short body. The flag is a field that the short body sets."""
 
 HEADER = 1 << 17
-"""Number of bytes at the start of a kernel's file that contain the names of the kernel's functions."""
+"""Number of bytes that are read from the start of a kernel's file. They contain the names of the kernel's
+functions."""
 
 
 class KnownKernels:
@@ -142,7 +145,7 @@ class FirstLaunches:
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
         if self._made:
-            _ = self._flag[None]  # compiles the kernel that reads the flag, which the next process needs
+            _ = self._flag[None]  # compiles the kernel that reads the flag: the next process needs it
 
     def keep(self) -> None:
         """Store the code of kernels that were created from their source in the files of their short bodies.

@@ -1,8 +1,8 @@
 """Read the source of kernels and functions once.
 
-Taichi reads the lines around each function when the function is defined, which takes more than half of the
-time to import this package. Taichi reads the whole source again for every call of a `ti.func`, and formats
-the lines around every expression for a possible message.
+When a function is defined, Taichi reads the lines around the function. This reading takes more than half of
+the time to import this package. Taichi reads the whole source again for every call of a `ti.func`, and
+formats the lines around every expression for a possible message.
 
 This file is unnecessary once Taichi's `_inside_class` reads no source and `get_pos_info` caches its results.
 The main branch does neither. https://github.com/taichi-dev/taichi/issues/7711 asked for a faster import.
@@ -48,7 +48,7 @@ def _is_in_class(level_of_class_stackframe: int) -> bool:
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return `look_up` with a cache, which keeps the result for each object as long as the object exists."""
+    """Return `look_up` with a cache that keeps the result for an object as long as the object exists."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
     def remembered(key: Any) -> Any:

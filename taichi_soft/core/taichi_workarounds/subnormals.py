@@ -24,7 +24,7 @@ from taichi_soft.core.taichi_workarounds.kernel_keys import not_kept
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 Environment = ctypes.c_char * 64
-"""Buffer for C's `fenv_t`, which has at most 32 bytes on all platforms of Taichi."""
+"""Type of a buffer for C's `fenv_t`. On all platforms of Taichi, `fenv_t` has at most 32 bytes."""
 
 
 def _unchanged(_: Any) -> None:

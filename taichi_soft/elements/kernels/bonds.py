@@ -27,7 +27,7 @@ def lane_pressure(state: ti.template(), block, lane):
 
 @ti.func
 def store_block_pressures(state: ti.template(), number):
-    """Store the pressures of a block's tetrahedra, which `ring_tension` reads."""
+    """Store the pressures of a block's tetrahedra for `ring_tension`."""
     block = number & BLOCK_BITS
     pressure = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
@@ -171,7 +171,7 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 def stored_frame_of(state: ti.template(), law: ti.template(), e):
     """Return the result of `bond_frame_of`.
 
-    With implicit integration, laws with planes read the result that the last evaluation of forces stored.
+    With implicit integration, laws with planes read the stored result of the last evaluation of forces.
     """
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)

@@ -10,7 +10,7 @@ from taichi_soft.elements.laws.springs import damped_pull, spring_tension
 
 @ti.func
 def _simple_force(state: ti.template(), model: ti.template(), e, r, relative_velocity, tension):
-    """Force of a spring, an additional `tension` [N], and damping on the first end of an edge [N].
+    """Sum of the spring force, an additional `tension` [N] and the damping on the first end of an edge [N].
 
     For laws without bonds, the force contains only the damping.
     """
@@ -65,7 +65,7 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
         force = _simple_force(state, model, e, r, relative_velocity, tension)
         for i in ti.static(range(3)):
             forces[lane, i] = ti.select(lane < count, force[i], 0.0)
-        forces[lane, 3] = 0.0  # also written, because gaps in the rows would prevent vector stores
+        forces[lane, 3] = 0.0  # gaps in the rows would prevent vector stores
     for half in ti.static(range(2)):
         total = ti.Vector.zero(state.real, 4)
         for i in range(HALF):
@@ -73,7 +73,7 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
             q = state.edge_vertices[first + lane][1]
             force = ti.Vector([forces[lane, axis] for axis in ti.static(range(4))])
             total += force
-            # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
+            # No `+=`: Taichi would make it atomic, although only one thread owns the body.
             state.particle_force[q] = state.particle_force[q] - force
         first_end = (p, p_later)[half]
         state.particle_force[first_end] = state.particle_force[first_end] + total

@@ -3,7 +3,7 @@
 The lanes of a block run in one loop that reads fields and writes only local arrays. LLVM's loop vectoriser
 then turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`). The
 vectoriser has two requirements. The loop must not write to a field, because the next lane could read the same
-memory. Index arithmetic must provably not overflow, which the mask `BLOCK_BITS` ensures.
+memory. Index arithmetic must provably not overflow; the mask `BLOCK_BITS` ensures this.
 """
 
 from taichi_soft.core.constants import LANES
@@ -14,7 +14,8 @@ from taichi_soft.elements.laws.damping import tet_mean_damping_forces
 from taichi_soft.elements.laws.force_model import flipped_forces, upright_forces
 
 BLOCK_BITS = (1 << 22) - 1
-"""Mask for block numbers. It changes no block number, because memory cannot hold 33 million tetrahedra."""
+"""Mask that leaves every block number unchanged. A larger block number would need 33 million tetrahedra, more
+than memory can hold."""
 
 
 @ti.func
@@ -126,7 +127,7 @@ def _compute_block_forces(
             g1[lane, i] = f1[i]
             g2[lane, i] = f2[i]
             g3[lane, i] = f3[i]
-        # The zeros are also written, because gaps in the rows would prevent vector stores.
+        # Write the zeros too, because gaps in the rows would prevent vector stores.
         g0[lane, 3] = 0.0
         g1[lane, 3] = 0.0
         g2[lane, 3] = 0.0
@@ -159,15 +160,15 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                # Taichi would copy the selected matrix to a variable for every lane, so there is no variable.
+                # Do not store the selected matrix in a variable: Taichi would copy the matrix for every lane.
                 force = ti.Vector([(g0, g1, g2, g3)[corner][lane, i] for i in ti.static(range(4))])
-                # `+=` would be atomic in Taichi, which is unnecessary: one thread owns the body.
+                # No `+=`: Taichi would make it atomic, although only one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
 
 
 @ti.func
 def store_block_forces(state: ti.template(), model: ti.template(), number):
-    """Store the corner forces of a block's tetrahedra, which the particles gather later."""
+    """Store the corner forces of a block's tetrahedra. The particles gather these forces later."""
     block = number & BLOCK_BITS
     g0 = ti.Matrix.zero(state.real, LANES, 4)
     g1 = ti.Matrix.zero(state.real, LANES, 4)

@@ -3,8 +3,9 @@
 K = - df/dx and D = - df/dv are both projected to be positive semi-definite. Only particles that share an edge
 interact, so every law fills the same blocks, and a product with the matrix is one pass over the edges. The
 rows of K and D sum to zero, so a product needs only `particle_inertia` and the velocity differences along
-edges. If all particles have the same velocity, the products of stiff blocks and velocities would cancel and
-leave only rounding errors. Only the preconditioner uses the diagonal blocks.
+edges. A product with the diagonal blocks would be less exact: if all particles have the same velocity, the
+large products of blocks and velocities would cancel and leave only rounding errors. Only the preconditioner
+uses the diagonal blocks.
 """
 
 from taichi_soft.core.constants import LANES
@@ -33,7 +34,8 @@ from taichi_soft.elements.laws.springs import along, spring_tension
 from taichi_soft.elements.laws.volume_springs import expansion_gradients
 
 EDGES = ((0, 0, 1), (1, 0, 2), (2, 0, 3), (3, 1, 2), (4, 1, 3), (5, 2, 3))
-"""Six edges of a tetrahedron: index of the edge in `state.tet_edges`, first corner and second corner."""
+"""The six edges of a tetrahedron. Each entry has the index of the edge in `state.tet_edges`, the first corner
+and the second corner."""
 
 
 @ti.func
@@ -154,7 +156,7 @@ def volume_pull(state: ti.template(), t):
 def _add_volume_stiffness(state: ti.template(), body, scale):
     """Add the stiffness of tetrahedra that pull the ends of their edges together.
 
-    The stiffness of a tetrahedron is w g^T (`volume_pull`), of which only the positive part is added. The
+    The stiffness of a tetrahedron is w g^T (`volume_pull`). This function adds only the positive part. The
     symmetric part of w g^T has the eigenvalues (w.g +- |w||g|) / 2. The positive eigenvalue belongs to the
     direction w/|w| + g/|g|.
     """

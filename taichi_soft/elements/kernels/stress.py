@@ -9,7 +9,7 @@ from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, part
 from taichi_soft.elements.laws.force_model import cauchy_stress
 
 NO_LIMIT = 1e30
-"""Value that turns a limit of stress off [Pa]. It is not infinity, because fast-math compilers assume that
+"""Limit of stress that no stress exceeds [Pa]. It is not infinity, because fast-math compilers assume that
 infinity does not occur."""
 
 

@@ -172,8 +172,8 @@ def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsNa
     """Return the name of the default law for a material and options.
 
     The default is "springs" for a `SpringMaterial`. It is "virial" for an `AnisotropicMaterial`, and for
-    options that only the laws of the thesis support. Otherwise it is "neo_hookean", because with this law no
-    body froze and every inverted body recovered (`python -m lab drop-test --sweep`).
+    options that only the laws of the thesis support. Otherwise it is "neo_hookean". In the drop test with
+    this law, no body froze and every inverted body recovered (`python -m lab drop-test --sweep`).
     """
     if isinstance(material, SpringMaterial):
         return "springs"

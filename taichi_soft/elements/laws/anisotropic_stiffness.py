@@ -31,7 +31,8 @@ from taichi_soft.elements.laws.anisotropy import anisotropic_stress, between, gr
 from taichi_soft.elements.laws.force_gradients import element_stiffness, positive_part, stiffness_block
 
 MIN_VOLUME = 0.05
-"""Lower limit of the relative volume V / V0 by which tension is divided."""
+"""Lower limit of the relative volume V / V0 as a divisor of the tension. It keeps the stiffness of a flat
+tetrahedron finite."""
 
 
 @ti.func

@@ -32,7 +32,7 @@ def subface(center, a, b):
 def carried_direction(rings: EdgeRings, directions: Floats) -> Floats:
     """Return the weights from which the carried direction of an edge is computed, (r, 3).
 
-    The weights are those of the edge's second end and of the two sides of each subface.
+    Each row has the weights of the edge's second end and of the two sides of the subface.
 
     A tetrahedron transforms a direction d at rest to F d = sum (A^-1 d)_i (x_i - x_0) (eq. 6.3). Here, x_0 is
     the edge's first end. The sum over the rows of an edge is the carried direction: the mean of F d over the

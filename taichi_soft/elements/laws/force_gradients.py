@@ -15,7 +15,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.laws.principal import hooke_principal
 
 MIN_GAP = 2.0e-3
-"""Relative gap of two stretches below which they count as equal, to avoid a quotient of round-off."""
+"""Two stretches count as equal if their relative difference is below this value. Otherwise, the shear
+stiffness would be a quotient of round-off errors."""
 
 
 @ti.func
@@ -36,14 +37,16 @@ def positive_part(columns):
 
 @ti.func
 def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template()):
-    """Return alpha and beta of a pair of axes [Pa]: half the sum, and half the difference, of the stiffness
-    against shear and the stiffness against rotation.
+    """Return alpha and beta of a pair of axes [Pa].
 
+    alpha is half the sum of the stiffness against shear and the stiffness against rotation. beta is half the
+    difference, shear minus rotation.
     Args:
         sa, sb: stretches along the two axes, with sa >= |sb| as `signed_svd` orders them.
         pa, pb: principal stresses along the two axes [Pa].
         along: shear stiffness in the limit of equal stretches [Pa].
-        largest: upper limit of the rotation stiffness [Pa], which is a quotient of round-off near sa = -sb.
+        largest: upper limit of the rotation stiffness [Pa]. Near sa = -sb, the rotation stiffness is a
+            quotient of round-off errors.
     """
     gap, total = sa - sb, sa + sb
     shear = along

@@ -18,7 +18,8 @@ from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law
 from taichi_soft.elements.laws.recovery import recovering_piola
 
 MIN_VOLUME = 1 / 1024
-"""Lower limit of the relative volume V / V0 by which force is divided to get the stress."""
+"""Lower limit of the relative volume V / V0 as a divisor in the conversion of force to stress. It keeps the
+stress of a flat tetrahedron finite."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class EnergyLaw:
     principal: Any  # ti.func (stretches vec3, lambda, mu) -> principal stress [Pa], derivatives as columns
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
-    flips: tuple[Flips, ...]  # exactly one treatment, which follows from the energy
+    flips: tuple[Flips, ...]  # a single treatment, which the energy determines
     parameters: tuple[str, ...] = SOLID
     keeps_energy: bool = True
     takes_anisotropy: bool = False

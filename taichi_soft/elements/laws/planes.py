@@ -16,8 +16,9 @@ def plane_angles(mesh: TetMesh, law: str) -> NDArray[np.float64]:
 
     The angle is NaN for edges without a bond.
 
-    The normal splits the strain of an edge into tension and shear. If the angle is larger, a larger part of a
-    tension counts as shear. Voronoi faces and tilted planes are perpendicular to their edges by construction.
+    The normal splits the strain of an edge into tension and shear. The larger the angle, the larger the part
+    of a tension that counts as shear. Voronoi faces and tilted planes are perpendicular to their edges by
+    construction.
     Args:
         mesh: rest shape.
         law: name of a law of chapter 4, such as "cmpm2" or "best_fitting_plane".

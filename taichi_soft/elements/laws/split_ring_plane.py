@@ -24,7 +24,8 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 FLAT = 1e-6
-"""Lower limit of the sine of the angle between the two vectors. Below the limit, the normal is round-off."""
+"""Lower limit of the sine of the angle between the two vectors. Below this limit, rounding errors would
+determine the normal."""
 
 
 def split_weights(rings: EdgeRings) -> tuple[Floats, Floats]:

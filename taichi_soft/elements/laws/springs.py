@@ -9,8 +9,8 @@ from taichi_soft.elements.materials import Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
 
 TINY = 1e-30
-"""Number that is added to squared lengths [m^2] to avoid a division by zero. It is far below any squared
-length, and adding it is faster than a maximum."""
+"""Number that is added to squared lengths to avoid a division by zero [m^2]. It is negligible compared with
+any squared length. Adding it is faster than taking a maximum."""
 
 
 @ti.func
@@ -35,7 +35,7 @@ def along(r, tension):
 
 @ti.func
 def damped_pull(r, relative_velocity, tension, damping):
-    """Sum of `along` and `edge_damping_force` [N]. The only division need not wait for the square root."""
+    """Sum of `along` and `edge_damping_force` [N]. The only division does not depend on the square root."""
     square = r.dot(r) + TINY
     inverse = 1.0 / square
     return r * (inverse * (tension * ti.sqrt(square) + damping * r.dot(relative_velocity)))

@@ -26,7 +26,7 @@ def linear_strain(F):
 
 @ti.func
 def exact_strain(F):
-    """Exact strain U - I with U = sqrt(F F^T) = F R^T, an open question in thesis chapter 7.
+    """Exact strain U - I with U = sqrt(F F^T) = F R^T. Thesis chapter 7 leaves it as an open question.
 
     A mirrored F has the same strain.
     """

@@ -21,7 +21,8 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import EdgeRings, TetMesh
 
 PRINTED = 1 / 8
-"""Ratio of c in eq. 4.12 as printed, (1/4) beta / (2 pi), to beta / pi."""
+"""Ratio of two values of c: (1/4) beta / (2 pi), which eq. 4.12 prints, and beta / pi, which the corrected
+law uses."""
 
 
 @ti.func

@@ -1,9 +1,9 @@
 """Springs with additional forces that preserve the volume of tetrahedra (thesis chapter 5).
 
-In addition to the springs, a tetrahedron that has expanded by dV pulls the ends of each of its six edges
-together, with the pressure E nu dV / V0 times the total area a of the edge. This is eq. 5.5 with the opposite
-sign. With the printed sign, an expanded tetrahedron pushes the ends apart, and its volume diverges. To get
-the printed forces, use Poisson's ratio -nu, which does not affect the springs.
+A tetrahedron that expands by dV also pulls the ends of each of its six edges together. The pull is the
+pressure E nu dV / V0 times the total area a of the edge: eq. 5.5 with the opposite sign. With the printed
+sign, an expanded tetrahedron pushes the ends apart, and its volume diverges. To get the printed forces, use
+Poisson's ratio -nu, which does not affect the springs.
 """
 
 from __future__ import annotations

@@ -148,7 +148,7 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
         where = f" {int(lengths.argmin())} is zero" if len(rows) else " are missing"
         raise MaterialError(f"directions{where}: pass the fibre's direction in every tetrahedron")
     along = rows / lengths[:, None]
-    # The smallest rotation that maps x to the direction; half a turn about z maps it to -x.
+    # Use the smallest rotation that maps x to the direction. For the direction -x, use half a turn about z.
     frames = np.empty((len(rows), 3, 3))
     cosine = along[:, 0]
     axis = np.cross([1.0, 0.0, 0.0], along)

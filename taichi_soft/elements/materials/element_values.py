@@ -14,7 +14,8 @@ from taichi_soft.core.errors import MaterialError
 Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 1e-9, 1e20
-"""Range of valid constants. Outside this range, forces or accelerations overflow float32."""
+"""Smallest and largest valid constant of a material. Outside this range, forces or accelerations overflow
+float32."""
 
 MAX_DAMPING_RATIO = 1000.0
 """Largest valid damping ratio. It is far above the damping that a substep can apply, so a larger ratio would

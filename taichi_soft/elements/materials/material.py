@@ -25,7 +25,8 @@ from taichi_soft.elements.materials.element_values import (
 )
 
 DAMPING_RATIO = 0.05
-"""Default damping ratio of a body's first mode: a tenth of the amplitude remains after seven oscillations."""
+"""Default damping ratio of a body's slowest vibration. With this value, a tenth of the amplitude remains
+after seven oscillations."""
 
 CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping")
 
@@ -54,9 +55,8 @@ class Material:
             None for E / (2 (1 + nu)).
         damping_ratio: damping ratio of the slowest vibration of a free body. With 0, the body is
             undamped. With 0.05, a tenth of the amplitude remains after seven oscillations. With 1, the body
-            returns without oscillating. All vibrations
-            decay at the same rate; rigid motion is not damped. The damping ratio never increases the
-            number of substeps. `damping` acts in addition.
+            returns without oscillating. All vibrations decay at the same rate; rigid motion is not damped.
+            The damping ratio never increases the number of substeps. `damping` acts in addition.
         shear_damping: damping b_m across the edges, eq. 4.5 [N s/m], only for the laws of chapter 4; None for
             the value of `damping`.
     Raises: MaterialError with the first value out of range.

@@ -1,4 +1,4 @@
-"""Constants of springs between given particles (thesis section 3.4)."""
+"""Constants of the springs between particles (thesis section 3.4)."""
 
 from __future__ import annotations
 

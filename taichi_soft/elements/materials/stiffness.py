@@ -21,7 +21,7 @@ from taichi_soft.elements.materials.element_values import LARGEST, SMALLEST
 Floats = NDArray[np.float64]
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-"""Axes of each of Voigt's six components."""
+"""The two axes of each of Voigt's six components."""
 
 ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
 """Row and column of each entry that can be non-zero if xy is a plane of symmetry. yz and xz then couple only

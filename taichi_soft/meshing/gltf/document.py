@@ -40,7 +40,7 @@ MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 REPLACEMENT_CHARACTER = "\ufffd".encode()
-"""Character that text tools write in place of bytes that they cannot decode."""
+"""UTF-8 bytes of the character that text tools write in place of bytes that they cannot decode."""
 
 
 class Document:

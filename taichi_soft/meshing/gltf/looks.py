@@ -26,19 +26,19 @@ TEXTURES = (
 )
 
 SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
-"""Extensions that store a texture's image in another format."""
+"""Extensions that store the image of a texture in a format other than PNG or JPEG."""
 
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM = "KHR_texture_transform"
 READ = (GLOSS, TRANSFORM, *SOURCES)
-ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # pillow cannot always read these formats
+ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # some builds of Pillow cannot read these formats
 
 
 class Looks:
     """Reader of the appearance of a file's primitives, as trimesh visuals.
 
     Attributes:
-        notes: sentences on images and materials that were not read.
+        notes: messages about images and materials that were not read.
     """
 
     def __init__(self, document: Document) -> None:
@@ -122,7 +122,7 @@ class Looks:
         return None
 
     def _opened(self, number: int) -> Any:
-        """Return image `number` as a pillow image, or a sentence on why it cannot be read."""
+        """Return image `number` as a pillow image, or a message that says why it cannot be read."""
         if missing_packages("film", "PIL"):
             return "texture images are not read without pillow: run pip install 'taichi-soft[film]'"
         from PIL import Image, UnidentifiedImageError

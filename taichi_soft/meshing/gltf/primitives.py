@@ -25,7 +25,8 @@ from taichi_soft.meshing.gltf.nodes import extension
 DRACO = "KHR_draco_mesh_compression"
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-"""Modes of primitives with triangles. The other modes are points and lines."""
+"""Modes of primitives with separate triangles, a triangle strip or a triangle fan. The other modes are points
+and lines."""
 
 
 class Primitive:

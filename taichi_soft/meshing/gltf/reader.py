@@ -36,13 +36,13 @@ SHAPELESS = (
 """Prefixes of extensions that do not change shapes. Files that require these extensions are read."""
 
 MAX_ROWS = 10_000_000
-"""Largest sum of all vertices and triangles. Even a small file can exceed this sum, if many nodes show the
-same mesh."""
+"""Largest total number of vertices and triangles in a scene. Even a small file can exceed this number, if
+many nodes show the same mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One primitive as the scene shows it, with all its instances, in the file's axes."""
+    """All instances of one primitive in the scene, in the file's axes."""
 
     name: str
     vertices: FloatArray  # (n, 3) [m]
@@ -74,7 +74,7 @@ def read_gltf(path: Path) -> list[Surface]:
 class _Reader:
     def __init__(self, document: Document) -> None:
         self.document, self.looks = document, Looks(document)
-        self.counts: Counter[str] = Counter()  # numbers for the notes
+        self.counts: Counter[str] = Counter()  # numbers that the notes report
         self.joints: set[int] = set()
         self.primitives: dict[tuple[int, int], Primitive] = {}
         self.remaining_rows = MAX_ROWS
