@@ -64,7 +64,7 @@ def framed(
 
 
 def _no_box(body: Body) -> Floats:
-    """Fail if a camera asks for the box of a body. An `Orbit` never asks for it."""
+    """Raise an error, because an `Orbit` never needs the box of a body."""
     raise AssertionError(body)
 
 

@@ -12,7 +12,7 @@ from taichi_soft.render.raster import Raster
 Floats = NDArray[np.float32]
 
 REACH = 0.06
-"""Radius of occlusion, as a fraction of the size of the scene."""
+"""Distance within which surfaces occlude each other, as a fraction of the size of the scene."""
 
 
 class Occlusion:

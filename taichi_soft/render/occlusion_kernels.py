@@ -20,11 +20,11 @@ TAPS = 10
 """Number of depth samples around a point."""
 
 TURNS = 4
-"""Edge of a block [points]. Each point of a block rotates its taps by another angle. The results are
-averaged over the block."""
+"""Edge of a block [points]. The taps are rotated by a different angle at each point of a block, and the
+results are averaged over the block."""
 
 WIDEST = 64.0
-"""Largest distance of a tap from its point [points]."""
+"""Largest distance between a point and its depth samples [points]."""
 
 BIAS = 0.12
 """Sine of the smallest angle above a triangle's plane at which other surfaces occlude the triangle. Without
@@ -40,7 +40,8 @@ ALIKE = 0.03
 def spiral_taps() -> NDArray[np.float32]:
     """Return offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
-    The `TAPS` offsets of each point of a block are contiguous. They form a spiral that is denser inside.
+    The `TAPS` offsets of each point of a block are contiguous. They form a spiral that is densest at its
+    centre.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
@@ -128,7 +129,8 @@ def hidden_share(
                 offset = pixel_ray(rays, u_there, v_there) / q_there - here
                 far2 = offset.dot(offset)
                 near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-                # The added thousandth of the reach prevents self-occlusion from round-off.
+                # Adding a thousandth of the reach to the distance prevents round-off from causing
+                # self-occlusion.
                 total += ti.max(above / ti.sqrt(far2 + 1e-6 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 

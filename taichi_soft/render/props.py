@@ -38,7 +38,7 @@ class Prop:
 
 
 class Scenery:
-    """Surfaces of all colliders of a world except its floor, and of further props.
+    """Surfaces of all colliders of a world except its floor, and surfaces of props.
 
     The surfaces are interpolated between the last two steps, like bodies. Call `remember` before each step.
     """

@@ -83,7 +83,7 @@ def rasterize(
             a1, b1, c1 = planes[t, 3], planes[t, 4], planes[t, 5]
             a2, b2, c2 = planes[t, 6], planes[t, 7], planes[t, 8]
             aq, bq, cq = planes[t, 9], planes[t, 10], planes[t, 11]
-            # If the innermost corner of a pixel is outside an edge, all samples of the pixel are outside.
+            # If all four corners of a pixel are outside an edge, all samples of the pixel are outside.
             m0 = c0 + 0.5 * (ti.abs(a0) + ti.abs(b0) + a0 + b0)
             m1 = c1 + 0.5 * (ti.abs(a1) + ti.abs(b1) + a1 + b1)
             m2 = c2 + 0.5 * (ti.abs(a2) + ti.abs(b2) + a2 + b2)

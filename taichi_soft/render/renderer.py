@@ -25,7 +25,7 @@ from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.tone import encode_table, light_table
 
-LARGEST = 8192  # largest edge [pixels]; beyond it, sample indices exceed 32 bits
+LARGEST = 8192  # largest width and height [pixels]; sample indices of larger images would exceed 32 bits
 
 
 class Renderer:
