@@ -40,7 +40,7 @@ def choices(
     A script saved by `taichi-soft live` begins with this context.
     Args:
         law, strain, flips: settings of all bodies, see `SoftBodyAsset`. A new law also replaces the scene's
-            strain and flips, which the new law may not support.
+            strain and flips, because the new law does not always support them.
         has_palette: True to let `World.build` reserve capacity for bodies that visitors add, see `PALETTES`.
         meshes: surface files. Visitors can add bodies of these shapes too.
     """

@@ -63,7 +63,8 @@ PRESET_SLIDERS: dict[str, dict[str, float]] = {
     and isinstance(each.poisson, float)
     and SLIDERS["poisson"].low <= each.poisson <= SLIDERS["poisson"].high
 }
-"""Values of the material sliders for each preset that fits their ranges."""
+"""Values of the material sliders, by name of the preset. Presets that the sliders cannot represent are left
+out."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,7 @@ class Controls:
         self._apply(changed)
 
     def record(self, sliders: Given) -> None:
-        """Store slider values without applying them, because a restored world already has them."""
+        """Store slider values without applying them. A restored world already has these values."""
         self.given, self.preset = dict(sliders.values), sliders.preset
 
     def _apply(self, names: set[str]) -> None:

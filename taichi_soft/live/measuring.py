@@ -25,8 +25,8 @@ COUNTS = (1, 16, 64)
 """Numbers of spheres in the measured worlds."""
 
 SECONDS = 11.0
-"""Length of a measurement [s]. A world reports percentiles of its last 600 steps, which take 10 s. In a
-longer measurement, these steps exclude those of the previous measurement."""
+"""Length of a measurement [s]. A world reports percentiles of its last 600 steps, which take 10 s. A
+measurement is longer, so that these steps do not include steps of the previous measurement."""
 
 TURNS = 5
 """Number of turns. Each turn consists of a measurement without and a measurement with a visitor."""
@@ -175,7 +175,7 @@ class _Reader:
 async def _latency(reader: _Reader, number: int) -> float:
     """Grab and lift a resting body. Returns: the time until the first frame in which it is lifted [s]."""
     await reader.say("reset")
-    await reader.listen(0.6 + 0.013 * (number % 7))  # moves begin at different times between two frames
+    await reader.listen(0.6 + 0.013 * (number % 7))  # vary the time between a frame and the following move
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])
     await reader.listen(0.1)
     rest, start = reader.corner[2], time.perf_counter()

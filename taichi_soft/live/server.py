@@ -42,10 +42,11 @@ MOST_MESHES = 8
 """Largest number of meshes that visitors can add. A world reserves capacity for bodies of each mesh."""
 
 BETWEEN_CHOICES = 1.0
-"""Shortest time between two choices of a law [s], because each choice starts a process."""
+"""Minimum time between two requests that start a world, such as a change of the law [s]. Each world runs
+in a new process."""
 
 VIEWED = ("grab", "move", "release", "tint")
-"""Requests that are accepted if another program steps the world."""
+"""Names of the requests that visitors can make if another program steps the world."""
 
 
 class LiveServer:
@@ -106,7 +107,7 @@ class LiveServer:
     async def close(self) -> None:
         """End all processes and connections."""
         for runner in self.worlds.coming.values():
-            runner.kill()  # a process that compiles reads no messages
+            runner.kill()  # a process does not read messages while it compiles
         for runner in self.worlds.panes.values():
             runner.stop()
         self.downloads.stop()
