@@ -12,10 +12,10 @@ PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
 """Default material. glTF treats a material without these values as metal."""
 
 COLORS = ((232, 107, 82), (41, 148, 158), (242, 178, 71), (102, 115, 199), (128, 178, 97), (204, 107, 153))
-"""Colours of bodies without a colour, sRGB from 0 to 255, the same colours as in films."""
+"""Default colours of bodies, sRGB from 0 to 255. Films use the same colours."""
 
 UNSET = (102, 102, 102)
-"""The grey that trimesh assigns to a material without a colour."""
+"""Grey that trimesh assigns to a material without a colour, sRGB from 0 to 255."""
 
 
 def visual_of(clip: Clip, number: int) -> Any:
