@@ -17,7 +17,7 @@ class Budget:
     substeps: int
     bodies: int
     tets: int
-    measured: Phases  # measurement of fewer or more spheres, from which `bodies` is scaled
+    measured: Phases  # measured with another number of spheres; `bodies` is computed from these times
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:

@@ -21,7 +21,7 @@ class Crossover:
     tets: int
     flat: Spread
     per_body: Spread
-    ratio: Spread  # time with "flat" over time with "per_body", for each pair of runs
+    ratio: Spread  # time with "flat" divided by time with "per_body", for each pair of runs
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:

@@ -26,15 +26,15 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
-DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as for the sphere of the thesis
+DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second; the sphere of the thesis has 700
 COUNT = 16
 SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
 SETTLING = 180
 """Number of frames after which bodies on the floor or in a heap have come to rest."""
 
 UNUSED_FACTOR = 25
-"""Unused features are measured with this many times as many pairs of steps. Only the median of about 300
-pairs can distinguish a ratio of 1.01 from 1.03."""
+"""Factor for the number of measured pairs of steps if a feature is unused. About 300 pairs are needed before
+the median can distinguish a ratio of 1.01 from 1.03."""
 
 
 @dataclass(frozen=True)
