@@ -24,7 +24,7 @@ from taichi_soft.fracture.cutting import require_room
 from taichi_soft.solver.context import WorldContext
 
 _MAX_COUNT = 1 << 53
-"""Largest valid number of steps or handles, and largest valid time [s]."""
+"""Largest valid number of steps and of handles. It is also the largest valid time [s]."""
 
 
 def write_manifest(context: WorldContext) -> dict[str, Any]:
