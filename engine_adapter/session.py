@@ -50,8 +50,8 @@ class RollbackSession:
     Each machine runs the same world and has its own session. `advance` makes a tick with the input of the own
     player, and predicts that the other players repeat their last known inputs. `message` returns a datagram
     for all other machines, and `receive` reads a datagram from one of them. Datagrams can arrive late, twice,
-    in any order or not at all, because each repeats all inputs that were not acknowledged. Give all machines
-    the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
+    in any order or not at all, because each datagram repeats all inputs that were not acknowledged. Give all
+    machines the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
         world: world built by the same script on all machines, at the same step.
@@ -59,7 +59,7 @@ class RollbackSession:
             step. The function must depend only on the inputs and the world, because ticks can be repeated.
         player: number of the own player, from 0.
         players: number of players, 2 to 16.
-        input_size: size of an input [bytes], 1 to 64. Before a player's first input, its input is zeros.
+        input_size: size of an input [bytes], 1 to 64. Before the first input of a player, all bytes are 0.
         step: length and substeps of each tick.
         ticks: largest number of ticks made on predictions, 1 to 1000. Each tick takes the memory of a
             snapshot.
@@ -110,12 +110,12 @@ class RollbackSession:
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
         self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
         self._heard = [first] * self._players  # per player, the first tick without a known input
-        self._acknowledged = [first] * self._players  # per player, first own input not yet received there
+        self._acknowledged = [first] * self._players  # per player, first own input not acknowledged
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
         self._hashes: dict[int, int] = {}  # own hashes, by tick
-        self._their_hashes: dict[tuple[int, int], int] = {}  # hashes still to compare, by tick and player
+        self._their_hashes: dict[tuple[int, int], int] = {}  # received, not yet compared, by tick and player
         self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
         self._waits = 0
@@ -242,8 +242,8 @@ class RollbackSession:
             self._their_hashes[message.hash_tick, other] = message.hash
         if message.tick > self._newest[other]:
             self._newest[other] = message.tick
-            # Each machine receives the other's tick late. If the latency is equal in both directions, half of
-            # the difference is this machine's lead.
+            # Each machine receives the other machine's tick late. If the latency is equal in both directions,
+            # half of the difference is the lead of this machine.
             lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 

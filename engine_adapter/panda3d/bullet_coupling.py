@@ -139,7 +139,7 @@ class BulletCoupling:
         """
         for each in self._rigid:
             each.push()
-        # With substeps, Bullet would report poses one step late, and late contacts gain energy.
+        # With substeps, Bullet would report poses one step late, and contacts at late poses would add energy.
         self._bullet.do_physics(dt, 0)
         for each in self._rigid:
             for one in each.colliders:

@@ -14,7 +14,8 @@ from taichi_soft import Body, Grab, OptionError, World
 Floats = NDArray[np.float64]
 
 _GRAZING = 1e-3
-"""Smallest cosine between a ray and the normal of the drag plane. Flatter rays hit the plane too far away."""
+"""Smallest cosine of the angle between a ray and the normal of the drag plane. Rays at a larger angle are
+ignored, because they hit the plane too far away."""
 
 
 class MouseGrab:
