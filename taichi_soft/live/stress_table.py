@@ -30,7 +30,7 @@ class StressRow:
 
 @dataclass(frozen=True)
 class StressTable:
-    """Result of `stress_table`. Notebooks show a table, and below it a stress histogram weighted by volume."""
+    """Result of `stress_table`. Notebooks show a table and a stress histogram weighted by volume."""
 
     rows: tuple[StressRow, ...]  # stress of each body
     edges: NDArray[np.float64]  # limits of the bars' stress intervals [Pa], (BARS + 1,)
