@@ -23,7 +23,7 @@ class EngineAdapter:
     """Runs a built world in fixed steps at any frame rate, and interpolates the positions to draw.
 
     While an adapter is in use, no other code must step or restore its world, because `alpha` and `time` count
-    the adapter's steps. Only one thread at a time can call an adapter, as for a world.
+    the adapter's steps. Only one thread at a time can call an adapter. The same holds for a world.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:

@@ -31,7 +31,7 @@ class Rollback:
             raise StateError("the world is not built: call world.build() before Rollback(world, ticks)")
         self._world = world
         self._ticks = as_count(ticks, "ticks")
-        self._snapshots: dict[int, bytes] = {}  # by step count, ascending
+        self._snapshots: dict[int, bytes] = {}  # snapshots by step count, ascending
         self._restore_count = world.restore_count  # value at the time of the snapshots
 
     @property

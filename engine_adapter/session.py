@@ -54,7 +54,7 @@ class RollbackSession:
     machines the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
-        world: world built by the same script on all machines, at the same step.
+        world: built world. All machines must build it with the same script, and start at the same step count.
         act: function that receives the inputs of all players, in their order, and applies them before each
             step. The function must depend only on the inputs and the world, because ticks can be repeated.
         player: number of the own player, from 0.
@@ -108,13 +108,13 @@ class RollbackSession:
         self._tick = first = world.step_count
         blank = bytes(self._input_size)
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
-        self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
+        self._used: dict[int, Inputs] = {}  # inputs of all players that each tick used
         self._heard = [first] * self._players  # per player, the first tick without a known input
         self._acknowledged = [first] * self._players  # per player, first own input not acknowledged
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
-        self._hashes: dict[int, int] = {}  # own hashes, by tick
+        self._hashes: dict[int, int] = {}  # hashes of own states, by tick
         self._their_hashes: dict[tuple[int, int], int] = {}  # received, not yet compared, by tick and player
         self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
@@ -164,7 +164,7 @@ class RollbackSession:
         Returns: False if no tick was made, because `ticks` ticks are already predicted. Call `advance` again
             in the next frame, and keep sending messages.
         Raises: OptionError for an input of another size; SessionError after `patience` consecutive calls
-            without a tick; errors of `act` and `World.step`, which leave the tick unmade.
+            without a tick; errors of `act` and `World.step`, after which the tick is not made.
         """
         if not isinstance(own_input, bytes) or len(own_input) != self._input_size:
             raise OptionError(f"own_input must be {self._input_size} bytes, got {own_input!r}")

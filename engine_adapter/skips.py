@@ -82,7 +82,7 @@ class Skips:
         ]
 
     def _slowed(self, load: int, limit: float) -> list[_Island]:
-        """Return the farthest islands, as many as must skip every second step to meet `limit`."""
+        """Return the farthest islands that must skip every second step to keep the load within `limit`."""
         slow, mean = [], float(load)
         for island in self._islands:
             if mean <= limit:

@@ -163,7 +163,8 @@ class BulletCoupling:
 
         Args:
             state: result of `snapshot`.
-        Raises: OptionError if rigid bodies were added or removed since the snapshot, with nothing changed.
+        Raises: OptionError if rigid bodies have been added or removed since the snapshot, with nothing
+            changed.
         """
         if [row[0] for row in state.rows] != [each.path for each in self._rigid]:
             raise OptionError(

@@ -51,7 +51,7 @@ class MouseGrab:
         self._bodies = None if bodies is None else tuple(bodies)
         self._frequency, self._max_force = frequency, max_force
         self._grab: Grab | None = None
-        self._plane = (np.zeros(3), np.zeros(3))  # a point [m] and the normal
+        self._plane = (np.zeros(3), np.zeros(3))  # drag plane: a point [m] and the normal
         if button is not None:
             base.accept(button, self._press_at_mouse)
             base.accept(f"{button}-up", self.release)

@@ -22,7 +22,7 @@ def visual_of(clip: Clip, number: int) -> Any:
     """Make a trimesh `TextureVisuals` with a glTF material: the artist's material or a default material.
 
     Args:
-        number: index of the clip, which chooses the colour of a clip without a colour.
+        number: index of the clip. It selects the default colour.
     """
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial

@@ -56,7 +56,7 @@ class GlbFile:
         self._set_view_targets()
 
     def _set_view_targets(self) -> None:
-        """Set the target of each buffer view, which trimesh omits and some importers require."""
+        """Set the target of each buffer view. Trimesh omits the targets, but some importers require them."""
         for mesh in self.content.meshes:
             (primitive,) = mesh.primitives
             kinds = {accessor: ARRAY_BUFFER for accessor in vars(primitive.attributes).values()}

@@ -22,8 +22,8 @@ from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core.errors import OptionError
 
 WIDEST, TALLEST = 4096, 16384
-"""WIDEST, TALLEST: largest width and largest height of a texture [pixels]. Common GPUs do not support more
-rows."""
+"""WIDEST: largest width of a texture [pixels]. TALLEST: largest height of a texture [pixels], because common
+GPUs do not support more rows."""
 
 LEVELS = 65535
 """Number of quantisation steps with 16 bits."""

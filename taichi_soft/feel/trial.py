@@ -41,7 +41,7 @@ class Standing(NamedTuple):
     """
 
     static_sag: float  # sag at rest, with drag
-    free_sag: float  # sag after the drag is removed, as in a game
+    free_sag: float  # sag without drag, as in a game
     lean: float  # rotation from the pose of the mesh [rad]
     inverted: int  # number of inverted tetrahedra; all tetrahedra if the body froze
 

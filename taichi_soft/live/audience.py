@@ -27,7 +27,7 @@ UNSEEN = 2
 """Largest number of frames that were sent to a visitor but are not shown yet. Further frames are skipped."""
 
 MOST_MESSAGES = 20
-"""Largest number of messages queued for a visitor; older messages are dropped."""
+"""Largest number of messages queued for a visitor. If the queue is full, the oldest message is dropped."""
 
 _log = logging.getLogger("taichi_soft")
 

@@ -50,8 +50,8 @@ class LiveCost:
     """Cost of the live view of one world.
 
     Attributes:
-        alone_ms, visited_ms: 50th and 99th percentile of the step time without and with a visitor, medians
-            over the turns.
+        alone_ms: 50th and 99th percentile of the step time without a visitor. Both are medians of the turns.
+        visited_ms: 50th and 99th percentile of the step time with a visitor. Both are medians of the turns.
         ratios: for each turn, the 99th percentile with a visitor divided by the 99th percentile without a
             visitor, ascending.
     """

@@ -17,7 +17,8 @@ from taichi_soft.live.pane import Runner
 from taichi_soft.live.scene import SceneSource
 
 MOST_BREAKDOWNS = 2
-"""Largest number of failures within a minute. After one more failure, a shown world is not restarted."""
+"""Largest number of failures within a minute after which a shown world is restarted. After one more failure,
+the world is closed."""
 
 USUAL_KERNELS = 70
 """Approximate number of kernels that a world compiles."""

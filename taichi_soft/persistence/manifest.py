@@ -67,9 +67,9 @@ class BodyEntry:
     part: CutMesh | None
     level: int  # level of detail
     held: NDArray[np.int64] | None  # see `BodyRecord`
-    friction: float | None  # None: the asset's friction
+    friction: float | None  # friction of the body; None for the asset's friction
     description: BodyDescription
-    arrays: BodyArrays | None  # None unless the body is cut
+    arrays: BodyArrays | None  # arrays of a cut body; None for an uncut body
 
 
 @dataclass

@@ -69,7 +69,7 @@ def paint_backdrop(
     Args:
         rays: directions of pixels, see `pixel_ray`.
         eye: position of the camera [m].
-        target: point from which the checks fade with distance [m].
+        target: point around which checks are visible; they fade with the distance from it [m].
         check: edge of a check [m].
         fade: distance at which the floor has faded into the sky [m].
         horizon, zenith, bright, dark: see `BackdropColors`.

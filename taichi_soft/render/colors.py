@@ -94,7 +94,7 @@ class ColorScale:
         self.colors([self.low])
 
     def colors(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Map numbers to colours from blue (`low`) over yellow to red (`high`).
+        """Map numbers to colours from blue (`low`) through yellow to red (`high`).
 
         All colours are bright enough for shaded surfaces.
 

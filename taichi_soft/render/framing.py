@@ -39,7 +39,7 @@ def framed(
     returned in its initial state.
     Args:
         make_stage: function that returns the same stage at each call.
-        aspect: width over height of the image.
+        aspect: width divided by height of the image.
         seconds: world time to run [s]; None uses the stage's default.
         orbit: period of an orbiting camera [s of world time], see `Orbit`; None for a fixed camera.
     Raises: OptionError for a moving camera or numbers out of range, before the run; and the errors of the
