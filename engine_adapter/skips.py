@@ -18,7 +18,7 @@ LOOK_AGAIN = 8
 
 @dataclass(frozen=True)
 class _Island:
-    """A group of connected bodies, which always skip a step together."""
+    """A group of connected bodies. All bodies of a group skip the same steps."""
 
     bodies: tuple[Body, ...]
     tets: int

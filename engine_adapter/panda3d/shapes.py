@@ -77,7 +77,9 @@ def pose_of(path: Any) -> tuple[Floats, Floats]:
 
 
 def _matrix(quaternion: Any) -> Floats:
-    """Return the rotation matrix of a quaternion, (3, 3), whose columns are the axes. Panda3D uses rows."""
+    """Return the rotation matrix of a quaternion, (3, 3). Its columns are the axes; in Panda3D, they are
+    rows.
+    """
     rows = core.LMatrix3()
     quaternion.extract_to_matrix(rows)
     turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T

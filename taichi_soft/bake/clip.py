@@ -1,4 +1,4 @@
-"""Clips: meshes over time, the input of all bake formats."""
+"""Clips, the input of all bake formats. A clip is a mesh with its motion."""
 
 from __future__ import annotations
 

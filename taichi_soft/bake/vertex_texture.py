@@ -3,8 +3,8 @@
 Each pixel is one vertex in one frame. Vertex v of frame f is in column v % width and row
 f * rows_per_frame + v // width, counted from the upper left. Positions have 16 bits per axis, from the lowest
 to the highest position of the whole bake. One image has the upper eight bits and another image the lower
-eight, because engines treat 16-bit images differently. All vertices of an absent body are at one point, so it
-is invisible.
+eight, because engines treat 16-bit images differently. All vertices of an absent body are at one point, so
+that the body is invisible.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ def _stage_of(
 
 
 def _scene_of(scene: str) -> Callable[[], Any]:
-    """Return a function that runs a script or function, which makes a new world or stage."""
+    """Return a function that runs a script or function to make a new world or stage."""
     if ":" not in scene and not scene.endswith(".py"):
         from taichi_soft.render.demos import demo_names
 

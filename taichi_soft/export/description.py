@@ -1,4 +1,4 @@
-"""Describe a world as named arrays for its world file, which does not contain kernels."""
+"""Describe a world as named arrays for its world file. The world file does not contain kernels."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
 
 
 def _held(context: WorldContext) -> Arrays:
-    """Return the vertices of the finest level that pins represent, for all slots. See `BodyRecord.held`."""
+    """Return the pinned vertices of the finest level for all slots, see `BodyRecord.held`."""
     bodies = context.slots.slots
     held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
     rows = [np.zeros(0) if each is None else each for each in held]

@@ -44,7 +44,7 @@ class Platform:
 
     @property
     def is_web(self) -> bool:
-        """True for WebAssembly, for which the native library is linked into the same file as the kernels."""
+        """True for WebAssembly. Its native library and its kernels are linked into one file."""
         return self.file == "web"
 
 

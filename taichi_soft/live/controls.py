@@ -204,7 +204,7 @@ class Controls:
             _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
-        """Apply the material sliders to a body. Skip a body of springs only, which has no material."""
+        """Apply the material sliders to a body. Skip a body of springs, because it has no material."""
         material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}

@@ -232,7 +232,7 @@ class LiveServer:
         self.downloads.film_asked(runner)
 
     def _choose(self, do: str, request: dict[str, Any]) -> None:
-        """Prepare a world with another law, which replaces the shown world or appears next to it."""
+        """Prepare a world with another law. The new world replaces the shown world or appears next to it."""
         self._require_patience()
         chosen = {key: request[key] for key in ("law", "strain", "flips")}
         pane = 1 if do == "compare" else request["pane"]

@@ -16,7 +16,7 @@ SUBSTEPS = 20
 
 @dataclass(frozen=True)
 class Crossover:
-    """Time of one body under both schedules [ns per tetrahedron and substep]."""
+    """Times of one body with both schedules [ns per tetrahedron and substep]."""
 
     tets: int
     flat: Spread

@@ -175,7 +175,7 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
     """Drop 32 spheres into a pit and time their steps at rest.
 
     First, only steps of the heap are timed, as in a game with one world. Then steps of the heap alternate
-    with steps of as many free spheres, which evict the heap from the CPU's caches."""
+    with steps of as many free spheres. The free spheres evict the heap from the CPU's caches."""
     world = bare_world(collider_room=8, soft_contact=True)
     free = bare_world(floor=None)
     for side in (-1, 1):

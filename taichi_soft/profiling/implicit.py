@@ -81,7 +81,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
 
 
 def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
-    """Measure the bar with the virial law, whose force gradients the thesis does not use (section 6.5)."""
+    """Measure the bar with the virial law. The thesis does not use its force gradients (section 6.5)."""
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}

@@ -69,7 +69,9 @@ def _no_box(body: Body) -> Floats:
 
 
 def _box_of_run(stage: Stage, seconds: float | None) -> tuple[Floats, Floats]:
-    """Run the stage. Returns: lower and upper corner of the box of its bodies over the whole run [m]."""
+    """Run the stage. Returns: lower and upper corner of the box that contains its bodies during the whole run
+    [m].
+    """
     if not isinstance(stage.camera, Camera):
         raise OptionError(f"stage.camera must be a fixed Camera, got {type(stage.camera).__name__}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")

@@ -63,7 +63,7 @@ def box_average(depth: ti.template(), size, left, top, fu, fv, height):
 
 @ti.func
 def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
-    """Return the fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the map.
+    """Return the fraction of sunlight that reaches a point of a body, 0 to 1, averaged in a box of the map.
 
     The map contains only faces turned away from the sun, so that a body does not shadow its own lit side.
     `LIFT` prevents false shadows at the rim of the lit side.

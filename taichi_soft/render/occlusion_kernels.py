@@ -2,7 +2,7 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Kernels for screen-space ambient occlusion, at half the image's width and height.
 
-On a plane in space, q = 1 / depth is linear over the image: a u + b v + c. Therefore the height of a point
+On a plane in space, q = 1 / depth is linear in the image: q = a u + b v + c. Therefore the height of a point
 above the plane of a triangle follows from (u, v) and q of the point.
 """
 
@@ -67,7 +67,7 @@ def gather_depth(
     In tiles without triangles, store q of the floor.
 
     Args:
-        backdrop: a, b, c of q on the floor, which is a u + b v + c.
+        backdrop: coefficients a, b, c of q = a u + b v + c on the floor.
         offset_u, offset_v: position of the first sample relative to the centre of the pixel [pixels].
         out: (height / 2, width / 2).
     """
@@ -103,7 +103,7 @@ def hidden_share(
     Args:
         rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
         lens: inverse of `rays`.
-        plane: a, b, c of q = 1 / depth on the triangle, which is a u + b v + c.
+        plane: coefficients a, b, c of q = 1 / depth = a u + b v + c on the triangle.
         reach: distance beyond which nothing occludes [m].
         focal: focal length [pixels].
     """

@@ -77,7 +77,7 @@ def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def is_level(collider: Collider) -> bool:
-    """True for a horizontal plane, such as the floor, which the renderer draws itself."""
+    """True for a horizontal plane, such as the floor. The renderer draws the floor itself."""
     return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
 
 

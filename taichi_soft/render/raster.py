@@ -59,7 +59,7 @@ class Raster:
         Args:
             to_picture: (4, 4), see `project_triangles`.
             near: smallest depth drawn [m]; None for an orthographic projection, where every depth is 1.
-            backdrop: a, b and c of the plane q = a u + b v + c, which hides everything behind it.
+            backdrop: coefficients of the plane q = a u + b v + c. The plane hides everything behind it.
             keep_empty_tiles: do not clear tiles without triangles, to save time.
         """
         if len(self.planes) != len(scene.triangles):

@@ -43,13 +43,13 @@ def rasterize(
 
     Args:
         samples: (s, 2), positions of the samples relative to the centre of a pixel [pixels].
-        backdrop: a, b, c of the plane q = a u + b v + c that hides everything behind it.
+        backdrop: coefficients of the plane q = a u + b v + c. The plane hides everything behind it.
         nearest: largest q that is drawn.
         clear_all: 1 to clear tiles without triangles too, 0 to skip them.
         tile_next: scratch, one entry per tile.
         tile_triangles: scratch, at least as long as the result of `project_triangles`.
-        depth: out, q of the nearest triangle, which has the largest q. Sample s of the pixel in column u and
-            row v has the index (v * width + u) * s_count + s.
+        depth: out, q of the nearest triangle. The nearest triangle has the largest q. Sample s of the pixel
+            in column u and row v has the index (v * width + u) * s_count + s.
         owner: out, index of the nearest triangle at each sample, or -1.
     """
     tiles_across = (width + TILE - 1) // TILE

@@ -191,7 +191,7 @@ class Renderer:
         return picture
 
     def _floor_depth(self) -> tuple[float, float, float]:
-        """Return a, b and c of the floor's 1 / depth over the image, a u + b v + c.
+        """Return the coefficients a, b and c of 1 / depth = a u + b v + c on the floor.
 
         The raster hides surfaces behind this plane.
         """
