@@ -97,7 +97,7 @@ def palette_of(world: World) -> dict[str, SoftBodyAsset]:
 
 
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
-    """Make the assets of the shapes, about 0.5 m wide, and of the mesh files, by name."""
+    """Return the assets of the shapes, which are about 0.5 m wide, and of the mesh files, by name."""
     shapes = (
         sphere(0.3, 3),
         box((0.5, 0.5, 0.5), (3, 3, 3)),

@@ -121,7 +121,7 @@ class Controls:
     def stable_substeps(self) -> int:
         """Number of substeps that the chosen materials need, predicted from the wave speed in each asset.
 
-        Estimating each body again instead would pause the world whenever a slider moves.
+        A new estimate for each body would pause the world whenever a slider moves.
         """
         has_stable_step = context_of_world(self.world).substeps.has_stable_step
         if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):

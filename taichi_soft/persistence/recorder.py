@@ -82,7 +82,7 @@ class Recorder:
         self._present = _Segment(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
-        self.field_accelerations: FieldAccelerations = []  # accelerations that the field gives next
+        self.field_accelerations: FieldAccelerations = []  # accelerations for the next step
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]

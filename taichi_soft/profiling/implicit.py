@@ -33,7 +33,7 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ImplicitGain:
-    """Time to simulate one second with implicit Euler and with another method, in alternating runs."""
+    """Times to simulate one second with implicit Euler and with another method, from alternating runs."""
 
     name: str
     step: float  # step of implicit Euler [s]

@@ -51,7 +51,7 @@ class KeptBudget:
     is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
     step: Spread  # time of `World.step` [ms]
     work: Spread  # CPU time of a step [ms], without waiting for other programs
-    settled: Spread  # time of the steps after the budget was met; of all steps if it was never met [ms]
+    settled: Spread  # time of the steps after the budget was met, or of all steps if it was never met [ms]
     frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
     late_settled: float  # fraction of late steps in `settled`

@@ -61,7 +61,7 @@ class Scenery:
         self._before = [_pose(prop) for prop in self._props]
 
     def at(self, alpha: float) -> list[Surface]:
-        """Return the surfaces between their stored pose (`alpha` 0) and their current pose (`alpha` 1)."""
+        """Return the surfaces, interpolated between the stored poses (`alpha` 0) and the current ones (1)."""
         for prop, surface, (start, turn) in zip(self._props, self._surfaces, self._before, strict=True):
             end, last_turn = _pose(prop)
             rotation = matrix_of(turned_by(turn, alpha * rotation_vector(turn, last_turn)))

@@ -24,7 +24,8 @@ CONTACT_SIZE = 192  # texels per side of the contact map, seen from the floor
 # its contact shadow is 1 / e.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
-# Depth below the floor, as a fraction of the size of the scene. Deeper surfaces cast no shadow on the floor.
+# Largest depth below the floor at which surfaces cast shadows on the floor, as a fraction of the size of the
+# scene.
 SUNK = 0.05
 # Largest distance from the camera's target at which bodies cast shadows, as a multiple of the distance
 # between camera and target. Without this limit, a body that flies away would stretch the map.
