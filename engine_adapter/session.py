@@ -137,7 +137,7 @@ class RollbackSession:
         """Estimated number of ticks by which this machine is ahead of the slowest other machine; negative if
         this machine is behind.
 
-        A game that occasionally skips a tick while this is above 1 avoids long rewinds on all machines.
+        To avoid long rewinds on all machines, occasionally skip a tick while `ahead` is above 1.
         """
         return max(self._leads[each] for each in self._others)
 

@@ -34,7 +34,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
 
 
 def variables_of(script: str) -> dict[str, Any]:
-    """Run a script, which can import modules from its own folder and from the current folder.
+    """Run a script. The script can import modules from its own folder and from the current folder.
 
     Returns: the script's variables, by name.
     Raises: OptionError if the file cannot be read; errors of the script.

@@ -92,7 +92,7 @@ class Recent:
         self._rows.clear()
 
     def rows(self) -> list[tuple[float, int, Any]]:
-        """Return the frames in order, each with world time [s], version of the meshes, (positions, poses)."""
+        """Return the frames in order, each as (world time [s], version of the meshes, (positions, poses))."""
         return list(self._rows)
 
 

@@ -263,7 +263,7 @@ class LiveServer:
             raise OptionError("too many of your requests are waiting: try again later")
 
     def take_upload(self, visitor: Visitor, content: bytes) -> None:
-        """Check a visitor's mesh in another process, then prepare a world with capacity for it."""
+        """Check a visitor's mesh in another process, then prepare a world with capacity for its bodies."""
         upload, visitor.upload = visitor.upload, None
         if upload is None:
             raise OptionError("a file arrived without its name")

@@ -21,10 +21,10 @@ class Budget:
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each frame rate, and scale their number until the frame time is used up.
+    """Measure `count` spheres at each frame rate, and estimate the number of spheres that fits a frame.
 
-    The fixed cost of a frame is scaled too. The material determines the substep, so a frame of half the
-    length needs half as many substeps.
+    The estimate is proportional to `count`, and includes the fixed cost of a frame. The material determines
+    the substep, so a frame of half the length needs half as many substeps.
     """
     found = []
     for rate in FRAME_RATES:

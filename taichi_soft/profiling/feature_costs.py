@@ -1,5 +1,5 @@
-"""Measure the cost of features, both unused and used, and of contact in a heap of bodies. Each measurement
-alternates with bodies without the feature.
+"""Measure the cost of unused features, of used features, and of contact in a heap of bodies. Each measurement
+alternates with a measurement of bodies without the feature.
 """
 
 from __future__ import annotations

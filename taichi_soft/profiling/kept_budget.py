@@ -1,4 +1,7 @@
-"""Measure whether bodies that need twice the time budget are reduced in detail until their steps fit it."""
+"""Measure whether a time budget reduces the detail of bodies until their steps fit the budget.
+
+Without a budget, the bodies need twice the time.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from taichi_soft.render.tone import WHITE
 
 @ti.func
 def smoothstep(low, high, x):
-    """Return 0 below `low`, 1 above `high`, and a smooth transition between."""
+    """Return 0 below `low`, 1 above `high`, and a smooth transition between both."""
     s = ti.math.clamp((x - low) / (high - low), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 

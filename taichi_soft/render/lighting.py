@@ -41,7 +41,7 @@ CLOTH_THROUGH = 0.42
 CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
-HORIZON = vec3(0.93, 0.94, 0.95)  # light of the sky that rims reflect
+HORIZON = vec3(0.93, 0.94, 0.95)  # light of the sky in reflections at grazing angles
 POOL = 0.14  # relative increase of the floor's brightness at the camera's target
 
 # Elevation and azimuth of the key light, which shines over the camera's left shoulder.
