@@ -19,8 +19,8 @@ class FixedStep:
     Args:
         dt: length of a step [s], see `World.step`.
         substeps: number of equal substeps of a step, 1 or more; None lets the world choose a stable number.
-        max_steps: largest number of steps per frame, 1 or more. Further time is dropped. If
-            a machine is too slow for the simulation, it shows slow motion instead of ever longer frames.
+        max_steps: largest number of steps per frame, 1 or more. Further time is dropped. If a machine is too
+            slow for the simulation, it shows slow motion instead of ever longer frames.
     Raises: OptionError for a value out of range.
     """
 

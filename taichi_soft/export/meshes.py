@@ -52,7 +52,7 @@ class ExportedMesh:
 
     @property
     def is_skin(self) -> bool:
-        """True for a skin, which is drawn at every level of detail."""
+        """True for a skin. Skins are drawn at every level of detail."""
         return self.tables[0].is_skin
 
 

@@ -18,7 +18,7 @@ from taichi_soft.render.take import Take, skins_of
 from taichi_soft.render.texture import Texture
 
 _RECENT = 25
-"""Number of recent frames from whose median step time the displayed speed is computed."""
+"""Number of recent frames. The displayed speed is computed from their median step time."""
 
 LABEL_DISTANCE = 1.2
 """Distance from a body's centre to its label, as a multiple of half the body's width at rest."""

@@ -176,7 +176,7 @@ def _stroke(line: float) -> int:
 
 
 def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> float:
-    """Return the largest line height at which all lines fit, at most the default [pixels]."""
+    """Return the largest line height up to the default at which all lines fit [pixels]."""
     line = max(LINE * side, SMALLEST_LINE)
     while line > 2.0:
         _, wide, high = _panel_size(lines, line)

@@ -29,7 +29,7 @@ LARGEST = 8192  # largest width and height [pixels]; sample indices of larger im
 
 
 class Renderer:
-    """Draws surfaces with a warm key light and a cool fill, over a checked floor that fades to the horizon.
+    """Draws surfaces with a warm key light and a cool fill, above a checked floor that fades to the horizon.
 
     Shadows are soft, nearby surfaces occlude ambient light, and tone mapping compresses bright tones, see
     `tone`.
