@@ -17,7 +17,7 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # contact thickness of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # inner radius and thickness of the bowl [m]
 BODIES = 20
-DRAG = 1.0  # damping rate [1/s], which stops balls that would roll between other bodies forever
+DRAG = 1.0  # damping rate [1/s]; without it, balls would roll between other bodies forever
 STEP = FixedStep(dt=1 / 50)
 
 

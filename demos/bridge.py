@@ -22,11 +22,11 @@ WIDTH, ROPE, THICKNESS = (
     0.12,
     0.12,
 )  # width of the bridge, width of its side ropes, thickness of planks and ropes [m]
-EDGE = 0.16  # height of the ropes' outer edges above the planks [m], so that nothing rolls off
+EDGE = 0.16  # height of the ropes' outer edges above the planks [m]; they stop rolling bodies
 HEIGHT = 1.5  # height of the straight bridge [m]
 WOOD, HEMP = 1.5e6, 1.0e6  # Young's moduli of planks and ropes [Pa]
 SOFT = Material(young=3.0e4, poisson=0.3, density=400.0, damping_ratio=0.1)
-DRAG = 1.0  # damping rate of the bodies [1/s], so that the bridge stops swinging
+DRAG = 1.0  # damping rate of the bodies [1/s]; it makes the bridge stop swinging
 LENGTH = PLANKS * PLANK + (PLANKS - 1) * GAP
 STEP = FixedStep(dt=1 / 50)
 

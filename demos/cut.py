@@ -26,7 +26,7 @@ SEAM, SLOPE = (
 CUT = np.array([0.0, 0.0, 1.53])  # point where the blade crosses the axis of the stretched bar [m]
 ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # direction of the blade's motion
 ASIDE = np.array([0.0, 1.0, 0.0])  # direction of the blade's edge
-WAY, WIDTH = 2.6, 0.3  # distance that the blade travels, and its width [m]
+WAY, WIDTH = 2.6, 0.3  # distance that the blade travels, and width of the blade [m]
 BEGIN, PASSING = 0.9, 0.5  # start time and duration of the blade's pass [s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
@@ -87,7 +87,7 @@ def stage() -> Stage:
 
 
 def _leaning(bar: TetMesh) -> TetMesh:
-    """Shear the mesh so that a boundary between its layers coincides with the cut, for smooth faces."""
+    """Shear the mesh so that a boundary between layers is in the plane of the cut. This smooths the faces."""
     x, y, z = bar.vertices.T
     nearness = np.clip(1.0 - np.abs(z - SEAM) / 0.6, 0.0, 1.0)
     return TetMesh(np.stack([x, y, z + SLOPE * x * nearness], axis=1), bar.tets)

@@ -53,7 +53,9 @@ def _mark_flips(color: tuple[float, float, float]):  # type: ignore[no-untyped-d
 
 
 def proof(stage: Stage) -> float:
-    """Return the number of inverted tetrahedra of the tolerant sphere minus that of the recovering sphere."""
+    """Return the number of inverted tetrahedra of the tolerant sphere minus the number of the recovering
+    sphere.
+    """
     tolerant, recover = (actor.body.flipped_count() for actor in stage.actors)
     return float(tolerant - recover)
 

@@ -17,8 +17,8 @@ JELLY = Material(young=2.5e4, poisson=0.4, density=500.0, damping_ratio=0.08)
 RUBBER = Material(young=4.0e5, poisson=0.3, density=1300.0, damping_ratio=0.3)
 SIZE, LAYERS = (1.8, 1.8, 0.5), 3  # size of a block [m], and number of blocks
 SKIN = 0.02  # distance between blocks [m]
-RADIUS, DROP = 0.5, 0.9  # radius of the ball, and its initial height above the stack [m]
-TURN = 0.12  # rotation of each block relative to the one below [rad]
+RADIUS, DROP = 0.5, 0.9  # radius of the ball, and initial height of the ball above the stack [m]
+TURN = 0.12  # rotation of each block relative to the block below [rad]
 STEP = FixedStep(dt=1 / 50)
 
 

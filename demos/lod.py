@@ -15,7 +15,7 @@ from taichi_soft.render.film import Actor, Stage
 
 CELLS = (10, 6, 4)  # cells along a ball in each level, finest first
 DISTANCES = (10.3, 13.8)  # distances from the camera above which the second and the third level are used [m]
-HYSTERESIS = 0.5  # distance below a limit in DISTANCES at which a ball returns to the finer level [m]
+HYSTERESIS = 0.5  # distance by which a ball must be below a limit to return to the finer level [m]
 JELLY = Material(young=3.0e4, poisson=0.4, density=200.0)
 RADIUS, COUNT = 0.5, 5
 SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # slope [rad], length and width [m] of the chute

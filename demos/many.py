@@ -12,7 +12,7 @@ from taichi_soft.render.film import Actor, Stage
 
 ROWS = 8
 PITCH = 2.8  # distance between the centres of spheres [m]
-LOWEST, SPREAD = 1.3, 4.5  # lowest initial height, and range above it [m]
+LOWEST, SPREAD = 1.3, 4.5  # smallest initial height, and range of initial heights [m]
 SOFT = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.03)
 
 

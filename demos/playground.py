@@ -32,7 +32,7 @@ HUB = np.array([1.85, 0.0, 3.6])  # centre of the wheel [m]
 HOLLOW = np.array([1.7, 0.0, 0.0])  # centre of the hollow [m]
 UP = np.array([0.0, 0.0, 1.0])
 RIM = 2.4  # radius of the hollow's rim [m]
-GROUND, MOVING = (0.52, 0.52, 0.40), (0.92, 0.90, 0.85)  # colours of colliders
+GROUND, MOVING = (0.52, 0.52, 0.40), (0.92, 0.90, 0.85)  # colours of the ground and of moving colliders
 STEP = FixedStep(dt=1 / 50)
 
 

@@ -53,7 +53,7 @@ class Machine:
     player: int
     world: World
     known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # known inputs, by tick and player
-    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # inputs with which each tick was made
+    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # inputs that each tick used
     names: dict[int, str] = field(default_factory=dict)  # state hash before each tick
     rewinds: int = 0
     wrong: int = 0  # number of repeated ticks that began in a different state than before
@@ -119,7 +119,7 @@ class Match:
         self.machines = [Machine(player, world) for player, world in enumerate(worlds)]
 
     def __call__(self, world: World) -> None:
-        """Run a tick of both machines, except for the step of the first world, which the caller makes
+        """Run a tick of both machines, except for the step of the first world. The caller makes that step
         next.
         """
         tick = world.step_count

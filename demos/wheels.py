@@ -23,7 +23,7 @@ RISE, TREAD, STEPS = 0.14, 0.9, 3  # height and depth of the steps [m], and thei
 FOOT, TOP = 1.4, 2.8  # start of the first step, and length of the last step [m]
 GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # position at which the motors brake [m]
 BEGIN = 0.4  # start time of the motors [s]
-DRAG = 2.0  # damping rate of a braking wheel, which would otherwise rock about its hub [1/s]
+DRAG = 2.0  # damping rate of a braking wheel [1/s]; without it, the wheel would rock about its hub
 SMOOTHING = 0.04  # weight of the last step in the displayed torques
 STEP = FixedStep(dt=1 / 50)
 
@@ -34,7 +34,7 @@ class Drivers:
     def __init__(self, motors: list[Motor]) -> None:
         """Start with all motors waiting."""
         self.motors = motors
-        self.torques = np.zeros(len(motors))  # running means [N m]
+        self.torques = np.zeros(len(motors))  # running mean of each motor's torque [N m]
 
     def __call__(self, world: World) -> None:
         """Update the motors before a step."""

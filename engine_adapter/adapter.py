@@ -23,7 +23,7 @@ class EngineAdapter:
     """Runs a built world in fixed steps at any frame rate, and interpolates the positions to draw.
 
     While an adapter is in use, no other code must step or restore its world, because `alpha` and `time` count
-    the adapter's steps. Only one thread at a time can call an adapter, as for a world.
+    the adapter's steps. Only one thread at a time can call an adapter. The same holds for a world.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -200,10 +200,11 @@ class EngineAdapter:
 
     @one_thread
     def rewind(self, steps: int) -> None:
-        """Undo the last `steps` steps and their inputs.
+        """Undo the last `steps` steps and the inputs of these steps.
 
-        Then repeat the steps with `step` and the corrected inputs. `alpha` does not change, so that drawing
-        continues at the same time.
+        The world returns to the state before the inputs of the first undone step. To repeat the steps, call
+        `step` with the corrected inputs. `alpha` does not change, so that rendering resumes at the same
+        simulated time after the repeated steps.
         Args:
             steps: number of fixed steps, from 1 to `rewind_ticks`.
         Raises: OptionError if `steps` exceeds `rewind_ticks` or the number of steps since the last `restore`;

@@ -16,27 +16,31 @@ from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
-"""Limits for the expected time of a long step, as fractions of the budget. Above TIGHT, detail is reduced
-until the time is below FULL. Detail is raised only up to ROOMY. The gaps prevent levels from oscillating."""
+"""Limits of the expected time of a long step, as fractions of the budget. If the time is above TIGHT, detail
+is reduced until the time is at most FULL. Detail is raised only while the time stays at most ROOMY. The
+differences between the limits prevent levels from oscillating."""
 
 REMEMBERED = 8
-"""Number of recent steps whose median gives the cost of a tetrahedron. The median ignores interrupted
-steps."""
+"""Number of recent steps from which the cost of a tetrahedron is computed. The cost is a median, so that
+single interrupted steps have no effect."""
 
 SPREAD, LONG, LEAST_LONG, MOST_LONG = 240, 0.97, 1.15, 1.5
-"""The expected time of a long step is the median time multiplied by a factor. The factor is the quantile LONG
-of time divided by median in the last SPREAD steps, clamped to [LEAST_LONG, MOST_LONG]. Without this limit,
-other programs that interrupt many steps would reduce detail too far."""
+"""A long step is expected to take the median step time multiplied by a factor. SPREAD: number of recent steps
+whose ratios of time to median are stored. LONG: quantile of these ratios that is used as the factor.
+LEAST_LONG, MOST_LONG: limits of the factor. Without MOST_LONG, detail would be reduced too far if other
+programs interrupted many steps."""
 
 PATIENCE = 30
-"""Number of steps without a reduction before levels are raised: 0.5 s of a game."""
+"""Number of steps without a reduction of detail before levels are raised. This is 0.5 s at 60 steps per
+second."""
 
 TRY_AGAIN = 8
-"""Number of steps to wait after a search found no level to lower, because the search itself takes time."""
+"""Number of steps until the next search for levels to lower, if a search found none. Each search takes
+time."""
 
 CHANGING = 0.25
-"""Fraction of the budget after which no further level is changed before a step. The first change is always
-made."""
+"""Time for changes of level before a step, as a fraction of the budget. When this time is over, no further
+level is changed. The first change is always made."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Budget:
         self._world = world
         self._viewer: NDArray[np.float64] | None = None
         self._costs: deque[float] = deque(maxlen=REMEMBERED)  # cost of a tetrahedron in recent steps [s]
-        self._spread: deque[float] = deque(maxlen=SPREAD)  # ratio of each cost to the median before it
+        self._spread: deque[float] = deque(maxlen=SPREAD)  # each cost, divided by the median of earlier costs
         self._load = 0  # number of tetrahedra that move in the next step, or moved in the last step
         self._calm = 0  # steps since a reduction or an attempt to raise levels
         self._waits = 0  # steps until the next attempt to lower levels
@@ -122,7 +126,7 @@ class Budget:
             del self._decided[old]
 
     def revert(self) -> None:
-        """Undo the changes of the last `prepare`, because the following step was refused."""
+        """Undo the changes of the last `prepare`, because the step after it failed."""
         if self._before is not None:
             undo(self._world, self._before)
         step = self._world.step_count
@@ -221,7 +225,7 @@ class Budget:
         return changes
 
     def _is_late(self, start: float) -> bool:
-        """True if the changes since `start` already take too long for one frame."""
+        """True if the time for changes of level, which began at `start`, is over, see `CHANGING`."""
         return perf_counter() - start > CHANGING * self.seconds
 
     def _with_levels(self, change: int) -> list[Body]:
@@ -238,7 +242,7 @@ class Budget:
     def _has_changed(self, body: Body, level: int) -> bool:
         """Change the level of a body. Return False if the change is refused, see `Body.set_level`.
 
-        Levels of held bodies are not lowered, because a player may be holding the body.
+        The level of a held body is not lowered, because a player can be dragging the body.
         """
         if body.is_held and level > body.level:
             return False

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from taichi_soft.core.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
-"""A step is due if at most this fraction of its time is missing. The sum of frame times has rounding errors:
-six frames of 1/60 s are not exactly 1/10 s. A billionth of a step is larger than the rounding errors of years
-of frames, and invisible."""
+"""Fraction of a step's length that can be missing when the step becomes due. The sum of frame times has
+rounding errors: six frames of 1/60 s are not exactly 1/10 s. A billionth of a step is larger than the
+rounding errors that accumulate in years of frames, and too short to be visible."""
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class FixedStep:
     Args:
         dt: length of a step [s], see `World.step`.
         substeps: number of equal substeps of a step, 1 or more; None lets the world choose a stable number.
-        max_steps: largest number of steps per frame, 1 or more. Further time is dropped: a machine too slow
-            for the simulation then shows slow motion instead of longer and longer frames.
+        max_steps: largest number of steps per frame, 1 or more. Further time is dropped. If a machine is too
+            slow for the simulation, it shows slow motion instead of ever longer frames.
     Raises: OptionError for a value out of range.
     """
 

@@ -31,8 +31,8 @@ class Rollback:
             raise StateError("the world is not built: call world.build() before Rollback(world, ticks)")
         self._world = world
         self._ticks = as_count(ticks, "ticks")
-        self._snapshots: dict[int, bytes] = {}  # by step count, ascending
-        self._restore_count = world.restore_count  # the value when the snapshots were stored
+        self._snapshots: dict[int, bytes] = {}  # snapshots by step count, ascending
+        self._restore_count = world.restore_count  # value at the time of the snapshots
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -41,7 +41,7 @@ class Rollback:
 
     @property
     def _is_past(self) -> bool:
-        """True if the snapshots are from the past of the current state."""
+        """True if the snapshots lead to the current state, because no other code has restored the world."""
         return self._restore_count == self._world.restore_count
 
     def save(self) -> None:
@@ -52,7 +52,7 @@ class Rollback:
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks + 1:  # the newest snapshot is of the current state
+        while len(self._snapshots) > self._ticks + 1:  # the newest snapshot is the current state
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:

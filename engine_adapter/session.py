@@ -50,16 +50,16 @@ class RollbackSession:
     Each machine runs the same world and has its own session. `advance` makes a tick with the input of the own
     player, and predicts that the other players repeat their last known inputs. `message` returns a datagram
     for all other machines, and `receive` reads a datagram from one of them. Datagrams can arrive late, twice,
-    in any order or not at all, because each repeats all inputs that were not acknowledged. Give all machines
-    the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
+    in any order or not at all, because each datagram repeats all inputs that were not acknowledged. Give all
+    machines the same arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
-        world: world built by the same script on all machines, at the same step.
+        world: built world. All machines must build it with the same script, and start at the same step count.
         act: function that receives the inputs of all players, in their order, and applies them before each
             step. The function must depend only on the inputs and the world, because ticks can be repeated.
         player: number of the own player, from 0.
         players: number of players, 2 to 16.
-        input_size: size of an input [bytes], 1 to 64. Before a player's first input, its input is zeros.
+        input_size: size of an input [bytes], 1 to 64. Before the first input of a player, all bytes are 0.
         step: length and substeps of each tick.
         ticks: largest number of ticks made on predictions, 1 to 1000. Each tick takes the memory of a
             snapshot.
@@ -108,14 +108,14 @@ class RollbackSession:
         self._tick = first = world.step_count
         blank = bytes(self._input_size)
         self._inputs = [{first - 1: blank} for _ in range(self._players)]  # per player, known inputs by tick
-        self._used: dict[int, Inputs] = {}  # inputs with which each tick was made
+        self._used: dict[int, Inputs] = {}  # inputs of all players that each tick used
         self._heard = [first] * self._players  # per player, the first tick without a known input
-        self._acknowledged = [first] * self._players  # per player, first own input not yet received there
+        self._acknowledged = [first] * self._players  # per player, first own input not acknowledged
         for _ in range(self._delay):
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
-        self._hashes: dict[int, int] = {}  # own hashes, by tick
-        self._their_hashes: dict[tuple[int, int], int] = {}  # hashes still to compare, by tick and player
+        self._hashes: dict[int, int] = {}  # hashes of own states, by tick
+        self._their_hashes: dict[tuple[int, int], int] = {}  # received, not yet compared, by tick and player
         self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
         self._waits = 0
@@ -137,7 +137,7 @@ class RollbackSession:
         """Estimated number of ticks by which this machine is ahead of the slowest other machine; negative if
         this machine is behind.
 
-        A game that occasionally skips a tick while this is above 1 avoids long rewinds on all machines.
+        To avoid long rewinds on all machines, occasionally skip a tick while `ahead` is above 1.
         """
         return max(self._leads[each] for each in self._others)
 
@@ -164,7 +164,7 @@ class RollbackSession:
         Returns: False if no tick was made, because `ticks` ticks are already predicted. Call `advance` again
             in the next frame, and keep sending messages.
         Raises: OptionError for an input of another size; SessionError after `patience` consecutive calls
-            without a tick; errors of `act` and `World.step`, which leave the tick unmade.
+            without a tick; errors of `act` and `World.step`, after which the tick is not made.
         """
         if not isinstance(own_input, bytes) or len(own_input) != self._input_size:
             raise OptionError(f"own_input must be {self._input_size} bytes, got {own_input!r}")
@@ -242,8 +242,8 @@ class RollbackSession:
             self._their_hashes[message.hash_tick, other] = message.hash
         if message.tick > self._newest[other]:
             self._newest[other] = message.tick
-            # Each machine receives the other's tick late. If the latency is equal in both directions, half of
-            # the difference is this machine's lead.
+            # Each machine receives the other machine's tick late. If the latency is equal in both directions,
+            # half of the difference is the lead of this machine.
             lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 

@@ -1,4 +1,4 @@
-"""Choose the bodies that skip a step if there is no time for all. The farthest bodies take turns."""
+"""Choose the bodies that skip a step if there is no time for all bodies. The farthest bodies take turns."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from taichi_soft import Body, World
 from taichi_soft.core.handles import serial_of
 
 LEAST = 0.25
-"""Smallest fraction of the slow tetrahedra that move in each step, so that no body skips more than three
-steps in a row."""
+"""Smallest fraction of the tetrahedra in slow islands that moves in each step. Slow islands are the islands
+that currently skip steps. With this fraction, no body skips more than three steps in a row."""
 
 LOOK_AGAIN = 8
 """Number of steps between updates of islands and distances."""
@@ -18,7 +18,7 @@ LOOK_AGAIN = 8
 
 @dataclass(frozen=True)
 class _Island:
-    """A group of connected bodies, which always skip a step together."""
+    """A group of connected bodies. All bodies of a group skip the same steps."""
 
     bodies: tuple[Body, ...]
     tets: int
@@ -82,7 +82,7 @@ class Skips:
         ]
 
     def _slowed(self, load: int, limit: float) -> list[_Island]:
-        """Return the farthest islands, as many as must skip every second step to meet `limit`."""
+        """Return the farthest islands that must skip every second step to keep the load within `limit`."""
         slow, mean = [], float(load)
         for island in self._islands:
             if mean <= limit:

@@ -1,8 +1,8 @@
 """Write the demo as a project for Godot 3 or 4: `python write_project.py 3 FOLDER`.
 
 The folder `demo` contains the nodes and the demo for Godot 4. `demo3` and `demo4` contain files for one
-version only. For Godot 3, the tables below replace expressions. If that is not enough, comments after a line
-that begin with `# Godot 3: ` contain the lines that replace it.
+version only. For Godot 3, the tables below replace expressions. If this is not sufficient, a line is followed
+by comments that begin with `# Godot 3: `. The text of these comments replaces the line.
 """
 
 import re
@@ -15,7 +15,7 @@ Pairs = list[tuple[str, str | Callable[[re.Match[str]], str]]]
 HERE = Path(__file__).resolve().parent
 PICTURE = HERE.parents[1] / "assets" / "elephant.glb"
 KINDS = (".gd", ".tscn", ".godot", ".gdns", ".gdnlib", ".gdextension", ".py")
-"""Suffixes of the files that belong to a project. An editor adds other files."""
+"""Suffixes of the files that belong to a project. Godot's editor adds files with other suffixes."""
 
 MARK = "# Godot 3: "
 

@@ -74,7 +74,7 @@ ENUMS = {
 }
 
 COUNTS = {WORLD: "1", BODY: "bodies", PARTICLE: "particles", COLLIDER: "collider_room"}
-"""C++ expressions for the number of rows of a field, by `rows` of its declaration."""
+"""For each value of `rows` in a field's declaration, the C++ expression for the field's number of rows."""
 
 CONDITIONS = {
     "": "",
@@ -82,8 +82,8 @@ CONDITIONS = {
     "has_soft_contact": "has_soft_contact",
     "implicit": "is_implicit",
 }
-"""Members of `Scene` that are true if the scene has the field, by `when` of its declaration. Every exported
-world has contact."""
+"""For each value of `when` in a field's declaration, the member of `Scene` that is true if the scene has the
+field. The member is empty if every scene has the field. Every exported world has contact."""
 
 THINGS = {"": "kNothing", PARTICLE: "kParticles", BODY: "kBodies", COLLIDER: "kColliders", FRAME: "kFrames"}
 

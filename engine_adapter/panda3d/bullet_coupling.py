@@ -139,7 +139,7 @@ class BulletCoupling:
         """
         for each in self._rigid:
             each.push()
-        # With substeps, Bullet would report poses one step late, and late contacts gain energy.
+        # With substeps, Bullet would report poses one step late, and contacts at late poses would add energy.
         self._bullet.do_physics(dt, 0)
         for each in self._rigid:
             for one in each.colliders:
@@ -163,7 +163,8 @@ class BulletCoupling:
 
         Args:
             state: result of `snapshot`.
-        Raises: OptionError if rigid bodies were added or removed since the snapshot, with nothing changed.
+        Raises: OptionError if rigid bodies have been added or removed since the snapshot, with nothing
+            changed.
         """
         if [row[0] for row in state.rows] != [each.path for each in self._rigid]:
             raise OptionError(

@@ -37,7 +37,7 @@ class DebugNode(core.NodePath):  # type: ignore[misc]
             raise OptionError(f"adapter must be an EngineAdapter, got {type(adapter).__name__}")
         super().__init__(core.GeomNode("soft body debug"))
         self._adapter = adapter
-        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # (topology version, edges)
+        self._body_edges: dict[Body, tuple[int, NDArray[np.int32]]] = {}  # topology version, edges
         self._shape_edges: dict[Shape, Floats] = {}
         self.set_light_off(1)
         self.set_texture_off(1)

@@ -12,7 +12,7 @@ from panda3d import core
 _UNSET = np.full(3, 102 / 255)
 """Grey that trimesh assigns to a material without a colour."""
 
-_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by id of the material
+_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # textures, by id of the material
 
 
 def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:

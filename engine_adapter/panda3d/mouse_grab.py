@@ -14,7 +14,8 @@ from taichi_soft import Body, Grab, OptionError, World
 Floats = NDArray[np.float64]
 
 _GRAZING = 1e-3
-"""Smallest cosine between a ray and the normal of the drag plane. Flatter rays hit the plane too far away."""
+"""Smallest cosine of the angle between a ray and the normal of the drag plane. Rays at a larger angle are
+ignored, because they hit the plane too far away."""
 
 
 class MouseGrab:
@@ -50,7 +51,7 @@ class MouseGrab:
         self._bodies = None if bodies is None else tuple(bodies)
         self._frequency, self._max_force = frequency, max_force
         self._grab: Grab | None = None
-        self._plane = (np.zeros(3), np.zeros(3))  # a point [m] and the normal
+        self._plane = (np.zeros(3), np.zeros(3))  # drag plane: a point [m] and the normal
         if button is not None:
             base.accept(button, self._press_at_mouse)
             base.accept(f"{button}-up", self.release)

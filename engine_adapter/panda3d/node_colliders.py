@@ -28,7 +28,7 @@ class NodeCollider:
         return f"NodeCollider({self.path.get_name()!r}, {self.collider!r})"
 
     def follow(self) -> None:
-        """Move the collider to the node's pose over the next step. The collider pushes bodies in its path.
+        """Move the collider to the node's pose during the next step. The collider pushes bodies in its path.
 
         Call this in `before_step`, after setting the pose that the node has at the end of the step.
         Raises: StateError after the collider was removed.

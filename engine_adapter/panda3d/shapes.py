@@ -16,7 +16,8 @@ from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, Shape, 
 Floats = NDArray[np.float64]
 
 _SCALE_TOLERANCE = 1e-3
-"""Largest relative difference of scales that count as uniform. It covers rounding in float32."""
+"""Largest relative difference between the scales along a node's axes for which the scale counts as uniform.
+The difference covers rounding in float32."""
 
 _ADVICE = "build it from those, or add a shape with World.add_collider"
 
@@ -76,7 +77,9 @@ def pose_of(path: Any) -> tuple[Floats, Floats]:
 
 
 def _matrix(quaternion: Any) -> Floats:
-    """Return the rotation matrix of a quaternion, (3, 3), whose columns are the axes. Panda3D uses rows."""
+    """Return the rotation matrix of a quaternion, (3, 3). Its columns are the axes; in Panda3D, they are
+    rows.
+    """
     rows = core.LMatrix3()
     quaternion.extract_to_matrix(rows)
     turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T
@@ -191,8 +194,8 @@ _SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
     core.CollisionCapsule: _capsule,
     core.CollisionPlane: _plane,
 }
-"""Converters by exact class, because subclasses can be other shapes: CollisionPolygon is a subclass of
-CollisionPlane, and hollow solids are subclasses of spheres."""
+"""Converter for each class of solids. Subclasses are not converted, because they can have other shapes:
+CollisionPolygon is a subclass of CollisionPlane, and hollow solids are subclasses of spheres."""
 
 _BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
     bullet.BulletSphereShape: _bullet_sphere,

@@ -98,8 +98,8 @@ def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
 
 
 def _box_round(positions: NDArray[np.float32]) -> Any:
-    """Return a BoundingBox of points (n, 3) for culling, because Panda3D computes a bounding sphere much more
-    slowly.
+    """Return a BoundingBox of points (n, 3) for culling. By default, Panda3D would compute a bounding sphere,
+    which is much slower.
     """
     columns = positions.T.copy()
     corners = (

@@ -1,4 +1,4 @@
-"""Clips: meshes over time, the input of all bake formats."""
+"""Clips, the input of all bake formats. A clip is a mesh with its motion."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Clip:
 
     @property
     def end(self) -> int:
-        """Number of the first frame after the last frame with the body."""
+        """Number of the frame after the last frame in which the body is in the world."""
         return self.first + len(self.positions)
 
     @property
@@ -60,7 +60,8 @@ class Clip:
     def at(self, frame: int) -> tuple[Floats32, Floats32]:
         """Return positions and normals at a frame of the bake, (k, 3) each.
 
-        If the body is absent in this frame, return those of the nearest frame with the body.
+        If the body is absent in this frame, return the positions and normals of the nearest frame with the
+        body.
         """
         index = min(max(frame - self.first, 0), len(self.positions) - 1)
         return self.positions[index], self.normals[index]

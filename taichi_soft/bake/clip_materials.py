@@ -12,17 +12,17 @@ PLAIN = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
 """Default material. glTF treats a material without these values as metal."""
 
 COLORS = ((232, 107, 82), (41, 148, 158), (242, 178, 71), (102, 115, 199), (128, 178, 97), (204, 107, 153))
-"""Colours of bodies without a colour, sRGB from 0 to 255, the same colours as in films."""
+"""Default colours of bodies, sRGB from 0 to 255. Films use the same colours."""
 
 UNSET = (102, 102, 102)
-"""The grey that trimesh assigns to a material without a colour."""
+"""Grey that trimesh assigns to a material without a colour, sRGB from 0 to 255."""
 
 
 def visual_of(clip: Clip, number: int) -> Any:
     """Make a trimesh `TextureVisuals` with a glTF material: the artist's material or a default material.
 
     Args:
-        number: index of the clip, which chooses the colour of a clip without a colour.
+        number: index of the clip. It selects the default colour.
     """
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial

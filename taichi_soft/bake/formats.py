@@ -14,7 +14,7 @@ from taichi_soft.bake.vertex_texture import require_pixels, write_vat
 from taichi_soft.core.errors import OptionError
 
 LARGEST_GLB = 4 * 1024**3 - 1
-"""Largest .glb [bytes]: its length field has 32 bits."""
+"""Largest size of a .glb file [bytes]. The length field in the file has 32 bits."""
 
 
 class Format(NamedTuple):

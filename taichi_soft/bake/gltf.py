@@ -56,7 +56,7 @@ class GlbFile:
         self._set_view_targets()
 
     def _set_view_targets(self) -> None:
-        """Set the target of each buffer view, which trimesh omits and some importers require."""
+        """Set the target of each buffer view. Trimesh omits the targets, but some importers require them."""
         for mesh in self.content.meshes:
             (primitive,) = mesh.primitives
             kinds = {accessor: ARRAY_BUFFER for accessor in vars(primitive.attributes).values()}
@@ -155,7 +155,7 @@ class _Motion:
     def _weights(self, count: int, place: list[int]) -> int:
         """Add the weights of a clip: in each frame, 1 for its shape and 0 for all other shapes.
 
-        Returns: the index of their accessor. Clips with equal weights share an accessor.
+        Returns: the index of the accessor of these weights. Clips with equal weights share an accessor.
         """
         key = (count, *place)
         if key not in self.weights:

@@ -16,14 +16,15 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 STEPS_PER_SECOND = 60.0
-"""Smallest step rate of a world without an adapter [1/s], equal to the default rate of `FixedStep`."""
+"""Smallest step rate of a world without an adapter [1/s]. It is the default rate of `FixedStep`."""
 
 STEP_TOLERANCE = 1e-6
-"""Largest accepted time between a frame and a step [steps]. Frame rates such as 29.97 are rounded."""
+"""Largest relative deviation of the number of steps per frame from an integer. It covers rounding errors of
+frame rates and step lengths."""
 
 FRAME_TOLERANCE = 1e-3
-"""Largest fraction of a frame by which a clip can be too short for its last frame: 0.33333 s at 30 FPS have
-frames at 0 s, 1/30 s and so on up to 1/3 s."""
+"""Largest fraction of a frame by which a clip can end before the time of its last frame. For example, a clip
+of 0.33333 s at 30 FPS has frames from 0 s to 1/3 s."""
 
 Scene = World | EngineAdapter
 Progress = Callable[[int, int], None]

@@ -11,7 +11,7 @@ class Room:
 
     frames: int  # number of frames of the clip
     vertices: int  # number of vertices of all current meshes
-    size: int  # size of positions and normals [bytes]; resting bodies need less
+    size: int  # estimated size of positions and normals [bytes]; bodies at rest need less
 
     def __str__(self) -> str:
         return f"{self.frames:,} frames of {self.vertices:,} vertices, about {self.size / 1e6:,.1f} MB"

@@ -3,8 +3,8 @@
 Each pixel is one vertex in one frame. Vertex v of frame f is in column v % width and row
 f * rows_per_frame + v // width, counted from the upper left. Positions have 16 bits per axis, from the lowest
 to the highest position of the whole bake. One image has the upper eight bits and another image the lower
-eight, because engines treat 16-bit images differently. All vertices of an absent body are at one point, so it
-is invisible.
+eight, because engines treat 16-bit images differently. All vertices of an absent body are at one point, so
+that the body is invisible.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from taichi_soft.bake.gltf import GlbFile
 from taichi_soft.core.errors import OptionError
 
 WIDEST, TALLEST = 4096, 16384
-"""Largest width and height of a texture [pixels]. Common GPUs support no more rows."""
+"""WIDEST: largest width of a texture [pixels]. TALLEST: largest height of a texture [pixels], because common
+GPUs do not support more rows."""
 
 LEVELS = 65535
 """Number of quantisation steps with 16 bits."""
@@ -47,7 +48,8 @@ SHADERS = {
     "godot3.shader": ("godot.gdshader", GODOT_3),
     "unity.hlsl": ("unity.hlsl", {}),
 }
-"""For each shader file, its template and the keywords of the engine that replace placeholders."""
+"""For each shader file, its template, and the words of the engine that replace the template's
+placeholders."""
 
 Floats = NDArray[np.float64]
 
@@ -151,7 +153,7 @@ def _write_mesh(take: Take, path: Path, width: int, rows: int) -> None:
         vertex = start + np.arange(clip.vertex_count)
         pixel = np.stack([(vertex % width + 0.5) / width, (vertex // width + 0.5) / rows], axis=1)
         attributes = file.mesh_of(clip).primitives[0].attributes
-        if attributes.TEXCOORD_0 is None:  # a second set requires a first one
+        if attributes.TEXCOORD_0 is None:  # a mesh with a second set must also have a first set
             attributes.TEXCOORD_0 = file.add(np.zeros((clip.vertex_count, 2)))
         attributes.TEXCOORD_1 = file.add(pixel)
         start += clip.vertex_count

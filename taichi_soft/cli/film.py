@@ -29,14 +29,15 @@ if TYPE_CHECKING:
 MATERIAL = "gelatine"
 
 SMALLEST, LARGEST, LENGTH = 0.05, 5.0, 1.0
-"""A mesh whose longest side is outside [SMALLEST, LARGEST] is scaled to LENGTH [m]. At such sizes the file
-probably uses another unit, or the body would look rigid or limp."""
+"""SMALLEST, LARGEST: range of a mesh's longest side [m]. A mesh outside this range is scaled until its
+longest side is LENGTH [m], because its file probably uses another unit, or the body would look rigid or
+limp."""
 
 SECONDS = 5.0
-"""Default length of a film whose scene is not a Stage [s]."""
+"""Default length of a film [s]. A Stage has its own default length."""
 
 DROP = 0.5
-"""Drop height as a multiple of the height of the mesh."""
+"""Initial distance between a mesh and the floor, as a fraction of the mesh's height."""
 
 
 def film(
@@ -142,7 +143,7 @@ def _stage_of(
 
 
 def _scene_of(scene: str) -> Callable[[], Any]:
-    """Return a function that runs a script or function, which makes a new world or stage."""
+    """Return a function that runs a script or function to make a new world or stage."""
     if ":" not in scene and not scene.endswith(".py"):
         from taichi_soft.render.demos import demo_names
 

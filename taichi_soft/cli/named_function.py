@@ -17,7 +17,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
     """Return the function that a text such as `game.py:make_world` names.
 
     Args:
-        what: first words of an error message, which name the purpose of the function: "which worlds".
+        what: first words of error messages. They name the purpose of the function, such as "which worlds".
     Raises: OptionError for malformed text, a failed import, or an unknown name.
     """
     place, _, name = text.rpartition(":")
@@ -34,7 +34,7 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
 
 
 def variables_of(script: str) -> dict[str, Any]:
-    """Run a script, which can import modules from its own folder and from the current folder.
+    """Run a script. The script can import modules from its own folder and from the current folder.
 
     Returns: the script's variables, by name.
     Raises: OptionError if the file cannot be read; errors of the script.

@@ -16,7 +16,7 @@ from taichi_soft.core.runtime import init
 GpuName: TypeAlias = Literal["cuda", "vulkan", "metal"]
 
 IN_TURN = 15
-"""Smallest number of steps for a measurement of a time budget."""
+"""Smallest number of steps in a measurement of a time budget."""
 
 
 def profile(

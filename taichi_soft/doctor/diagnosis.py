@@ -31,13 +31,15 @@ MOST_SUBSTEPS = 500
 """Largest acceptable number of substeps per frame. `World` warns above this number."""
 
 SMALLEST, LARGEST = 0.02, 50.0
-"""Usual sizes of objects in a game [m]; other sizes suggest another unit."""
+"""Smallest and largest usual size of an object in a game [m]. Another size suggests that the file uses
+another unit."""
 
 THIN = 0.5
-"""Solid fraction of a tetrahedron below which the tetrahedron counts as thin."""
+"""Fraction of a tetrahedron's volume. If less of the volume is solid, the tetrahedron counts as thin."""
 
 MOST_THIN = 0.3
-"""Largest acceptable fraction of the solid in thin tetrahedra. Every surface has some thin tetrahedra."""
+"""Largest acceptable fraction of the solid volume that is in thin tetrahedra, see `THIN`. Some tetrahedra are
+thin at every surface."""
 
 TRIALS = 30
 """Number of timed frames."""
@@ -162,7 +164,7 @@ def _judge_surface(found: Diagnosis, facts: SurfaceFacts) -> None:
 
 
 def _judge_refinement(found: Diagnosis, asset: SoftBodyAsset, plain: SoftBodyAsset) -> None:
-    """Report the cost of keeping limbs and sheets that are thinner than the cells."""
+    """Report the tetrahedra and substeps that are needed to keep limbs and sheets thinner than the cells."""
     counts = [len(each.mesh.tets) for each in (plain, asset) if isinstance(each.mesh, TetMesh)]
     shorter = plain.stable_step.recommended / asset.stable_step.recommended
     found.say(

@@ -17,12 +17,12 @@ from taichi_soft.meshing.surface import Surface, joined
 from taichi_soft.meshing.surfaces import UP
 
 VOXELS = 96
-"""Number of voxels along the longest side of the grid that separates inside from outside."""
+"""Number of voxels along the longest side of a surface. Each voxel is inside or outside the solid."""
 
 ROUNDS = 3
 
 PROBES = (1.0, 2.0, 4.0, 8.0)
-"""Distances of the probes in front of and behind a triangle [voxels]."""
+"""Distances from a triangle at which the solid is sampled, in front of and behind the triangle [voxels]."""
 
 
 def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:

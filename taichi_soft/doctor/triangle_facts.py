@@ -17,7 +17,7 @@ surface's longest side."""
 
 @dataclass(frozen=True)
 class SurfaceFacts:
-    """Counts over all meshes of a file, after merging vertices at the same position."""
+    """Counts for all meshes of a file together, after vertices at the same position have been merged."""
 
     meshes: int
     vertices: int

@@ -1,4 +1,4 @@
-"""Export a built world as a folder, which the native library (`engine_adapter/native`) can run."""
+"""Export a built world as a folder that the native library (`engine_adapter/native`) can run."""
 
 from taichi_soft.export.engine_axes import AXES
 from taichi_soft.export.exporting import ExportReport, export_world

@@ -1,4 +1,4 @@
-"""Describe a world as named arrays for its world file, which does not contain kernels."""
+"""Describe a world as named arrays for its world file. The world file does not contain kernels."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ from taichi_soft.solver.context import WorldContext
 Arrays = dict[str, NDArray[Any]]
 
 _ALWAYS, _OF_JOINTS, _OF_MOTORS = range(3)
-"""Codes for the number of rows of a field in a snapshot: fixed, per row of joints, or per particle of motors.
+"""Codes for the rows of a field in a snapshot. _ALWAYS: the number of rows is fixed. _OF_JOINTS: the
+number is per row of joints in use. _OF_MOTORS: the number is per motor particle in use.
 `scene.hpp` declares the same codes."""
 
 
@@ -112,8 +113,8 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = row_counts(context, write_manifest(context)["slices"])
-    # Reserve rows for all grabs and motors, because a game can add some. The last three counts are per row in
-    # use.
+    # Reserve rows for all grabs and motors, because a game can add some. For the last three groups, give the
+    # number of rows per row or particle in use.
     rows |= {USED_GRABS: MOST_GRABS, PATCHES: MOST_GRABS * PATCH_ROWS, ALL_MOTORS: MOST_MOTORS}
     rows |= {USED_MOTORS: MOST_MOTORS, MOTOR_PARTICLES: 1, USED_JOINT_ROWS: 1, JOINT_ENDS: ENDS}
     whose = {MOTOR_PARTICLES: _OF_MOTORS, USED_JOINT_ROWS: _OF_JOINTS, JOINT_ENDS: _OF_JOINTS}
@@ -159,7 +160,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
 
 
 def _held(context: WorldContext) -> Arrays:
-    """Return the vertices of the finest level that pins represent, for all slots. See `BodyRecord.held`."""
+    """Return the pinned vertices of the finest level for all slots, see `BodyRecord.held`."""
     bodies = context.slots.slots
     held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
     rows = [np.zeros(0) if each is None else each for each in held]

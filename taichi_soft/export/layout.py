@@ -15,7 +15,7 @@ from taichi_soft.export.kernels.root import read_root
 from taichi_soft.solver.state import State
 
 FLOAT, WHOLE = 0, 1
-"""Codes for the types of numbers in fields: float32 and int32."""
+"""Codes for the types of numbers in fields. FLOAT: float32. WHOLE: int32."""
 
 
 @dataclass(frozen=True)

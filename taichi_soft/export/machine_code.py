@@ -44,7 +44,7 @@ class Platform:
 
     @property
     def is_web(self) -> bool:
-        """True for WebAssembly, for which the native library is linked into the same file as the kernels."""
+        """True for WebAssembly. Its native library and its kernels are linked into one file."""
         return self.file == "web"
 
 
@@ -98,7 +98,7 @@ def platforms_of(names: Sequence[str] | None) -> list[str]:
 class CompiledKernels:
     """Files of machine code, and the stamp that identifies the world file to which they belong."""
 
-    stamp: str  # the library compares this stamp with the stamp in the world file
+    stamp: str  # equal to the stamp in the world file; the library compares both
     files: list[Path]  # one or more per platform
 
 

@@ -17,7 +17,7 @@ from taichi_soft.bodies.skin_mesh import MIN_PARALLEL_VERTICES as FEWEST_OF_SKIN
 from taichi_soft.meshing.creases import split_at_creases
 
 CREASE = 40.0
-"""Smallest angle of a sharp edge [degrees]."""
+"""Smallest angle between two adjacent triangles at which the edge between them is sharp [degrees]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class ExportedMesh:
 
     name: str
     asset: int
-    level: int  # level of detail for which the mesh is drawn; -1: all
+    level: int  # level of detail at which the mesh is drawn; -1 for all levels
     vertex_count: int
     triangles: NDArray[np.int32]  # (m, 3)
     tables: list[Table]  # one for a surface, one per level for a skin
@@ -52,7 +52,7 @@ class ExportedMesh:
 
     @property
     def is_skin(self) -> bool:
-        """True for a skin, which is drawn at every level of detail."""
+        """True for a skin. Skins are drawn at every level of detail."""
         return self.tables[0].is_skin
 
 

@@ -59,7 +59,7 @@ _OF_CONTACT = {
     "forget_held": forget_held,
     "read_speed": read_speed,
 }
-"""Kernels of joints and motors, which need a world with contact."""
+"""Kernels of joints and motors. Joints and motors need a world with contact."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""

@@ -82,7 +82,7 @@ def web_sources() -> list[str | Path]:
     """Return the compiler arguments for the native library, which is linked with a world's kernels."""
     native = _HERE / "native"
     return [
-        # Optimise the native library for size, and standard functions that kernels call for speed.
+        # Optimise the native library for size, but optimise standard functions that kernels call for speed.
         *("-mexec-model=reactor", "-std=c++17", "-O2", "-Xclang", "-Os", "-msimd128", "-ffp-contract=off"),
         *(
             "-fno-exceptions",

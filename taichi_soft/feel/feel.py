@@ -24,40 +24,43 @@ from taichi_soft.solver.substeps import FRAME, MANY_SUBSTEPS
 _log = logging.getLogger(__name__)
 
 SETTLED = 0.05
-"""Fraction of a vibration's amplitude that remains at its settling time, as usual in control engineering."""
+"""Fraction of a vibration's amplitude that remains after the settling time. Control engineering commonly uses
+this value."""
 
 DECAY_FACTOR = -log(SETTLED)
 """Product of the decay rate and the settling time of a vibration."""
 
 MODE_TOLERANCE = 1e-5
-"""Relative change of the squared frequency at which the search for the slowest mode ends."""
+"""Relative change of the squared frequency below which the search for the slowest mode ends."""
 
 TOLERANCE, GUARANTEED = 0.015, 0.05
-"""Relative error of each target at which the search ends, and the relative error that the search guarantees.
-The guaranteed error is larger, because the floor and the steps of a game differ slightly from the search."""
+"""TOLERANCE: relative error of all targets at which the search ends. GUARANTEED: largest relative error of a
+result. It is larger, because the floor and the steps of a game differ slightly from those of the search."""
 
 MAX_TRIALS = 8
 """Largest number of simulations in a search."""
 
 SAG_RANGE = 1e-3, 0.3
-"""Allowed sags. Below this range, a body looks rigid and rounding matters; above it, tetrahedra invert."""
+"""Range of allowed sags, as fractions of the height. Below this range, a body looks rigid and rounding errors
+matter. Above this range, tetrahedra invert."""
 
 GRAVITY_SCALE_RANGE = 0.05, 20.0
-"""Allowed gravity scales. Outside this range, motion does not look natural."""
+"""Range of allowed gravity scales. Outside this range, motion does not look natural."""
 
 PERIOD_RANGE = 1.0, 100.0
-"""Allowed numbers of periods until a vibration settles. With fewer periods, the motion does not look like a
-vibration; with more, it seems never to end."""
+"""Range of allowed settling times, in periods of the vibration. With fewer periods, the motion does not look
+like a vibration. With more periods, the vibration seems never to end."""
 
 MAX_LEAN = 0.2
-"""Largest lean of a standing body [rad]. A body that leans further rolls or tips over."""
+"""Largest angle between a standing body and its initial pose [rad]. A body beyond this angle rolls or tips
+over."""
 
 
 @dataclass(frozen=True)
 class Behaviour:
     """Sag, frequency and settling time of a body."""
 
-    sag: float  # lowering of the highest point on a floor, relative to the height; nan if the body tips over
+    sag: float  # lowering of the highest point on a floor, relative to the height; nan after tipping over
     wobble_hz: float  # frequency of the slowest vibration of the free body [Hz]
     settle_s: float  # time after which 5 % of the amplitude of this vibration remains [s]
 
@@ -132,8 +135,8 @@ class _Body:
             raise OptionError(f"{mesh!r} has no vibration mode: use a finer mesh")
         height = float(np.ptp(mesh.vertices[:, 2]))
         self.weight = density * GRAVITY_EARTH * height  # pressure under a column of the body's height [Pa]
-        # Divide values by sqrt(young): the angular frequency of the slowest mode, the estimate of this
-        # frequency that damping ratios refer to, and the number of substeps of a frame.
+        # Angular frequency of the slowest mode, the estimate of this frequency that damping ratios refer
+        # to, and number of substeps of a frame. All three are divided by sqrt(young).
         self.speed = omega / sqrt(1e5)
         self.estimate = self.asset.first_frequency / sqrt(1e5)
         self.substeps = FRAME / self.asset.stable_step.recommended / sqrt(1e5)

@@ -16,8 +16,8 @@ from taichi_soft.world.body import Body
 Floats = NDArray[np.float64]
 
 AMPLITUDE = 1e-3
-"""Amplitude of a measured vibration, relative to the body's size. It is small, but far above the rounding
-errors of positions."""
+"""Amplitude of a measured vibration, as a fraction of the body's size. It is small, but far above the
+rounding errors of positions."""
 
 SAMPLES = 12
 """Number of samples per period. With more samples, rounding errors change the frequency; with fewer, the
@@ -27,10 +27,11 @@ PERIODS = 6
 """Number of measured periods."""
 
 SETTLED_CHANGE = 2e-3
-"""A damped body counts as standing if its sag changes by at most this fraction within a period."""
+"""Largest relative change of the sag within a period. If the sag changes less, a damped body counts as
+standing."""
 
 MAX_PERIODS = 60
-"""Number of periods after which a damped body counts as standing in any case."""
+"""Number of periods after which a damped body counts as standing, even if its sag still changes."""
 
 
 class Standing(NamedTuple):
@@ -40,7 +41,7 @@ class Standing(NamedTuple):
     """
 
     static_sag: float  # sag at rest, with drag
-    free_sag: float  # sag after the drag is removed, as in a game
+    free_sag: float  # sag without drag, as in a game
     lean: float  # rotation from the pose of the mesh [rad]
     inverted: int  # number of inverted tetrahedra; all tetrahedra if the body froze
 
@@ -119,7 +120,7 @@ class Trial:
 
     def _sag_over(self, period: float) -> float:
         """Step for a period [s]. Returns: mean lowering of the highest point, relative to the height."""
-        count = max(SAMPLES, int(np.ceil(60.0 * period)))  # no step is longer than a game's frame
+        count = max(SAMPLES, int(np.ceil(60.0 * period)))  # at least 60 steps per second, as in a game
         highest = []
         for _ in range(count):
             self._world.step(period / count)

@@ -27,7 +27,7 @@ UNSEEN = 2
 """Largest number of frames that were sent to a visitor but are not shown yet. Further frames are skipped."""
 
 MOST_MESSAGES = 20
-"""Largest number of messages queued for a visitor; older messages are dropped."""
+"""Largest number of messages queued for a visitor. If the queue is full, the oldest message is dropped."""
 
 _log = logging.getLogger("taichi_soft")
 
@@ -49,7 +49,7 @@ class Visitor:
     allowance: Allowance = field(default_factory=Allowance)
     sent: int = 0  # number of frames sent
     seen: int = 0  # number of the last frame that the page has shown
-    # Last frame sent, by pane: id of the runner, version of the meshes, number of the frame.
+    # Last frame that was sent, by pane: id of the runner, version of the meshes, number of the frame.
     last: dict[int, tuple[int, int, int]] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)  # queued messages
     upload: tuple[str, Up | None] | None = None  # name and upward axis of the next file
@@ -105,7 +105,7 @@ class Audience:
             key: key of the task; an existing task with this key is replaced.
             title: name of the task.
             step: current step of the task.
-            done, about: number of finished parts, and their approximate total; 0 if unknown.
+            done, about: number of finished parts, and approximate number of all parts; 0 if unknown.
         """
         before = self._activities.get(key)
         since = time.monotonic() if before is None or before.title != title else before.since

@@ -40,7 +40,7 @@ def choices(
     A script saved by `taichi-soft live` begins with this context.
     Args:
         law, strain, flips: settings of all bodies, see `SoftBodyAsset`. A new law also replaces the scene's
-            strain and flips, which the new law may not support.
+            strain and flips, because the new law does not always support them.
         has_palette: True to let `World.build` reserve capacity for bodies that visitors add, see `PALETTES`.
         meshes: surface files. Visitors can add bodies of these shapes too.
     """
@@ -97,7 +97,7 @@ def palette_of(world: World) -> dict[str, SoftBodyAsset]:
 
 
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
-    """Make the assets of the shapes, about 0.5 m wide, and of the mesh files, by name."""
+    """Return the assets of the shapes, which are about 0.5 m wide, and of the mesh files, by name."""
     shapes = (
         sphere(0.3, 3),
         box((0.5, 0.5, 0.5), (3, 3, 3)),

@@ -63,7 +63,8 @@ PRESET_SLIDERS: dict[str, dict[str, float]] = {
     and isinstance(each.poisson, float)
     and SLIDERS["poisson"].low <= each.poisson <= SLIDERS["poisson"].high
 }
-"""Values of the material sliders for each preset that fits their ranges."""
+"""Values of the material sliders, by name of the preset. Presets that the sliders cannot represent are left
+out."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Controls:
     def stable_substeps(self) -> int:
         """Number of substeps that the chosen materials need, predicted from the wave speed in each asset.
 
-        Estimating each body again instead would pause the world whenever a slider moves.
+        A new estimate for each body would pause the world whenever a slider moves.
         """
         has_stable_step = context_of_world(self.world).substeps.has_stable_step
         if self._first is None or not has_stable_step or not {"young", "poisson"} & set(self.given):
@@ -181,7 +182,7 @@ class Controls:
         self._apply(changed)
 
     def record(self, sliders: Given) -> None:
-        """Store slider values without applying them, because a restored world already has them."""
+        """Store slider values without applying them. A restored world already has these values."""
         self.given, self.preset = dict(sliders.values), sliders.preset
 
     def _apply(self, names: set[str]) -> None:
@@ -203,7 +204,7 @@ class Controls:
             _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
-        """Apply the material sliders to a body. Skip a body of springs only, which has no material."""
+        """Apply the material sliders to a body. Skip a body of springs, because it has no material."""
         material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}

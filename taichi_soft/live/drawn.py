@@ -34,7 +34,7 @@ class Drawn:
 
     @property
     def is_outdated(self) -> bool:
-        """True if bodies were added, removed or cut since the meshes were made."""
+        """True if bodies have been added, removed or cut since the meshes were made."""
         bodies = self.scene.world.bodies
         same = len(bodies) == len(self.bodies) and all(
             a is b for a, b in zip(bodies, self.bodies, strict=True)

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 PLACES = 3
-"""Number of buffers: one being read, one being written, and the newest complete one."""
+"""Number of buffers for frames. While one is read and one is written, a third has the newest complete
+frame."""
 
 _HEAD = np.dtype([("newest", "<i8"), ("pad", "<i8", 7)])
 _FRAME = np.dtype([("number", "<i8"), ("version", "<i8"), ("time", "<f8"), ("is_tinted", "<i8")])
 
 TRIES = 8
-"""Number of attempts to read a frame before the reader skips it. An attempt fails if the writer overwrites
-the frame."""
+"""Number of attempts to read a frame. If all attempts fail, the reader skips the frame. An attempt fails if
+the writer overwrites the frame during the attempt."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from urllib.parse import parse_qs, urlsplit
 MOST_VISITORS = 16
 
 VIEW_KEY = "TAICHI_SOFT_VIEW_KEY"
-"""Environment variable with the key that a server and the program that started it share."""
+"""Name of an environment variable. It contains a key that a program shares with the server that it starts."""
 
 EVERYWHERE = ("0.0.0.0", "::")
 """Addresses that bind to all network interfaces."""
@@ -31,8 +31,8 @@ PUBLIC = (
 """Files of the page that do not need the token."""
 
 MESSAGES, BURST = 240.0, 480.0
-"""Largest message rate of a visitor [1/s], and largest number of messages in a burst. Dragging a body sends
-60 messages per second."""
+"""MESSAGES: largest message rate of a visitor [1/s]. BURST: largest number of messages that a visitor can
+send at once. Dragging a body sends 60 messages per second."""
 
 _HOST = re.compile(
     r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::(?P<port>[0-9]{1,5}))?", re.ASCII

@@ -13,7 +13,7 @@ MOST_CHANGES = 20
 """Largest number of changes that can be undone."""
 
 DRAG = 2.0
-"""Longest interval between two values of a slider that still belong to the same change [s]."""
+"""Largest time between two values of a slider for which both belong to the same change [s]."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class History:
 
     def __init__(self) -> None:
         self._changes: deque[Before] = deque(maxlen=MOST_CHANGES)
-        self._drag_at = -math.inf  # time of the last slider value [s]; -inf after other changes
+        self._drag_at = -math.inf  # time of the last change if it was a slider value [s], else -inf
 
     @property
     def last(self) -> str | None:

@@ -18,13 +18,14 @@ MOST_WAITING = 64
 """Largest number of queued requests of one visitor; further requests are refused."""
 
 SHARE = 0.25
-"""Largest fraction of the world's time that requests of all visitors take together."""
+"""Largest fraction of time that a world spends on the requests of all visitors together."""
 
 BURST = 2.0
-"""Longest period over which unused time of a visitor accumulates [s]. Short bursts therefore do not wait."""
+"""Longest time by which a visitor can use allowed time in advance [s]. Short bursts of requests therefore do
+not wait."""
 
 LONGEST_WAIT = 1.0
-"""Longest delay of a visitor's next request after an expensive request [s]."""
+"""Longest time that a visitor's next request waits after an expensive request [s]."""
 
 Message = tuple[Any, ...]
 
@@ -35,8 +36,8 @@ class _Sender:
 
     waiting: OrderedDict[tuple[Hashable, int], Message] = field(default_factory=OrderedDict)
     segment: int = 0
-    used_until: float = -math.inf  # time up to which the sender's allowed time is used [s]
-    turn: int = 0  # number of the last turn in which the sender was served
+    used_until: float = -math.inf  # time until which the sender has used all allowed time [s]
+    turn: int = 0  # number of the last turn of this sender
 
 
 class Inbox:
@@ -98,7 +99,8 @@ class Inbox:
         return sender, self._senders[sender].waiting.popitem(last=False)[1]
 
     def charge(self, sender: int, now: float, seconds: float) -> None:
-        """Charge a visitor for the time that a request took, so that all visitors together keep to `SHARE`.
+        """Charge a visitor for the time that a request took, so that all visitors together do not exceed
+        `SHARE`.
 
         Args:
             now: current time [s].

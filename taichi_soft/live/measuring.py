@@ -25,8 +25,8 @@ COUNTS = (1, 16, 64)
 """Numbers of spheres in the measured worlds."""
 
 SECONDS = 11.0
-"""Length of a measurement [s]. A world reports percentiles of its last 600 steps, which take 10 s. In a
-longer measurement, these steps exclude those of the previous measurement."""
+"""Length of a measurement [s]. A world reports percentiles of its last 600 steps, which take 10 s. A
+measurement is longer, so that these steps do not include steps of the previous measurement."""
 
 TURNS = 5
 """Number of turns. Each turn consists of a measurement without and a measurement with a visitor."""
@@ -50,8 +50,8 @@ class LiveCost:
     """Cost of the live view of one world.
 
     Attributes:
-        alone_ms, visited_ms: 50th and 99th percentile of the step time without and with a visitor, medians
-            over the turns.
+        alone_ms: 50th and 99th percentile of the step time without a visitor. Both are medians of the turns.
+        visited_ms: 50th and 99th percentile of the step time with a visitor. Both are medians of the turns.
         ratios: for each turn, the 99th percentile with a visitor divided by the 99th percentile without a
             visitor, ascending.
     """
@@ -175,7 +175,7 @@ class _Reader:
 async def _latency(reader: _Reader, number: int) -> float:
     """Grab and lift a resting body. Returns: the time until the first frame in which it is lifted [s]."""
     await reader.say("reset")
-    await reader.listen(0.6 + 0.013 * (number % 7))  # moves begin at different times between two frames
+    await reader.listen(0.6 + 0.013 * (number % 7))  # vary the time between a frame and the following move
     await reader.say("grab", origin=[0.0, 0.0, 5.0], direction=[0.0, 0.0, -1.0])
     await reader.listen(0.1)
     rest, start = reader.corner[2], time.perf_counter()

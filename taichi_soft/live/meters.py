@@ -14,7 +14,7 @@ STEPS = 600
 """Number of recent steps whose percentiles are reported."""
 
 SHARE = 0.05
-"""Largest fraction of time that computing energies takes."""
+"""Largest fraction of time that is spent on the computation of energies."""
 
 
 class Meters:

@@ -25,8 +25,8 @@ LARGEST_BOX = np.float32(400.0)
 """Largest edge of the bounding box [m]. Points outside are clamped to the box."""
 
 _PICTURE = struct.Struct("<BBHIIId3f3f")
-"""Header of a frame: kind, pane, 1 if it has tints, number, version, number of vertices, time, lower corner
-and size of the box."""
+"""Header of a frame: kind, pane, 1 if the frame has tints, number of the frame, version of the meshes, number
+of vertices, world time [s], lower corner and size of the bounding box [m]."""
 
 
 def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:

@@ -13,8 +13,8 @@ from taichi_soft.live.three_js import fetch_three_js
 PAGE = Path(__file__).parent / "page"
 
 FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:"
-"""Sources that may embed a world in a frame: notebooks on this machine. A browser checks every enclosing
-page; VS Code shows a vscode-webview: page inside a vscode-file: page."""
+"""Origins of the pages that can embed a world in an HTML frame: notebooks on this machine. Browsers check all
+enclosing pages. VS Code shows a vscode-webview: page inside a vscode-file: page, so both are in the list."""
 
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 

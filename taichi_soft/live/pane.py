@@ -42,10 +42,10 @@ class Runner:
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
         self._packed = 0, 0, b""  # newest frame: version, number, packet
-        self.pulls: dict[int, int] = {}  # number of the move that the newest frame shows, by visitor
+        self.pulls: dict[int, int] = {}  # by visitor, number of the move that the newest frame shows
         self.is_over = False
         self.is_lost = False  # True if the connection is lost
-        self.is_asked = False  # True after this world requested the shown world's motion
+        self.is_asked = False  # True after this world has requested the motion of the shown world
         self.is_fresh = False  # True to start in the initial state, False to continue the shown world
         self.keeps_sliders = False  # True to ignore the slider values of the shown world
         self._inbox = Inbox()

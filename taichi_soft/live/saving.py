@@ -57,10 +57,10 @@ LOW_PRIORITY = 10
 """Nice value of the process that renders a film, from 0 to 19."""
 
 KEPT = 10.0
-"""Length of a film [s]."""
+"""Length of a film [s]. Frames of this period are stored."""
 
 MOST_KEPT = 2**28
-"""Largest size of the frames stored for a film [bytes]. Films of many vertices are shorter."""
+"""Largest size of the frames stored for a film [bytes]. If a world has many vertices, the film is shorter."""
 
 
 class Recent:
@@ -92,7 +92,7 @@ class Recent:
         self._rows.clear()
 
     def rows(self) -> list[tuple[float, int, Any]]:
-        """Return the frames in order, each with world time [s], version of the meshes, (positions, poses)."""
+        """Return the frames in order, each as (world time [s], version of the meshes, (positions, poses))."""
         return list(self._rows)
 
 
@@ -102,7 +102,7 @@ def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Dra
     own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]
     if not own:
         raise StateError("nothing has moved yet, so there is no film: let the world run first")
-    # Each frame of the film shows the last frame that was stored before its time.
+    # Each frame of the film shows the last stored frame that is not later than the frame of the film.
     moments = np.array([moment for moment, _ in own])
     shown = np.arange(moments[0], moments[-1] + 1e-9, 1.0 / FILM_FPS)
     frames = [own[i][1] for i in np.searchsorted(moments, shown + 1e-9, side="right") - 1]

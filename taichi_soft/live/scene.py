@@ -1,4 +1,4 @@
-"""Sources of live worlds. Every source is run as a script, which a saved scene contains."""
+"""Sources of live worlds. Every source is run as a script. A saved scene contains this script."""
 
 from __future__ import annotations
 

@@ -42,10 +42,11 @@ MOST_MESHES = 8
 """Largest number of meshes that visitors can add. A world reserves capacity for bodies of each mesh."""
 
 BETWEEN_CHOICES = 1.0
-"""Shortest time between two choices of a law [s], because each choice starts a process."""
+"""Minimum time between two requests that start a world, such as a change of the law [s]. Each world runs
+in a new process."""
 
 VIEWED = ("grab", "move", "release", "tint")
-"""Requests that are accepted if another program steps the world."""
+"""Names of the requests that visitors can make if another program steps the world."""
 
 
 class LiveServer:
@@ -106,7 +107,7 @@ class LiveServer:
     async def close(self) -> None:
         """End all processes and connections."""
         for runner in self.worlds.coming.values():
-            runner.kill()  # a process that compiles reads no messages
+            runner.kill()  # a process does not read messages while it compiles
         for runner in self.worlds.panes.values():
             runner.stop()
         self.downloads.stop()
@@ -231,7 +232,7 @@ class LiveServer:
         self.downloads.film_asked(runner)
 
     def _choose(self, do: str, request: dict[str, Any]) -> None:
-        """Prepare a world with another law, which replaces the shown world or appears next to it."""
+        """Prepare a world with another law. The new world replaces the shown world or appears next to it."""
         self._require_patience()
         chosen = {key: request[key] for key in ("law", "strain", "flips")}
         pane = 1 if do == "compare" else request["pane"]
@@ -262,7 +263,7 @@ class LiveServer:
             raise OptionError("too many of your requests are waiting: try again later")
 
     def take_upload(self, visitor: Visitor, content: bytes) -> None:
-        """Check a visitor's mesh in another process, then prepare a world with capacity for it."""
+        """Check a visitor's mesh in another process, then prepare a world with capacity for its bodies."""
         upload, visitor.upload = visitor.upload, None
         if upload is None:
             raise OptionError("a file arrived without its name")

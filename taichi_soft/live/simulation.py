@@ -31,16 +31,16 @@ FRAMES = 60.0
 """Largest number of frames per second."""
 
 TOLD = 5.0
-"""Number of reports of measurements per second."""
+"""Rate at which measurements are reported to the page [1/s]."""
 
 SHARE = 0.05
-"""Largest fraction of time that computing colours takes."""
+"""Largest fraction of time that is spent on the computation of colours."""
 
 MOST_HELD = 8
 """Largest number of simultaneous grabs of all visitors."""
 
 ANSWERING = 0.008
-"""Longest time for requests before the next step [s]: half a frame."""
+"""Time for requests between two steps [s]: half the duration of a frame. Remaining requests wait."""
 
 
 def words_of(error: BaseException) -> str:
@@ -69,9 +69,9 @@ class Simulation:
         self.frames: FrameFile
         self._due = {"frame": 0.0, "told": 0.0, "tints": 0.0}
         self._steps_seen = 0
-        # Moves that no frame shows yet, by visitor: number of the move, and step count at that time.
+        # For each visitor, the first move that no frame shows yet: its number, and the step count on arrival.
         self._pulls: dict[int, tuple[int, int]] = {}
-        self._alpha: float | None = None  # interpolation if another program steps the world
+        self._alpha: float | None = None  # interpolation factor if another program steps the world, else None
 
     def start(self, given: Given) -> None:
         """Compile all kernels that requests need, and send the meshes."""
@@ -175,7 +175,7 @@ class Simulation:
                 self.is_playing = False
                 self.connection.send(("said", f"stopped: {words_of(error)}"))
         self.meters.end((self.world.step_count - before) * self.adapter.fixed_step.dt)
-        self.is_moving = True  # bodies also move between two steps, by interpolation
+        self.is_moving = True  # interpolated positions also change between two steps
         for each in caught:
             # The page itself warns of instability, and only for the materials of existing bodies.
             if not issubclass(each.category, UnstableStepWarning):

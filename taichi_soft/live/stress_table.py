@@ -30,11 +30,11 @@ class StressRow:
 
 @dataclass(frozen=True)
 class StressTable:
-    """Result of `stress_table`. Notebooks show a table and below it a histogram of the volume over stress."""
+    """Result of `stress_table`. Notebooks show a table and a stress histogram weighted by volume."""
 
     rows: tuple[StressRow, ...]  # stress of each body
-    edges: NDArray[np.float64]  # edges of the bars [Pa], (BARS + 1,)
-    volumes: NDArray[np.float64]  # volume of material in each bar [m^3], (BARS,)
+    edges: NDArray[np.float64]  # limits of the bars' stress intervals [Pa], (BARS + 1,)
+    volumes: NDArray[np.float64]  # volume of the material in each stress interval [m^3], (BARS,)
 
     def _repr_html_(self) -> str:
         names = "body", "law", "largest", "mean", "strain", "inverted"

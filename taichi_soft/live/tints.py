@@ -53,7 +53,7 @@ class Tints:
 
     def __init__(self, quantity: str) -> None:
         self.quantity = QUANTITIES[quantity]
-        self.high = 1.0 if quantity == "flips" else 0.0  # value of 255, in the quantity's unit
+        self.high = 1.0 if quantity == "flips" else 0.0  # value that 255 stands for, in the quantity's unit
         self.rows = np.zeros(0, np.uint8)
 
     def renew(self, world: World) -> None:

@@ -20,7 +20,7 @@ KINDS = (".glb", ".obj", ".ply", ".stl", ".off")
 """Self-contained file formats. A .gltf could refer to other files on the server."""
 
 MOST_SECONDS = 60.0
-"""Time limit for making tetrahedra from a visitor's file [s]."""
+"""Largest time for making tetrahedra from a visitor's file [s]."""
 
 MOST_TRIANGLES = 200_000
 
@@ -70,7 +70,7 @@ def require_mesh(
 def _look_at(path: str, up: Up | None, connection: Connection) -> None:
     """Make a body from a file. If `up` is not the default axis of the format, write the file as .glb.
 
-    Send an empty string if this succeeds, else the reason of the failure.
+    Send an empty string if this succeeds, else the reason for the failure.
     """
     from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.live.choices import VISITOR

@@ -110,8 +110,8 @@ def view(
             world.step(1 / 60)
             window.update()
 
-    A separate process serves the view, only to this machine. Visitors can rotate the camera, colour bodies by
-    stress, and pull bodies.
+    A separate process serves the view. Only this machine can open it. Visitors can rotate the camera, colour
+    bodies by stress, and pull bodies.
     Args:
         world: a built world, or its adapter.
         colors: colours of bodies, sRGB from 0 to 1.

@@ -17,7 +17,8 @@ from taichi_soft.live.pane import Runner
 from taichi_soft.live.scene import SceneSource
 
 MOST_BREAKDOWNS = 2
-"""Largest number of failures per minute after which a shown world is restarted."""
+"""Largest number of failures within a minute after which a shown world is restarted. After one more failure,
+the world is closed."""
 
 USUAL_KERNELS = 70
 """Approximate number of kernels that a world compiles."""
@@ -98,7 +99,7 @@ class Worlds:
         """End the second world."""
         for runners in (self.panes, self.coming):
             if 1 in runners:
-                runners.pop(1).kill()  # a process that compiles reads no messages
+                runners.pop(1).kill()  # a process does not read messages while it compiles
         self._audience.end_activity("world 1")
         self._audience.wake()
 

@@ -24,7 +24,7 @@ from taichi_soft.fracture.cutting import require_room
 from taichi_soft.solver.context import WorldContext
 
 _MAX_COUNT = 1 << 53
-"""Largest valid number of steps or handles, and largest valid time [s]."""
+"""Largest valid number of steps and of handles. It is also the largest valid time [s]."""
 
 
 def write_manifest(context: WorldContext) -> dict[str, Any]:
@@ -67,9 +67,9 @@ class BodyEntry:
     part: CutMesh | None
     level: int  # level of detail
     held: NDArray[np.int64] | None  # see `BodyRecord`
-    friction: float | None  # None: the asset's friction
+    friction: float | None  # friction of the body; None for the asset's friction
     description: BodyDescription
-    arrays: BodyArrays | None  # None unless the body is cut
+    arrays: BodyArrays | None  # arrays of a cut body; None for an uncut body
 
 
 @dataclass

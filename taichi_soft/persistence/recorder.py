@@ -1,9 +1,9 @@
 """Flight recorder: records the calls and steps of the last ticks, and a snapshot of the state before them.
 
-A recording contains at least the requested number of ticks, but less than twice as many: the recorder takes a
-snapshot each time that number of ticks has passed, and keeps the last two segments. It removes ticks that
-`restore` undid. A recording is plain data and contains its assets and shapes, so that `replay` can rebuild
-the world on any machine.
+A recording contains at least the requested number of ticks, and less than twice this number. The recorder
+takes a snapshot whenever the requested number of ticks has passed, and keeps the last two segments. It
+removes ticks that `restore` undid. A recording is plain data and contains its assets and shapes, so that
+`replay` can rebuild the world on any machine.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MARK, VERSION = b"TSOFTREC", 1
 
 MAX_CONTENT = 1 << 28
 """Largest uncompressed size of a recording without its snapshot [bytes]. Compressed data can be a thousand
-times smaller: without this limit, a small file could fill the memory."""
+times smaller, so that without this limit a small file could fill the memory."""
 
 FieldAccelerations = list[tuple[int, NDArray[np.float32]]]
 """Accelerations that the force field gave in one step. Each pair is a body's serial number and the
@@ -48,7 +48,7 @@ class _Segment:
 
     snapshot: bytes
     entries: list[list[Any]] = field(default_factory=list)  # calls and steps
-    marks: dict[bytes, int] = field(default_factory=dict)  # number of entries before each snapshot, by name
+    marks: dict[bytes, int] = field(default_factory=dict)  # number of entries before each named snapshot
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -82,12 +82,14 @@ class Recorder:
         self._present = _Segment(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
-        self.field_accelerations: FieldAccelerations = []  # accelerations in the next step
+        self.field_accelerations: FieldAccelerations = []  # accelerations for the next step
 
     def call(
         self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
-        """Make a call and return its result. Record the call, unless it raises or a recorded call made it."""
+        """Make a call and return its result. Record the call, unless it raises an error or another recorded
+        call made it.
+        """
         if self._is_inside:
             return method(handle, *arguments, **options)
         copied = [

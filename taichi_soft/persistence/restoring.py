@@ -76,7 +76,7 @@ def _remove(context: WorldContext, state: State, body: SoftBody) -> None:
 
 
 def _insert(context: WorldContext, state: State, slot: int, entry: BodyEntry) -> SoftBody:
-    """Insert a body into a free slot. Return its handle, which is new unless a caller still has one."""
+    """Insert a body into a free slot. Return its handle. The handle is new unless a caller still has one."""
     asset = context.slots.assets[slot]
     if entry.part is not None or context.layout.bodies[slot] is not asset.levels[entry.level].arrays:
         refill_slot(context, state, slot, entry.level, entry.arrays)

@@ -99,7 +99,7 @@ def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
 def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = False) -> None:
     """See `World.restore`.
 
-    Args: keeps_events: True keeps the queued events, if no step was made since the snapshot.
+    Args: keeps_events: True to keep the queued events if no step has been made since the snapshot.
     """
     state = context.built.state
     structure, content, rows, event_part = _four_parts(unseal(data, MARK, VERSION, "snapshot"))

@@ -16,7 +16,7 @@ from taichi_soft.solver.context import WorldContext
 
 def structure_of(context: WorldContext) -> bytes:
     """Return the structure of a world, as JSON."""
-    # Leave out gravity and the floor's friction, which can change and are in the manifest.
+    # Leave out gravity and the floor's friction, because they can change. The manifest contains them.
     settings = {
         name: as_plain(value)
         for name, value in asdict(context.settings).items()
@@ -27,7 +27,7 @@ def structure_of(context: WorldContext) -> bytes:
         {
             "package": _package_version(),
             "slices": [each.name for each in context.slices],
-            # Leave out the sizes of fields, which follow from the bodies and can be larger in reused fields.
+            # Leave out the sizes of fields. They follow from the bodies, and reused fields can be larger.
             "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
             "soft_contact": context.contact.soft,
             "sleep_speed": context.contact.sleep_speed,

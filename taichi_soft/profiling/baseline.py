@@ -1,5 +1,5 @@
-"""Compile the C++ reference on this machine, and run it on the same arrays as the Taichi kernels, in the same
-order.
+"""Compile the C++ reference on this machine, and run it on the same arrays in the same order as the Taichi
+kernels.
 """
 
 from __future__ import annotations

@@ -17,14 +17,14 @@ class Budget:
     substeps: int
     bodies: int
     tets: int
-    measured: Phases  # measurement of fewer or more spheres, from which `bodies` is scaled
+    measured: Phases  # measured with another number of spheres; `bodies` is computed from these times
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each frame rate, and scale their number until the frame time is used up.
+    """Measure `count` spheres at each frame rate, and estimate the number of spheres that fits a frame.
 
-    The fixed cost of a frame is scaled too. The material determines the substep, so a frame of half the
-    length needs half as many substeps.
+    The estimate is proportional to `count`, and includes the fixed cost of a frame. The material determines
+    the substep, so a frame of half the length needs half as many substeps.
     """
     found = []
     for rate in FRAME_RATES:

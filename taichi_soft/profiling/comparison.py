@@ -19,11 +19,11 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
-"""Number of cells of a box, by approximate number of tetrahedra. The largest box is first, because the
+"""Cells of a box along x, y and z, by approximate number of tetrahedra. The largest box is first, because the
 smaller boxes reuse its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
-SUBSTEP = 1.0e-5  # substep, far shorter than the longest stable one [s]
+SUBSTEP = 1.0e-5  # length of a substep [s], far below the stable limit
 PUSHED_APART = 0.02  # initial stretch of the body, so that elastic forces act
 
 
@@ -40,7 +40,7 @@ class Comparison:
     tets: int
     taichi: Spread  # time in Taichi, including Python [ns per element and substep]
     native: Spread
-    ratio: Spread  # time in Taichi over time in C++, for each pair of runs
+    ratio: Spread  # time in Taichi divided by time in C++, for each pair of runs
     deviation: float  # largest difference of positions after equal steps, divided by the body's size
 
 

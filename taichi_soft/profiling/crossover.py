@@ -16,12 +16,12 @@ SUBSTEPS = 20
 
 @dataclass(frozen=True)
 class Crossover:
-    """Time of one body under both schedules [ns per tetrahedron and substep]."""
+    """Times of one body with both schedules [ns per tetrahedron and substep]."""
 
     tets: int
     flat: Spread
     per_body: Spread
-    ratio: Spread  # time with "flat" over time with "per_body", for each pair of runs
+    ratio: Spread  # time with "flat" divided by time with "per_body", for each pair of runs
 
 
 def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:

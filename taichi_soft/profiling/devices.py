@@ -1,5 +1,6 @@
-"""Find the number of tetrahedra from which a GPU is faster than the CPU's threads, with one process per
-device.
+"""Find the number of tetrahedra above which a GPU is faster than the CPU's threads.
+
+Each device is measured in its own process.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class DeviceGain:
     tets: int
     cpu: Spread
     gpu: Spread
-    gain: Spread  # time of the CPU over time of the GPU, for each pair of runs
+    gain: Spread  # time of the CPU divided by time of the GPU, for each pair of runs
 
 
 class Frames:

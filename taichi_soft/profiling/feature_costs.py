@@ -1,5 +1,5 @@
-"""Measure the cost of features, both unused and used, and of contact in a heap of bodies. Each measurement
-alternates with bodies without the feature.
+"""Measure the cost of unused features, of used features, and of contact in a heap of bodies. Each measurement
+alternates with a measurement of bodies without the feature.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
-DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second, as for the sphere of the thesis
+DT, SUBSTEPS = 1 / 60, 12  # 720 substeps per second; the sphere of the thesis has 700
 COUNT = 16
 SPACING = 3.0  # distance between the centres of spheres of radius 1 [m]
 SETTLING = 180
 """Number of frames after which bodies on the floor or in a heap have come to rest."""
 
 UNUSED_FACTOR = 25
-"""Unused features are measured with this many times as many pairs of steps. Only the median of about 300
-pairs can distinguish a ratio of 1.01 from 1.03."""
+"""Factor for the number of measured pairs of steps if a feature is unused. About 300 pairs are needed before
+the median can distinguish a ratio of 1.01 from 1.03."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
     """Drop 32 spheres into a pit and time their steps at rest.
 
     First, only steps of the heap are timed, as in a game with one world. Then steps of the heap alternate
-    with steps of as many free spheres, which evict the heap from the CPU's caches."""
+    with steps of as many free spheres. The free spheres evict the heap from the CPU's caches."""
     world = bare_world(collider_room=8, soft_contact=True)
     free = bare_world(floor=None)
     for side in (-1, 1):

@@ -1,5 +1,7 @@
-"""Measure the speed-up of implicit Euler over leapfrog, for CMPM (thesis 4.2) and for a stiff bar, and over
-an implementation with scipy.
+"""Measure the speed-up of implicit Euler.
+
+The comparisons are with leapfrog, for CMPM (thesis 4.2) and for a stiff bar, and with an implementation in
+scipy.
 """
 
 from __future__ import annotations
@@ -16,11 +18,11 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.bare import bare_world
 
 GROWTH = 100
-"""Step of implicit Euler divided by the step of leapfrog in the thesis: 1e-2 s divided by about 1e-4 s."""
+"""Ratio of the step lengths of implicit Euler (1e-2 s) and leapfrog (about 1e-4 s) in the thesis."""
 
 CMPM_MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
-"""Leapfrog needs steps of about 1e-4 s for this stiffness. Without damping, CMPM gains energy at any step
-length."""
+"""Material of the body that is stepped with CMPM. Leapfrog needs steps of about 1e-4 s for this stiffness.
+The material is damped, because CMPM without damping gains energy at any step length."""
 
 BAR_CELLS = (20, 10, 5)  # 5,000 tetrahedra
 BAR_MATERIAL = Material(young=1.0e6, poisson=0.3, density=1000.0, damping=20.0, damping_ratio=0.0)
@@ -31,7 +33,7 @@ TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ImplicitGain:
-    """Time to simulate one second with implicit Euler and with another method, in alternating runs."""
+    """Times to simulate one second with implicit Euler and with another method, from alternating runs."""
 
     name: str
     step: float  # step of implicit Euler [s]
@@ -79,7 +81,7 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
 
 
 def _bar_against_leapfrog(repeats: int) -> ImplicitGain:
-    """Measure the bar with the virial law, whose force gradients the thesis does not use (section 6.5)."""
+    """Measure the bar with the virial law. The thesis does not use its force gradients (section 6.5)."""
     mesh = box((4.0, 1.0, 1.0), BAR_CELLS)
     bent = mesh.vertices + [0.0, 0.0, 0.1] * np.sin(2.0 * mesh.vertices[:, :1])
     worlds = {}

@@ -1,4 +1,7 @@
-"""Measure whether bodies that need twice the time budget are reduced in detail until their steps fit it."""
+"""Measure whether a time budget reduces the detail of bodies until their steps fit the budget.
+
+Without a budget, the bodies need twice the time.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ SPACING = 1.6
 docs/speed.md."""
 
 SETTLING = 60
-"""Number of frames until the bodies have landed."""
+"""Number of frames after which all bodies have landed."""
 
 SHARE = 0.5
 """Budget as a fraction of the median step time without a budget."""
@@ -38,20 +41,20 @@ SHARE = 0.5
 EYE = (-8.0, 0.0, 2.0)  # [m]
 
 IN_TURN = 10
-"""The budget is met from the first step that fits it, if the median of this many steps from there also
-fits."""
+"""Number of consecutive steps whose median must fit the budget. The budget counts as met at the first such
+step that also fits the budget."""
 
 
 @dataclass(frozen=True)
 class KeptBudget:
     """Times of one of the runs, see `measure_kept_budget`."""
 
-    budget: float  # budget [ms]; in a run without a budget, only for comparison
+    budget: float  # budget [ms]; a run without a budget uses it only for comparison
     is_kept: bool  # True if the run had a budget
     is_fixed: bool  # True if the levels were fixed to the final levels of the run with a budget
     step: Spread  # time of `World.step` [ms]
     work: Spread  # CPU time of a step [ms], without waiting for other programs
-    settled: Spread  # time of the steps after the budget was met; of all steps if it was never met [ms]
+    settled: Spread  # time of the steps after the budget was met, or of all steps if it was never met [ms]
     frame: Spread  # time of `EngineAdapter.step` [ms], including decisions and changes of level
     late: float  # fraction of steps longer than the budget
     late_settled: float  # fraction of late steps in `settled`
@@ -59,7 +62,7 @@ class KeptBudget:
     deciding: Spread | None  # `frame` minus `step` in frames without a change of level [ms]
     changing: Spread | None  # `frame` minus `step` in frames with a change of level [ms], if any
     frames_with_changes: int
-    skipped: float  # fraction of steps that bodies skipped
+    skipped: float  # fraction of the bodies' steps that were skipped
     levels: dict[int, int]  # number of bodies by final level
     levels_in_order: tuple[int, ...]  # final level of each body
     tets: int  # number of tetrahedra at the end

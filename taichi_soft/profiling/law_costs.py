@@ -18,13 +18,13 @@ TETS, EDGES = len(MESH.tets), len(MESH.edges)
 MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 WOODEN = AnisotropicMaterial(Stiffness.isotropic(1.0e5, 0.3), density=1000.0, damping=0.1)
 SUBSTEPS = 40
-SUBSTEP = 1.0e-5  # substep, far shorter than the longest stable one [s]
+SUBSTEP = 1.0e-5  # length of a substep [s], far below the stable limit
 
 
 @dataclass(frozen=True)
 class LawCost:
-    """Cost of a law with one strain and one kind of material. `strain` is None if the law has no choice of
-    strain.
+    """Cost of a law with one strain and one kind of material. `strain` is None if the law has only
+    one strain.
     """
 
     law: LawName
@@ -32,7 +32,7 @@ class LawCost:
     is_anisotropic: bool
     element: str  # "tetrahedron" or "edge"
     cost: Spread  # time of a substep, including edge damping [ns per element]
-    ratio: Spread  # cost divided by that of "virial" with the linear strain, in alternating runs
+    ratio: Spread  # cost divided by the cost of "virial" with the linear strain, in alternating runs
 
 
 def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:

@@ -54,7 +54,7 @@ class Process:
 def compare_processes(one: Process, other: Process, line: str, repeats: int) -> tuple[Spread, Spread, Spread]:
     """Ask two processes alternately, after a warm-up. A slowdown of the machine then affects both processes.
 
-    Returns: times of `one` [ms], times of `other` [ms], and their ratio, `one` over `other`, for each pair.
+    Returns: times of `one` [ms], times of `other` [ms], and `one` divided by `other` for each pair.
     """
     pairs = [(one.ask(line), other.ask(line)) for _ in range(WARM_TURNS + repeats)][WARM_TURNS:]
     ones, others = ([pair[i] for pair in pairs] for i in (0, 1))

@@ -1,5 +1,6 @@
-"""Measure how much faster several threads step many bodies than one thread, with one process per thread
-count.
+"""Measure how much faster several threads step many bodies than one thread.
+
+Each number of threads is measured in its own process.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from taichi_soft.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
-"""Substeps per step. 4 is the number that the spheres need at 60 Hz; 14 is that of the thesis, which makes
-700 substeps per second at 50 Hz."""
+"""Measured numbers of substeps per step. The spheres need 4 substeps at 60 Hz. The thesis makes 14 substeps
+at 50 Hz, which are 700 substeps per second."""
 
 STEPS_PER_TURN = 5
 
@@ -37,7 +38,7 @@ class Scaling:
     threads: int
     single: Spread
     parallel: Spread
-    speedup: Spread  # time on one thread over time on several threads, for each pair of runs
+    speedup: Spread  # time on one thread divided by time on several threads, for each pair of runs
 
 
 def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:

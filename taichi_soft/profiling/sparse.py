@@ -32,7 +32,7 @@ def require_scipy() -> Any:
 
 
 class SparseBody:
-    """One body in float64, whose steps use sparse matrices of scipy."""
+    """One body in float64 that is stepped with sparse matrices of scipy."""
 
     def __init__(self, mesh: TetMesh, material: Material) -> None:
         self._sparse = require_scipy()

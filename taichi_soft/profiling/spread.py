@@ -47,7 +47,7 @@ def compare(
     """Time two calls alternately, after two warm-up rounds.
 
     A temporary slowdown of the machine then affects both calls, so that their ratio stays valid.
-    Returns: times of `one` and times of `other`, in seconds times `unit`, and their ratio, `one` over
+    Returns: times of `one` and times of `other`, in seconds times `unit`, and their ratio, `one` divided by
         `other`, for each pair of calls.
     """
     pairs = [(time_calls(one, 1)[0], time_calls(other, 1)[0]) for _ in range(repeats + 2)][2:]

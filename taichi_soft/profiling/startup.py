@@ -45,8 +45,8 @@ world = World()
 body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
 """,
 }
-"""Code that makes each world, by name. The worlds contain a body and a floor; soft contact, a pool and a
-collider; a body that can be cut."""
+"""Code that makes each world, by name. "plain": a body and a floor. "contact": soft contact, a pool and a
+collider. "cutting": a body that can be cut."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from taichi_soft.core.errors import OptionError
 
 
 def as_point(value: ArrayLike, name: str) -> tuple[float, float, float]:
-    """Convert `value` to three finite floats. Raises: OptionError, in which the value is called `name`."""
+    """Convert `value` to three finite floats. Raises: OptionError that calls the value `name`."""
     x, y, z = as_array(value, name, (3,)).tolist()
     return x, y, z
 
@@ -17,7 +17,7 @@ def as_point(value: ArrayLike, name: str) -> tuple[float, float, float]:
 def as_color(value: ArrayLike, name: str) -> tuple[float, float, float]:
     """Convert `value` to red, green and blue from 0 to 1.
 
-    Raises: OptionError, in which the value is called `name`.
+    Raises: OptionError that calls the value `name`.
     """
     color = as_point(value, name)
     if min(color) < 0.0 or max(color) > 1.0:

@@ -18,16 +18,16 @@ from taichi_soft.render.take import Take, skins_of
 from taichi_soft.render.texture import Texture
 
 _RECENT = 25
-"""Number of recent frames whose median step time is displayed."""
+"""Number of recent frames. The displayed speed is computed from their median step time."""
 
 LABEL_DISTANCE = 1.2
-"""Distance from the centre of a body to its label, in units of half the width of the body at rest."""
+"""Distance from a body's centre to its label, as a multiple of half the body's width at rest."""
 
 
 def speed_of(times: Sequence[float], fps: float) -> str:
     """Return the simulation speed as text, such as "1.5 x real time", or "" before the second frame.
 
-    The speed is the median of the last frames, which ignores single outliers.
+    The speed is computed from the median step time of the last frames, so that one slow frame has no effect.
 
     Args:
         times: step time of each frame [s]. The first frame makes no step and is ignored.
@@ -62,7 +62,7 @@ class Artist:
         )
         self.times: list[float] = []
         self._spent = 0.0
-        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces by actor and topology version
+        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # surfaces, by actor and topology version
         # Images and their textures by the id of the image. Storing the image keeps its id unique.
         self._textures: dict[int, tuple[Any, Texture]] = {}
 

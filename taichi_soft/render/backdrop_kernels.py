@@ -10,7 +10,7 @@ from taichi_soft.render.tone import WHITE
 
 @ti.func
 def smoothstep(low, high, x):
-    """Return 0 below `low`, 1 above `high`, and a smooth transition between."""
+    """Return 0 below `low`, 1 above `high`, and a smooth transition between both."""
     s = ti.math.clamp((x - low) / (high - low), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
@@ -69,17 +69,18 @@ def paint_backdrop(
     Args:
         rays: directions of pixels, see `pixel_ray`.
         eye: position of the camera [m].
-        target: point from which the checks fade with distance [m].
+        target: point around which checks are visible; they fade with the distance from it [m].
         check: edge of a check [m].
         fade: distance at which the floor has faded into the sky [m].
         horizon, zenith, bright, dark: see `BackdropColors`.
-        out: (height, width, 4), linear light, and the weight of the floor in the mix of floor and sky.
-        plain: (height, width, 3), the light of `out` as sRGB.
+        out: (height, width, 4). Three channels are linear light. The fourth is the weight of the floor, from
+            0 (only sky) to 1 (only floor).
+        plain: (height, width, 3), the first three channels of `out` as sRGB.
     """
     for y, x in ti.ndrange(out.shape[0], out.shape[1]):
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
-        # The sky is brightest at the horizon and keeps this brightness below it, where the floor fades out.
+        # Below the horizon, use the colour of the horizon, because the distant floor fades into this colour.
         color = horizon + (zenith - horizon) * smoothstep(-0.05, 0.65, ti.sqrt(ti.max(up, 0.0)))
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
@@ -94,7 +95,7 @@ def paint_backdrop(
             wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
             wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
-            # Fade checks of about a pixel's size, which would shimmer.
+            # Fade out the check pattern if a check is about as small as a pixel. Small checks would shimmer.
             wave *= 1.0 - smoothstep(0.15, 0.7, ti.max(wide_x, wide_y))
             tiles = dark + (bright - dark) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade

@@ -79,7 +79,7 @@ class Camera:
             elevation: angle of the eye above the horizon, -89 to 89 [degrees].
             fov_degrees: see `Camera`.
             margin: size of the view relative to the box, 1 to 10.
-            aspect: width over height of the image; with 1, the box fits in images of any aspect.
+            aspect: width divided by height of the image; with 1, the box fits in images of any aspect.
         Raises: OptionError for a box without extent or numbers out of range.
         """
         low, high = np.array(as_point(lower, "lower")), np.array(as_point(upper, "upper"))
@@ -110,7 +110,7 @@ class Camera:
         Args:
             lower, upper: opposite corners of the box [m].
             margin: size of the view relative to the box, 1 to 10.
-            aspect: width over height of the image.
+            aspect: width divided by height of the image.
         Raises: the errors of `framing`.
 
         A camera that looks straight up or down is tilted slightly.

@@ -18,7 +18,7 @@ BoxOf = Callable[[Body], NDArray[np.float64]]
 """Function that returns the bounding box of a body as it is drawn, (2, 3) [m]."""
 
 LOOSE = 0.35
-"""Largest distance of a followed body from the image's centre. 1 is half of the shorter side."""
+"""Largest distance between a followed body and the image's centre, as a fraction of half the shorter side."""
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,8 @@ RAMP: tuple[Color, ...] = (
 """Colours of a `ColorScale` at equal steps, sRGB from 0 to 1."""
 
 PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0))
-"""Prefixes of SI units and their factors, largest first. A prefix is used for values of at least ten times
-its factor."""
+"""Prefixes of SI units and their factors, largest first. A label has a prefix if its value is at least ten
+times the factor of the prefix."""
 
 FLIPPED: Color = (0.93, 0.10, 0.42)
 """Colour of inverted tetrahedra, sRGB from 0 to 1. `PALETTE` does not contain it."""
@@ -94,7 +94,7 @@ class ColorScale:
         self.colors([self.low])
 
     def colors(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Map numbers to colours from blue (`low`) over yellow to red (`high`).
+        """Map numbers to colours from blue (`low`) through yellow to red (`high`).
 
         All colours are bright enough for shaded surfaces.
 

@@ -33,10 +33,10 @@ CODECS = {
     ),
 }
 LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
-# With one palette per film and ordered dithering, pixels that do not move stay equal: later frames compress
-# well and do not flicker.
+# One palette per film and ordered dithering give a still part of the image the same pixels in all frames, so
+# that frames compress well and do not flicker.
 DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
-GIF_FASTEST = 50.0  # largest frame rate [1/s]; viewers play the next possible rate, 100, too slowly
+GIF_FASTEST = 50.0  # largest frame rate [1/s]; the next possible rate is 100, which viewers play too slowly
 
 
 @contextlib.contextmanager

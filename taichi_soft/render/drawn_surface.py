@@ -13,7 +13,8 @@ from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
-# Limit of coordinates [m]. Larger values result from an explosion, and their products overflow in float32.
+# Largest absolute value of a coordinate [m]. Larger values occur only after an explosion. Products of such
+# values would overflow in float32.
 FARTHEST = 1e7
 
 
@@ -162,7 +163,7 @@ class Surface:
 def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
     """Return the front and then the back triangles of a sheet, and their look codes.
 
-    If the sheet contains a triangle twice, once per side, only the first of the two is used.
+    If the sheet contains a triangle twice, once per side, only the first copy is used.
     """
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     front = triangles[np.sort(first)]

@@ -1,4 +1,4 @@
-"""Run ffmpeg in a separate process, which isolates its crashes and its licence."""
+"""Run ffmpeg in a separate process, to isolate the crashes and the licence of ffmpeg."""
 
 from __future__ import annotations
 

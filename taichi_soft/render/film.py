@@ -38,7 +38,7 @@ class FilmReport:
     path: Path | None  # path of the film; None if nothing was written
     frames: int  # number of frames
     fps: float  # frames per second
-    simulated: float  # world time that passed [s]
+    simulated: float  # simulated world time [s]
     step_times: NDArray[np.float64]  # time to step and read each frame except the first [s]
     draw_times: NDArray[np.float64]  # time to draw each frame [s]; empty if nothing is drawn
     slow: float = 1.0  # slow-motion factor of the film

@@ -1,4 +1,7 @@
-"""Find the tiles of an image that can show a shadow on the floor. Others are copied from the backdrop."""
+"""Find the tiles of an image that can show a shadow on the floor.
+
+In all other tiles, the floor is copied from the backdrop.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +56,8 @@ class FloorTiles:
                 continue
             texels = self._hits @ matrix[:2].T.astype(np.float64)
             low, high = texels.min(axis=1), texels.max(axis=1)
-            # The area of a tile is convex, so its corners bound it. Interpolation widens shadows by a texel.
+            # The floor area of a tile is convex, so the corners of the area are sufficient. Interpolation
+            # widens shadows by a texel.
             across = (low[:, 0] <= columns[-1] + 2) & (high[:, 0] >= columns[0] - 1)
             along = (low[:, 1] <= rows[-1] + 2) & (high[:, 1] >= rows[0] - 1)
             touched |= self._unbounded | (self._bounded & across & along)

@@ -39,7 +39,7 @@ def framed(
     returned in its initial state.
     Args:
         make_stage: function that returns the same stage at each call.
-        aspect: width over height of the image.
+        aspect: width divided by height of the image.
         seconds: world time to run [s]; None uses the stage's default.
         orbit: period of an orbiting camera [s of world time], see `Orbit`; None for a fixed camera.
     Raises: OptionError for a moving camera or numbers out of range, before the run; and the errors of the
@@ -64,12 +64,14 @@ def framed(
 
 
 def _no_box(body: Body) -> Floats:
-    """Fail if a camera asks for the box of a body. An `Orbit` never asks for it."""
+    """Raise an error, because an `Orbit` never needs the box of a body."""
     raise AssertionError(body)
 
 
 def _box_of_run(stage: Stage, seconds: float | None) -> tuple[Floats, Floats]:
-    """Run the stage. Returns: lower and upper corner of the box of its bodies over the whole run [m]."""
+    """Run the stage. Returns: lower and upper corner of the box that contains its bodies during the whole run
+    [m].
+    """
     if not isinstance(stage.camera, Camera):
         raise OptionError(f"stage.camera must be a fixed Camera, got {type(stage.camera).__name__}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")

@@ -11,11 +11,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.render.kernel_types import TILE, int_rows, ints, matrix, row_vec3, rows
 
 PLANE = 12
-"""Number of coefficients per triangle: a, b and c of a u + b v + c, for three edges and the depth."""
+"""Number of coefficients per triangle. The three edges and the depth are functions a u + b v + c of the
+pixel, with three coefficients each."""
 
 OVERLAP = 0.01
-"""Distance by which each triangle is enlarged [pixels]. It exceeds the rounding errors of edges,
-which would leave seams."""
+"""Distance by which each triangle is enlarged [pixels]. It exceeds the rounding errors of edges, so that no
+seams appear between triangles."""
 
 
 @ti.kernel

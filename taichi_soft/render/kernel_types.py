@@ -5,8 +5,8 @@
 from taichi_soft.core.runtime import ti
 
 TILE = 32
-"""Edge of a tile [pixels]. With smaller tiles, triangles are processed in more tiles; with larger tiles, the
-threads get unequal work."""
+"""Edge of a tile [pixels]. If tiles are smaller, each triangle is processed in more tiles. If tiles are
+larger, the work of the threads is less equal."""
 
 vec3 = ti.types.vector(3, ti.f32)
 matrix = ti.types.matrix(4, 4, ti.f32)

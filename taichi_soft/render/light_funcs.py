@@ -7,17 +7,17 @@ from taichi_soft.render import lighting
 from taichi_soft.render.look import CLOTH_BACK, JELLY, MATTE
 
 COARSE = 4.0
-"""Texels of the sun's shadow map per texel of the far-shadow maps, along one axis."""
+"""Edge of a texel in the far-shadow maps, in texels of the sun's shadow map."""
 
 FAINTEST = 0.002
-"""Shadow strength below which no shadow is drawn."""
+"""Strength of a shadow, from 0 to 1, below which the shadow is not drawn."""
 
 SOFT_TAPS = 8
-"""Width of the box filter for shadows on bodies [texels]."""
+"""Width of the box filter that softens shadows on bodies [texels]."""
 
 LIFT = 0.7
-"""Shadow bias [texels]. Look-ups are shifted by this distance along the normal, and by the same distance
-towards the sun."""
+"""Shadow bias [texels]. The point whose shadow is looked up is shifted by this distance along the normal, and
+again by this distance towards the sun."""
 
 
 @ti.func
@@ -63,7 +63,7 @@ def box_average(depth: ti.template(), size, left, top, fu, fv, height):
 
 @ti.func
 def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
-    """Return the fraction of sunlight that reaches a point of a body, 0 to 1, filtered over a box of the map.
+    """Return the fraction of sunlight that reaches a point of a body, 0 to 1, averaged in a box of the map.
 
     The map contains only faces turned away from the sun, so that a body does not shadow its own lit side.
     `LIFT` prevents false shadows at the rim of the lit side.
@@ -74,7 +74,7 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
     fu, fv = u - left, v - top
     lit = 1.0
     if left >= 0 and top >= 0 and left + SOFT_TAPS < size and top + SOFT_TAPS < size:
-        # Sample nine texels first. If they agree, assume the same of the texels between them.
+        # Sample nine texels first. If all nine are lit, or none is lit, assume the same for the whole box.
         open_texels = 0
         for j in range(3):
             for i in range(3):
@@ -138,7 +138,7 @@ def surroundings(normal, sun, above):
     upward = 0.5 + 0.5 * normal.z
     below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
     over = lighting.SKY_LIGHT * (0.75 + 0.25 * above)
-    # The fill light is opposite the key, at the height of the eye.
+    # The fill light is horizontal and comes from the side opposite the key light.
     aside = 0.5 - 0.5 * (normal.x * sun.x + normal.y * sun.y) / ti.sqrt(1.0 - sun.z * sun.z)
     return below + (over - below) * upward + lighting.FILL * (aside * aside)
 
@@ -147,7 +147,7 @@ def surroundings(normal, sun, above):
 def dimmed(light, color, openness):
     """Return the ambient light at a point that sees only the fraction `openness` of its surroundings.
 
-    Occluders are assumed to be about as bright as the surface, so that bright bodies do not look dirty at
+    Occluders are assumed to be about as bright as the surface. Otherwise, bright bodies would look dirty at
     contacts.
     """
     return light * (openness / (1.0 - 0.55 * (1.0 - openness) * color))
@@ -204,7 +204,7 @@ def cloth_glow(look, color, normal, sun, around, key, rim, openness):
         own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
     facing = normal.dot(sun)
     straight, tint = facing, own
-    if facing < 0.0:  # transmitted light passes more threads, which tint it more
+    if facing < 0.0:  # transmitted light passes through more threads than reflected light
         straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
     total = tint * (key * straight) + own * dimmed(around, own, openness)
     return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from taichi_soft.render.colors import to_linear, to_srgb
 
 SHUTTER = 0.5
-"""Fraction of a frame during which the shutter is open, the usual value of film cameras."""
+"""Fraction of a frame's duration for which the shutter is open. The value is usual for film cameras."""
 
 _LIGHT = to_linear(np.arange(256, dtype=np.float32) / 255.0)
 
 
 def shutter_times(pictures: int) -> list[float]:
-    """Return the time to advance before each subframe, in durations of a frame.
+    """Return the time to advance before each subframe, as a fraction of a frame's duration.
 
     The last subframe is at the end of the frame.
     """

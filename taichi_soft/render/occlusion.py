@@ -12,7 +12,7 @@ from taichi_soft.render.raster import Raster
 Floats = NDArray[np.float32]
 
 REACH = 0.06
-"""Radius of occlusion, as a fraction of the size of the scene."""
+"""Distance within which surfaces occlude each other, as a fraction of the size of the scene."""
 
 
 class Occlusion:
@@ -42,7 +42,7 @@ class Occlusion:
             rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
             lens: inverse of `rays`.
             focal: focal length [pixels].
-            backdrop: a, b and c of the floor's 1 / depth over the image, a u + b v + c.
+            backdrop: coefficients a, b and c of 1 / depth = a u + b v + c on the floor.
         """
         raster = self._raster
         count = len(raster.samples)

@@ -2,7 +2,7 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Kernels for screen-space ambient occlusion, at half the image's width and height.
 
-On a plane in space, q = 1 / depth is linear over the image: a u + b v + c. Therefore the height of a point
+On a plane in space, q = 1 / depth is linear in the image: q = a u + b v + c. Therefore the height of a point
 above the plane of a triangle follows from (u, v) and q of the point.
 """
 
@@ -20,11 +20,11 @@ TAPS = 10
 """Number of depth samples around a point."""
 
 TURNS = 4
-"""Edge of a block [points]. Each point of a block rotates its taps by another angle. The results are
-averaged over the block."""
+"""Edge of a block [points]. The taps are rotated by a different angle at each point of a block, and the
+results are averaged over the block."""
 
 WIDEST = 64.0
-"""Largest distance of a tap from its point [points]."""
+"""Largest distance between a point and its depth samples [points]."""
 
 BIAS = 0.12
 """Sine of the smallest angle above a triangle's plane at which other surfaces occlude the triangle. Without
@@ -40,7 +40,8 @@ ALIKE = 0.03
 def spiral_taps() -> NDArray[np.float32]:
     """Return offsets of the taps within the unit circle, float32 (TURNS * TURNS * TAPS, 2).
 
-    The `TAPS` offsets of each point of a block are contiguous. They form a spiral that is denser inside.
+    The `TAPS` offsets of each point of a block are contiguous. They form a spiral that is densest at its
+    centre.
     """
     k = np.arange(TAPS)
     turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
@@ -66,7 +67,7 @@ def gather_depth(
     In tiles without triangles, store q of the floor.
 
     Args:
-        backdrop: a, b, c of q on the floor, which is a u + b v + c.
+        backdrop: coefficients a, b, c of q = a u + b v + c on the floor.
         offset_u, offset_v: position of the first sample relative to the centre of the pixel [pixels].
         out: (height / 2, width / 2).
     """
@@ -102,7 +103,7 @@ def hidden_share(
     Args:
         rays: matrix (3, 3) from (u, v, 1) to the direction through a pixel.
         lens: inverse of `rays`.
-        plane: a, b, c of q = 1 / depth on the triangle, which is a u + b v + c.
+        plane: coefficients a, b, c of q = 1 / depth = a u + b v + c on the triangle.
         reach: distance beyond which nothing occludes [m].
         focal: focal length [pixels].
     """
@@ -128,7 +129,8 @@ def hidden_share(
                 offset = pixel_ray(rays, u_there, v_there) / q_there - here
                 far2 = offset.dot(offset)
                 near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-                # The added thousandth of the reach prevents self-occlusion from round-off.
+                # Adding a thousandth of the reach to the distance prevents round-off from causing
+                # self-occlusion.
                 total += ti.max(above / ti.sqrt(far2 + 1e-6 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 

@@ -1,4 +1,4 @@
-"""Import OpenCV, which only rendering needs. No other module of `render` imports it."""
+"""Import OpenCV. Only rendering needs OpenCV, and the other modules of `render` import it from here."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ from taichi_soft.render.opencv import cv2
 Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 1 / 26  # height of a line of text, relative to the shorter side of the image
-CAPTION = 0.8  # line height of captions, relative to `LINE`; small because an image can have many captions
+LINE = 1 / 26  # height of a line of text, as a fraction of the shorter side of the image
+CAPTION = 0.8  # line height of captions, as a fraction of `LINE`; an image can have many captions
 SMALLEST_LINE = 13.0  # smallest height of a line [pixels]; smaller letters are illegible
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # space between lines and around the text [line heights]
@@ -176,7 +176,7 @@ def _stroke(line: float) -> int:
 
 
 def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> float:
-    """Return the largest line height at which all lines fit, at most the default [pixels]."""
+    """Return the largest line height up to the default at which all lines fit [pixels]."""
     line = max(LINE * side, SMALLEST_LINE)
     while line > 2.0:
         _, wide, high = _panel_size(lines, line)

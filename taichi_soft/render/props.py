@@ -38,7 +38,7 @@ class Prop:
 
 
 class Scenery:
-    """Surfaces of all colliders of a world except its floor, and of further props.
+    """Surfaces of all colliders of a world except its floor, and surfaces of props.
 
     The surfaces are interpolated between the last two steps, like bodies. Call `remember` before each step.
     """
@@ -61,7 +61,7 @@ class Scenery:
         self._before = [_pose(prop) for prop in self._props]
 
     def at(self, alpha: float) -> list[Surface]:
-        """Return the surfaces between their stored pose (`alpha` 0) and their current pose (`alpha` 1)."""
+        """Return the surfaces, interpolated between the stored poses (`alpha` 0) and the current ones (1)."""
         for prop, surface, (start, turn) in zip(self._props, self._surfaces, self._before, strict=True):
             end, last_turn = _pose(prop)
             rotation = matrix_of(turned_by(turn, alpha * rotation_vector(turn, last_turn)))
@@ -77,7 +77,7 @@ def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def is_level(collider: Collider) -> bool:
-    """True for a horizontal plane, such as the floor, which the renderer draws itself."""
+    """True for a horizontal plane, such as the floor. The renderer draws the floor itself."""
     return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
 
 

@@ -11,8 +11,9 @@ from taichi_soft.render.geometry_kernels import PLANE, project_triangles
 from taichi_soft.render.kernel_types import TILE, matrix
 from taichi_soft.render.raster_kernels import rasterize
 
-# Positions of samples inside a pixel [pixels]. Four samples form a rotated grid: no two are in the same row
-# or column, which smooths nearly vertical and horizontal edges best.
+# Positions of the samples of a pixel relative to its centre [pixels]. CENTER: one sample. ROTATED_GRID: four
+# samples, of which no two are in the same row or column. This grid is best for smoothing edges that are
+# nearly vertical or nearly horizontal.
 CENTER = np.zeros((1, 2), dtype=np.float32)
 ROTATED_GRID = np.array([(-1, -3), (3, -1), (-3, 1), (1, 3)], dtype=np.float32) / 8.0
 
@@ -58,7 +59,7 @@ class Raster:
         Args:
             to_picture: (4, 4), see `project_triangles`.
             near: smallest depth drawn [m]; None for an orthographic projection, where every depth is 1.
-            backdrop: a, b and c of the plane q = a u + b v + c, which hides everything behind it.
+            backdrop: coefficients of the plane q = a u + b v + c. The plane hides everything behind it.
             keep_empty_tiles: do not clear tiles without triangles, to save time.
         """
         if len(self.planes) != len(scene.triangles):

@@ -43,13 +43,13 @@ def rasterize(
 
     Args:
         samples: (s, 2), positions of the samples relative to the centre of a pixel [pixels].
-        backdrop: a, b, c of the plane q = a u + b v + c that hides everything behind it.
+        backdrop: coefficients of the plane q = a u + b v + c. The plane hides everything behind it.
         nearest: largest q that is drawn.
         clear_all: 1 to clear tiles without triangles too, 0 to skip them.
         tile_next: scratch, one entry per tile.
         tile_triangles: scratch, at least as long as the result of `project_triangles`.
-        depth: out, q of the nearest triangle, which has the largest q. Sample s of the pixel in column u and
-            row v has the index (v * width + u) * s_count + s.
+        depth: out, q of the nearest triangle. The nearest triangle has the largest q. Sample s of the pixel
+            in column u and row v has the index (v * width + u) * s_count + s.
         owner: out, index of the nearest triangle at each sample, or -1.
     """
     tiles_across = (width + TILE - 1) // TILE
@@ -83,7 +83,7 @@ def rasterize(
             a1, b1, c1 = planes[t, 3], planes[t, 4], planes[t, 5]
             a2, b2, c2 = planes[t, 6], planes[t, 7], planes[t, 8]
             aq, bq, cq = planes[t, 9], planes[t, 10], planes[t, 11]
-            # If the innermost corner of a pixel is outside an edge, all samples of the pixel are outside.
+            # If all four corners of a pixel are outside an edge, all samples of the pixel are outside.
             m0 = c0 + 0.5 * (ti.abs(a0) + ti.abs(b0) + a0 + b0)
             m1 = c1 + 0.5 * (ti.abs(a1) + ti.abs(b1) + a1 + b1)
             m2 = c2 + 0.5 * (ti.abs(a2) + ti.abs(b2) + a2 + b2)

@@ -25,11 +25,11 @@ from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.tone import encode_table, light_table
 
-LARGEST = 8192  # largest edge [pixels]; beyond it, sample indices exceed 32 bits
+LARGEST = 8192  # largest width and height [pixels]; sample indices of larger images would exceed 32 bits
 
 
 class Renderer:
-    """Draws surfaces with a warm key light and a cool fill, over a checked floor that fades to the horizon.
+    """Draws surfaces with a warm key light and a cool fill, above a checked floor that fades to the horizon.
 
     Shadows are soft, nearby surfaces occlude ambient light, and tone mapping compresses bright tones, see
     `tone`.
@@ -191,7 +191,7 @@ class Renderer:
         return picture
 
     def _floor_depth(self) -> tuple[float, float, float]:
-        """Return a, b and c of the floor's 1 / depth over the image, a u + b v + c.
+        """Return the coefficients a, b and c of 1 / depth = a u + b v + c on the floor.
 
         The raster hides surfaces behind this plane.
         """

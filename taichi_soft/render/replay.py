@@ -34,7 +34,7 @@ class ReplayReport:
     first_difference: int | None  # step count of the first state that differs from the recording, or None
     failures: tuple[Failure, ...]  # failures of bodies that are frozen at the end
     picture: Path | None
-    hash: str  # hash of the last state, as web pages and the C library print it
+    hash: str  # hash of the last state, equal to the hash that web pages and the C library print
 
 
 def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayReport:

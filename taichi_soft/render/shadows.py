@@ -18,13 +18,17 @@ from taichi_soft.render.raster import CENTER, Raster
 COARSE = int(COARSE_TEXELS)
 SIZE = 384  # texels per side of the sun's shadow map
 CONTACT_SIZE = 192  # texels per side of the contact map, seen from the floor
-# Lengths relative to the size of the scene: blur of shadows cast from just above the floor, blur of shadows
-# cast from `FAR_HEIGHT` or higher, and `FAR_HEIGHT`; then blur and fade height of contact shadows.
+# Lengths as fractions of the size of the scene. NEAR_BLUR: blur of shadows cast from just above the floor.
+# FAR_BLUR: blur of shadows cast from high above the floor. FAR_HEIGHT: height from which shadows have this
+# blur. CONTACT_BLUR: blur of contact shadows. CONTACT_HEIGHT: height of an occluder at which the strength of
+# its contact shadow is 1 / e.
 NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
-SUNK = 0.05  # surfaces below this depth cast no shadow on the floor [size of the scene]
-# Largest distance from the camera's target at which bodies cast shadows, relative to the distance of the
-# camera. This limit prevents a body that flies away from stretching the map.
+# Largest depth below the floor at which surfaces cast shadows on the floor, as a fraction of the size of the
+# scene.
+SUNK = 0.05
+# Largest distance from the camera's target at which bodies cast shadows, as a multiple of the distance
+# between camera and target. Without this limit, a body that flies away would stretch the map.
 WITHIN = 3.0
 
 Floats = NDArray[np.float32]
@@ -43,14 +47,14 @@ class ShadowMaps:
         depth: float32 (SIZE * SIZE,), height towards the sun of the uppermost back face [m].
         near_shadow: float32 (SIZE, SIZE), shadow of occluders just above the floor, 0 to 1.
         far_shadow: float32 (SIZE / COARSE, SIZE / COARSE), shadow of occluders high above the floor, 0 to 1.
-        far_height: float32 with the shape of `far_shadow`, `far_shadow` times the height of the occluders
-            [FAR_HEIGHT].
+        far_height: float32 with the shape of `far_shadow`, `far_shadow` times the height of the occluders,
+            in units of FAR_HEIGHT.
         contact_matrix: like `matrix`, for the map seen from the floor upwards.
         contact: float32 (CONTACT_SIZE, CONTACT_SIZE), strength of contact shadows, 0 to 1.
     """
 
     def __init__(self, camera: Camera, floor: float | None, scale: float) -> None:
-        """Allocate the maps; `scale` is the size of the scene [m], the unit of blur and fade heights."""
+        """Allocate the maps; `scale` is the size of the scene [m]."""
         self._floor, self._scale = floor, scale
         outward = np.subtract(camera.eye, camera.target)
         azimuth = math.atan2(outward[1], outward[0]) - SUN_AZIMUTH

@@ -57,7 +57,7 @@ class Stage:
     enough for a film that is 480 pixels wide.
     """
 
-    title: str  # text in the corner
+    title: str  # text in the corner of the image
     world: World  # built world
     actors: list[Actor]  # bodies to draw; `act` may add some
     camera: Camera | Orbit | Follow  # fixed, orbiting a point, or following a body
@@ -66,7 +66,7 @@ class Stage:
     act: Callable[[World], object] | None = None  # called before every step, to move colliders, grab or throw
     props: list[Prop] = field(default_factory=list)  # solid objects that move with colliders or frames
     caption: Callable[[], str] | None = None  # function that returns another line of text for each frame
-    scale: ColorScale | None = None  # meaning of the colours of bodies, drawn as a bar
+    scale: ColorScale | None = None  # scale that the colours of bodies show, drawn as a colour bar
     legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and their meaning
     collider_colors: dict[Collider, Color] = field(default_factory=dict)  # colours of highlighted colliders
     backdrop: Backdrop | BackdropName = Backdrop.DAY  # sky and floor

@@ -21,7 +21,7 @@ follow."""
 
 
 class Texture:
-    """A texture with its mipmap, which prevents flicker at a distance.
+    """A texture with its mipmap. The mipmap prevents flicker at a distance.
 
     Args:
         pixels: sRGB, uint8 (height, width, 3), the first row at the top.

@@ -13,10 +13,10 @@ WHITE = 4.0
 """Linear light that an image shows as pure white."""
 
 TOE = 0.010
-"""Linear light around which dark tones are deepened."""
+"""Linear light that is reduced by half. Darker tones are reduced more, and brighter tones less."""
 
 KNEE = 0.55
-"""Linear light above which bright tones are compressed; colours between toe and knee are unchanged."""
+"""Linear light above which bright tones are compressed."""
 
 STEPS = 4096
 """Number of entries of the table that kernels use."""

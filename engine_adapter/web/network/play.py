@@ -26,8 +26,8 @@ from typing import Any
 HERE = Path(__file__).parent
 DT = 1 / 60
 NAMES = ("Python", "node")  # names of the players
-DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # base, random and stall delay of a message [s]
-LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # fractions of messages that are lost, delayed by STALL, and copied
+DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # delay of each message, largest random delay, delay of a stall [s]
+LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # fractions of messages lost, delayed by STALL, and sent twice
 LATE_START = (0, 20)  # frame in which each player begins
 PATIENCE = 60.0  # time after which a silent process counts as failed [s]
 

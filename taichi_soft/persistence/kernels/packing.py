@@ -12,7 +12,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
 LONG_GROUP = 256
-"""Number of rows from which copying a group takes a significant part of a snapshot's time."""
+"""Smallest number of rows for which copying a group of fields takes a significant part of a snapshot's
+time."""
 
 
 def row_table(state: State, counts: Mapping[str, int]) -> NDArray[np.int32]:
