@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 FILE = Path(__file__).parent / "elephant.glb"
 HEIGHT = 0.5  # [m]
-TRIANGLES, ROUNDS = 14000, 12  # number of triangles, rounds of smoothing
+TRIANGLES, ROUNDS = 14000, 12  # number of triangles, number of smoothing rounds
 GRID = 0.011  # edge of a cell of marching cubes
 PIXELS, MARGIN, QUALITY = 1024, 6, 90  # texture: edge and margin around charts [pixels], JPEG quality
 LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # corners of the sampled box
@@ -46,7 +46,7 @@ LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # corne
 EYES = np.array([[-0.105, -0.262, 0.765], [0.105, -0.262, 0.765]])
 EYE = 0.036  # radius
 EAR, EAR_SIZE = np.array([0.40, 0.02, 0.735]), np.array([0.235, 0.0, 0.265])  # centre, half axes
-EAR_TURN, EAR_TILT = 0.45, 0.22  # rotations: forward about z, outward about y [rad]
+EAR_TURN, EAR_TILT = 0.45, 0.22  # rotation about z (to the front), about y (outwards) [rad]
 EAR_THICKNESS = 0.052  # half thickness
 TRUNK = np.array(
     [
@@ -92,9 +92,9 @@ def cone(p: Floats, a: Floats, b: Floats, start: float, end: float) -> Floats:
 
 
 def ear_axes(p: Floats) -> Floats:
-    """Return points in the axes of the right ear: across, towards its front, and up, (..., 3).
+    """Convert points to coordinates in the axes of the right ear: sideways, to the front, and up, (..., 3).
 
-    Points to the left are mirrored, because the left ear mirrors the right one.
+    Points on the left side are mirrored, because the left ear is a mirror image of the right ear.
     """
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1) - EAR
     c, s = np.cos(EAR_TURN), np.sin(EAR_TURN)

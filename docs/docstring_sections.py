@@ -53,7 +53,10 @@ def sectioned(text: str) -> str:
 
 
 def value_of(default: griffe.Expr, module: str) -> str | None:
-    """Return the value of a default that contains names, as text; None if the source text is clearer."""
+    """Return the value of a parameter's default that contains names, as text.
+
+    Return None if the source text of the default is clearer.
+    """
     names = [part.name for part in default.iterate(flat=True) if isinstance(part, griffe.ExprName)]
     if not names or module not in sys.modules:
         return None

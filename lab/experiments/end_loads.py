@@ -1,7 +1,8 @@
 """Loads on the ends of a bar along x: prescribed displacements or forces, and their work.
 
 Strains in a uniform bar are at most `STRAIN`. Stiffness is defined by work. For a displacement q, the
-stiffness is the work of the reactions over q^2. For a force F, the stiffness is F^2 over the work of F.
+stiffness is the work of the reactions divided by q^2. For a force F, the stiffness is F^2 divided by the work
+of F.
 """
 
 from __future__ import annotations

@@ -34,11 +34,11 @@ DT = 1 / 60
 READ_EVERY = 3  # steps between two measurements
 CONSERVATIVE = 0.25  # Poisson's ratio at which the linear virial stress has an energy
 LITTLE = 0.05
-"""Largest damping that counts as very little, as a fraction of the critical damping of the cube's longest
-vibration."""
+"""Largest damping that counts as very little, as a fraction of the critical damping. The longest vibration of
+the cube determines the critical damping."""
 GROWS, STAYS = 1.15, 1.05
-"""Limits for the mean kinetic energy of the last quarter of a run over that of the first quarter. The energy
-grows if the ratio exceeds `GROWS`, and is constant if it is below `STAYS`."""
+"""Limits of the ratio that `growth` returns. The energy grows if the ratio exceeds `GROWS`, and is constant
+if the ratio is below `STAYS`."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -96,7 +96,7 @@ def _elastic_energy(body: Body, point: Point) -> float:
 
 
 def growth(numbers: Numbers) -> float:
-    """Return the mean kinetic energy of the last quarter of the run over that of the first quarter.
+    """Return the growth of the mean kinetic energy from the first to the last quarter of the run, as a ratio.
 
     The result is infinite if the body failed.
     """

@@ -18,7 +18,7 @@ Forces = Callable[[Floats], Floats]
 """Function that maps positions (n, 3) [m] to forces (n, 3) [N]."""
 
 SMALLEST = 1e-9
-"""Largest remaining force on free coordinates, over the largest force."""
+"""Largest force that may remain on a free coordinate in equilibrium, as a fraction of the largest force."""
 DIFFERENCE = 1e-6
 """Step of the finite differences [mean edge length]."""
 

@@ -81,7 +81,7 @@ class Plot:
 
     Args:
         name: file name, unique within the experiment.
-        caption: one or two sentences on what the plot shows.
+        caption: one or two sentences about the contents of the plot.
         draw: function that draws into an empty figure of matplotlib, with units on every axis.
         size: width and height [inches].
     """
@@ -106,7 +106,7 @@ class Section:
     """Conclusion of an experiment.
 
     Args:
-        text: paragraphs on the set-up and the result, for a reader who knows the thesis.
+        text: paragraphs about the set-up and the result, for a reader who knows the thesis.
     """
 
     text: tuple[str, ...]

@@ -31,11 +31,11 @@ BODIES: dict[str, tuple[Material, tuple[float, ...]]] = {
     "stiff": (Material(1e8, 0.3, 1000.0, 1000.0, damping_ratio=0.0), (10.0, 30.0, 100.0)),
     "very stiff": (MATERIAL, (10.0, 100.0, 300.0)),
 }
-"""Material of each sphere, and steps of implicit Euler over leapfrog's largest stable step. The longest step
-is about as long as a frame."""
+"""Material of each sphere, and lengths of its steps with implicit Euler [leapfrog's largest stable step]. The
+longest step is about as long as a frame."""
 
 EXPLICIT = 0.9
-"""Step of leapfrog over its largest stable step."""
+"""Length of a leapfrog step, as a fraction of the largest stable step."""
 PAYS = 1.5
 """Smallest gain that counts as an advantage; smaller gains may be noise on a busy machine."""
 

@@ -42,7 +42,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the distance of a stretched cube from its start after equal numbers of steps forth and back."""
+    """Measure the distance of a stretched cube from its start after steps forwards and as many backwards."""
     cube = box(cells=(2, 2, 2))
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")

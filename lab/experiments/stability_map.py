@@ -1,8 +1,8 @@
 """The dropped sphere for many Young's moduli and Poisson's ratios (thesis section 6.6).
 
 Spheres of all moduli with one Poisson's ratio fall side by side in one world, without contact. The linear
-limit is the modulus whose largest stable step is the thesis's step. This limit shows how much of the upper
-edge is due to the mesh.
+limit is the modulus whose largest stable step is the thesis's step. The comparison with this limit shows how
+strongly the mesh determines the upper edge.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ WINDOWS = {0.1: (2e5, 3e6), 0.4: (4e5, 1e6)}
 LEAST, MOST = 1e5, 1e7
 """Range of moduli to try [Pa]."""
 ROUNDING = 1.5
-"""Largest factor between an edge and the thesis's edge. The thesis prints one digit: 1e6 can stand for
-1.5e6."""
+"""An edge agrees if it differs from the thesis's edge by at most this factor. The thesis prints one digit, so
+1e6 can stand for 1.5e6."""
 EQUAL = 1.1
 """Largest factor between edges that count as equal. The factor between neighbouring moduli is larger."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")

@@ -28,7 +28,8 @@ POISSON = (0.0, 0.3)
 CELLS = 4
 REGULAR = "regular grid"
 TOPS = 0.35, 0.75
-"""Range of shears in which the volume must have its maximum, so that it drops beyond 0.5."""
+"""Range of shears that must contain the maximum of the volume. The volume then drops beyond a shear of about
+0.5."""
 HALF = 0.5
 """Shear beyond which the volume drops in the thesis."""
 FAR_BELOW = 0.7

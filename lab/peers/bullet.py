@@ -25,7 +25,7 @@ MARGIN = 1e-3
 """Gap between body and floor [m]."""
 
 FLOOR = 5.0
-"""Half height of the floor's box, and a sixth of its width [m]."""
+"""Half the height of the box that serves as the floor [m]. The box is six times as wide as this value."""
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:

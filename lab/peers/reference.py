@@ -17,10 +17,12 @@ from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 Floats = NDArray[np.float64]
 
 FLOOR = 1.6e7
-"""Stiffness of the floor per mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
+"""Stiffness of the floor divided by the mass of a vertex [1/s^2]. With this value, vertices sink into the
+floor by a few millimetres."""
 
 FRACTION = 0.05
-"""Length of a step over the time in which sound crosses the smallest altitude of a tetrahedron."""
+"""Length of a step, as a fraction of the time in which sound crosses the smallest altitude of all
+tetrahedra."""
 
 
 class Reference:
@@ -30,7 +32,7 @@ class Reference:
     """
 
     def __init__(self, drop: Drop, steps: int) -> None:
-        """Create the body at the start of the drop; it makes `steps` steps in 1 / RATE s."""
+        """Create the body at the start of the drop. `advance` makes `steps` steps in 1 / RATE s."""
         self.drop, self.steps, self.h = drop, steps, 1.0 / (RATE * steps)
         self.masses, self.volumes = drop.masses, drop.volumes
         self.corners = drop.mesh.tets.T  # (4, m)

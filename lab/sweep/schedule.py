@@ -14,8 +14,8 @@ TIME_LIMIT = 1800.0
 """Time limit of a point [s]."""
 
 LOOK = 0.5
-"""Interval between checks of time limits, and of Ctrl-C on systems where Ctrl-C does not interrupt a wait
-[s]."""
+"""Interval between checks of time limits [s]. On systems where Ctrl-C does not interrupt a wait, Ctrl-C takes
+effect at the next check."""
 
 
 def compute_all(

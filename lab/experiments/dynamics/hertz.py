@@ -41,11 +41,11 @@ ELEMENTS = "finite elements"
 QUICK_LAWS, FULL_LAWS = ("virial", "neo_hookean", "springs"), (*TETRAHEDRAL, "springs", "volume_springs")
 EXPONENT, EXPONENT_TOLERANCE = 1.5, 0.1
 FROM_HERTZ = 0.1
-"""Largest relative difference from Hertz's force at any depth. Finite elements differ from it by 8 %, because
-few vertices touch the plane at first."""
+"""Largest relative difference from Hertz's force at any depth. Finite elements differ from Hertz's force by 8
+%, because at first only a few vertices touch the plane."""
 SAME_MESH = 0.03
 """Largest relative difference from finite elements at the smallest depth. Finite elements assume small
-strain. The strain below the contact is about half the root of depth over radius, 4 to 10 %."""
+strain. The strain below the contact is about sqrt(depth / radius) / 2, which is 4 to 10 %."""
 
 
 def points(effort: Effort) -> list[Point]:
