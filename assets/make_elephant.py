@@ -13,11 +13,12 @@
 """Make `elephant.glb`: a sitting toy elephant, 0.5 m high, with a painted texture.
 
 Run `uv run assets/make_elephant.py`, or install the packages above and run `python assets/make_elephant.py`.
-The same packages make the same file. In this script, the unit of length is about the height of the toy, z
-points up, and the elephant looks along -y. In the file, y points up, as glTF requires.
+With the same versions of the packages, the script makes the same file. In this script, the unit of length is
+about the height of the toy, z points up, and the elephant faces the direction -y. In the file, y points up,
+as glTF requires.
 
 The shape is the zero level of a function of space that blends round parts. The colours are also a function of
-space, which is evaluated at each pixel of the texture.
+space. This function is evaluated at each pixel of the texture.
 """
 
 from __future__ import annotations
@@ -144,7 +145,7 @@ def gradient(p: Floats) -> Floats:
 def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
     """Return the vertices (n, 3), the triangles (m, 3) and the vertex normals (n, 3) of the elephant.
 
-    Marching cubes make a mesh of the surface, which is simplified, smoothed, and projected back onto the
+    Marching cubes make a mesh of the surface. The mesh is simplified, smoothed, and projected back onto the
     solid.
     """
     axes = [np.arange(lo, hi, GRID) for lo, hi in zip(LOW, HIGH, strict=True)]

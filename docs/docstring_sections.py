@@ -1,7 +1,7 @@
 """Griffe extension that prepares the docstrings of this code base for mkdocstrings.
 
-Our docstrings have `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each,
-and code under `Example:`. Comments after the fields of a dataclass describe the fields. Signatures show the
+Our docstrings have no empty line before `Args:`. `Returns:` and `Raises:` are one sentence each, and
+`Example:` contains code. Comments after the fields of a dataclass describe the fields. Signatures show the
 values of constants. Classes that only a world can create have no signature.
 """
 

@@ -2,7 +2,7 @@
 
 The first paragraph of a demo's docstring describes what the film shows, the second paragraph what to notice.
 The docstrings in `play/scenes.py` describe the scenes. On the page, the scenes are above the demos. Stills
-come from `docs/pictures`, which is in the repository. Films and worlds come from `docs/gallery`, where
+come from the folder `docs/pictures` in the repository. Films and worlds come from `docs/gallery`, where
 `make_gallery.py` and `make_worlds.py` write them. If they are missing, an entry shows its still, and the page
 says how to make them. MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
 """

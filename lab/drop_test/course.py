@@ -45,7 +45,7 @@ class Solid:
     shape: Shape
     distance: Distance  # maps points in the solid's axes; negative inside a solid or outside the room
     tolerance: float  # depth up to which a point counts as lying on the surface [m]
-    is_room: bool  # True for floor, walls and lid, which bodies must not pass
+    is_room: bool  # True for floor, walls and lid; bodies must not pass through them
     position: Floats
     rotation: Floats  # (3, 3)
     friction: float

@@ -48,7 +48,8 @@ def points(effort: Effort) -> list[Point]:
 
 
 def bars_mesh() -> TetMesh:
-    """Return the mesh of the bars, centred at their crossing, with ends at +-1.3 m on each axis."""
+    """Return the mesh of the bars. The crossing is at the origin, and the ends are at +-1.3 m on each
+    axis."""
     mesh = load_mesh(ASSETS / "bars.npz")
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
@@ -85,8 +86,8 @@ def measure(point: Point) -> Numbers:
 def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
     """Return the largest deflection of an end across its bar [m], and the largest relative change of length.
 
-    Deflections are measured in axes that move and rotate with the crossing. Lengths are those of half bars,
-    along the centres of their cross-sections.
+    Deflections are measured in axes that move and rotate with the crossing. Lengths are measured from the
+    crossing to each end, along the centres of the cross-sections.
     """
     rest = mesh.vertices
     hub = (np.abs(rest) < 0.6 * THICKNESS).all(axis=1)

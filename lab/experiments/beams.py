@@ -60,7 +60,7 @@ TEXT = (
 def points(effort: Effort) -> list[Point]:
     """List the points: every law and finite elements on a coarse mesh.
 
-    On two finer meshes, there are only one law and linear elements.
+    On two finer meshes, the points are only one law and linear elements.
     """
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)

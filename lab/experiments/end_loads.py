@@ -65,7 +65,7 @@ def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Return loads with a known solution, by name: on ends that can contract or warp, and on a cantilever.
+    """Return loads with a known solution, by name: loads on ends that can contract or warp, and a cantilever.
 
     Tension and bending prescribe displacements of the ends along x only, torsion across x only. The stresses
     of a uniform bar and of Saint-Venant's theory are then exact solutions of linear elasticity up to the

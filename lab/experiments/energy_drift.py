@@ -1,4 +1,4 @@
-"""Kinetic energy without damping over time (thesis section 6.4): it accumulates, and little damping stops it.
+"""Kinetic energy accumulates without damping, and little damping prevents this (thesis section 6.4).
 
 The thesis's stress is not the derivative of an energy, except for the virial law at nu = 1/4, with W = 1/2
 lambda (J (tr b - 5) + 2) and b = F F^T. In this case, and under any law with an energy, kinetic energy must
@@ -90,7 +90,7 @@ def _elastic_energy(body: Body, point: Point) -> float:
     if point["law"] != "virial":
         return body.elastic_energy()
     F, now = body.deformations(), body.volumes()
-    per_volume = (F**2).sum(axis=(1, 2)) - 5  # times J V0, which is the current volume
+    per_volume = (F**2).sum(axis=(1, 2)) - 5  # to be multiplied by the current volume, J V0
     lam = YOUNG * point["poisson"] / ((1 + point["poisson"]) * (1 - 2 * point["poisson"]))
     return float(0.5 * lam * (now @ per_volume + 2 * EDGE**3))
 

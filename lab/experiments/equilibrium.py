@@ -1,6 +1,6 @@
 """Equilibrium of a body between plates: vertices on the plates are prescribed, other vertices move freely.
 
-Newton's method on forces in float64 finds the state in which a damped body would come to rest.
+Newton's method in float64 finds the state in which a damped body would come to rest.
 """
 
 from __future__ import annotations

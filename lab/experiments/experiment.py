@@ -162,12 +162,12 @@ class Experiment:
 
     Args:
         name: short unique name, as in `python -m lab report NAME`.
-        source: section or figure of the thesis, or the theory beyond it.
-        claims: keys in `CLAIMS`; the section has one finding for each.
+        source: section or figure of the thesis, or the theory behind an experiment that is not in the thesis.
+        claims: keys in `CLAIMS`. The section contains one finding for each claim.
         points: function that lists the points of a quick or a full report.
         measure: module-level function that measures one point, in any process. The device is already chosen.
         conclude: function that judges the results. Raises: MissingPointError if a needed point is missing.
-        is_timing: True if the points measure time. Such points run alone, one after the other.
+        is_timing: True if the points measure time. Points that measure time run alone, one after the other.
     """
 
     name: str

@@ -90,7 +90,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the stiffness in every direction [Pa], or, for a point with "apex", the strains of an edge.
 
-    The strains are those that CMPM2 computes for an edge at the top vertex, which is pulled.
+    The top vertex is pulled. The strains are those that CMPM2 computes for an edge at this vertex.
     """
     if "apex" in point:
         mesh, material = tetrahedron(point["apex"]), MATERIALS[JUDGED]

@@ -79,9 +79,9 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the fraction of planes that are far from perpendicular, and the cheap normals, on several meshes.
+    """Judge the fraction of planes that are far from perpendicular, and the accuracy of the cheap normals.
 
-    One mesh is like that of the thesis.
+    There are several meshes. One of them is similar to the thesis's mesh.
     """
     beam = results.one(mesh=BEAM)[FITTED]
     rows = [(point["mesh"], numbers) for point, numbers in results.where()]

@@ -1,7 +1,7 @@
-"""Tetrahedra that invert on a hard impact (thesis section 6.6): they stay inverted, as dents.
+"""Tetrahedra that invert on a hard impact and stay inverted, as dents (thesis section 6.6).
 
 The thesis's sphere is thrown at the floor with each treatment of inverted tetrahedra: "tolerant" as in the
-thesis, "off", and "recover", which restores them.
+thesis, "off", and "recover".
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Gain of implicit Euler for tetrahedra (thesis section 6.5): its computing time compared with leapfrog's.
+"""Gain of implicit Euler for tetrahedra (thesis section 6.5): computing time compared with leapfrog.
 
 A sphere falls onto the floor. A stiffer sphere needs shorter steps with leapfrog but not with implicit Euler,
 so the gain grows with the stiffness. Therefore three materials are compared.
@@ -43,7 +43,7 @@ PAYS = 1.5
 def points(effort: Effort) -> list[Point]:
     """List the points: a fall for each sphere, integrator and step.
 
-    A quick report uses a coarse sphere and omits the stiffest one.
+    A quick report uses a coarse mesh and omits the stiffest sphere.
     """
     is_full = effort is Effort.FULL
     common = {"resolution": 5 if is_full else 3, "repeats": 3 if is_full else 2}

@@ -29,7 +29,7 @@ except that of lazy leapfrog."""
 
 ORDER_TOLERANCE = 0.15
 START = 0.02
-"""Initial displacement [m]; errors are divided by it."""
+"""Initial displacement [m]. Errors are divided by this value."""
 
 STEPS = (32, 64, 128, 256)
 """Numbers of steps per period. With more steps, rounding of float32 dominates."""

@@ -1,4 +1,4 @@
-"""A block of tetrahedra of many shapes and orientations, which favours no law."""
+"""A block of tetrahedra of many shapes and orientations. Such a mesh favours no law."""
 
 from __future__ import annotations
 

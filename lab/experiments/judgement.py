@@ -18,7 +18,7 @@ class Span:
     values: Collection[float]
 
     def __format__(self, how: str) -> str:
-        """Format the smallest and the largest number; only one number if both have the same text."""
+        """Format the smallest and the largest number. If both have the same text, return it only once."""
         low, high = format(min(self.values), how), format(max(self.values), how)
         return low if low == high else f"{low} to {high}"
 

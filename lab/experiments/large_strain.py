@@ -23,7 +23,7 @@ from taichi_soft import Material, cylinder, internal_forces
 RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6
 """Cylinder of figure 6.3 (b): radius and height [m], Young's modulus [Pa]."""
 MESH = (2, 10)
-"""Rings and layers of the cylinder's mesh, which has 720 tetrahedra."""
+"""Numbers of rings and layers of the cylinder's mesh. The mesh has 720 tetrahedra."""
 POISSON = (0.0, 0.1, 0.2, 0.3, 0.4)
 STRAINS = ("linear", "exact")
 WANTED, FURTHEST = 1.0, 1.2

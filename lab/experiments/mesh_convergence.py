@@ -156,7 +156,7 @@ def conclude(results: Results) -> Section:
 
 
 def _falls(errors: list[float]) -> bool:
-    """True if each error is smaller than the one before."""
+    """True if each error is smaller than the previous error."""
     return all(abs(after) < abs(before) for before, after in pairwise(errors))
 
 

@@ -1,4 +1,4 @@
-"""Forces by faces and by the virial theorem, and their cost compared with springs (thesis 6.6, 6.7)."""
+"""Forces by faces and by the virial theorem, and the cost of both compared with springs (thesis 6.6, 6.7)."""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ ROUNDING = 1.5
 """An edge agrees if it differs from the thesis's edge by at most this factor. The thesis prints one digit, so
 1e6 can stand for 1.5e6."""
 EQUAL = 1.1
-"""Largest factor between edges that count as equal. The factor between neighbouring moduli is larger."""
+"""Edges count as equal if they differ by less than this factor. Neighbouring moduli differ by a larger
+factor."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
@@ -192,7 +193,7 @@ def conclude(results: Results) -> Section:
 
 
 def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
-    """Return two booleans: True if the lower edge agrees with the thesis's, True if the upper edge does."""
+    """Return a boolean each for the lower and the upper edge: True if it agrees with the thesis's edge."""
     low, first, last, high = window(numbers, collapsed)
     thesis_low, thesis_high = WINDOWS[nu]
     return (
@@ -227,7 +228,7 @@ def _within(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> list[t
 
 
 def _other_lines(numbers: Numbers, nu: float) -> str:
-    """Describe for which other values of `COLLAPSED` the verdict is the same."""
+    """Describe for which other values of `COLLAPSED` the verdict does not change."""
 
     def verdict(line: float) -> Verdict:
         return _window_verdict(numbers, nu, line)

@@ -25,8 +25,8 @@ STEP = 1e-5
 """Step of the finite differences, as a fraction of the shortest edge. Truncation and rounding each cause a
 relative error of about 1e-10."""
 SLOW = 0.5
-"""If a step of Newton's method leaves more than this fraction of the residual, the stiffness is computed
-again."""
+"""The stiffness is computed again if a step of Newton's method leaves more than this fraction of the
+residual."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
 """A body counts as unconstrained if the first step of Newton's method displaces it by more than this multiple

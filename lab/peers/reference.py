@@ -1,9 +1,9 @@
-"""The reference drop in NumPy: float64, a textbook law, and much shorter steps than those of any engine.
+"""The reference drop in NumPy, with float64, a textbook law, and much shorter steps than in any engine.
 
 No engine uses the law psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984). The floor is a
 stiff spring under each vertex, so contact dissipates no energy. Without the springs, each impact of a vertex
-would dissipate energy that depends only on the mesh, whereas the surface of a real body has no mass. With
-half the step and a floor of four times the stiffness, squash and bounce change by at most 0.6 %.
+would dissipate energy. This energy would depend on the mesh, because the surface of a real body has no mass.
+With half the step and four times the stiffness of the floor, squash and bounce change by at most 0.6 %.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ gained energy."""
 class Verdict(Choice):
     """Verdicts, worst first.
 
-    `TOO_SOFT` means that tetrahedra are inverted, and that `World.build` warned of it. `NO_RESULT` means that
-    the run failed.
+    `TOO_SOFT` means that tetrahedra are inverted after `World.build` warned that the body is too soft.
+    `NO_RESULT` means that the run failed.
     """
 
     FROZEN = "frozen"
@@ -49,7 +49,7 @@ class Ending:
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:
-    """Return the worst verdict that applies, and its reason, which is empty for `OK`."""
+    """Return the worst verdict that applies, and its reason. The reason for `OK` is empty."""
     if end.failure is not None:
         return Verdict.FROZEN, end.failure
     if not end.is_finite:

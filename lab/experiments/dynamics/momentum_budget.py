@@ -126,7 +126,7 @@ def conclude(results: Results) -> Section:
                 axes.plot(numbers["times"], numbers["turning"], style, label=name)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angular momentum, over that at the start [1]")
-        axes.set_ylim(-0.1, 2.0)  # larger changes mean that the body failed
+        axes.set_ylim(-0.1, 2.0)  # a larger change means that the body failed
         figure.legend(loc="outside right upper")
 
     return Section(

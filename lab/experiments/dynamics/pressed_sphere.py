@@ -40,7 +40,7 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Return the indices of the fixed vertices, which lie more than half a radius above the centre."""
+    """Return the indices of the fixed vertices: those more than half a radius above the centre."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
@@ -89,7 +89,7 @@ def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
 def _descent() -> list[list[float]]:
     """Return the depth after each step [m], as one list for each of `DEPTHS`.
 
-    A list first moves to its depth and then stays there.
+    The values of a list approach its depth and then stay constant.
     """
     starts = (0.0, *DEPTHS[:-1])
     return [

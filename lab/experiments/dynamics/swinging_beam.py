@@ -46,7 +46,8 @@ def theory(support: str) -> float:
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     """Return the frequency of the vibrating beam [Hz], and the growth of its amplitude in one period.
 
-    The growth is the ratio of the later to the earlier amplitude. Both numbers are 0 if the beam fails.
+    The growth is the amplitude after the period divided by the amplitude before it. Both numbers are 0 if the
+    beam fails.
     """
     shape, held = mode_shape(mesh, support)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
