@@ -48,8 +48,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def bars_mesh() -> TetMesh:
-    """Return the mesh of the bars. The crossing is at the origin, and the ends are at +-1.3 m on each
-    axis."""
+    """Return the mesh of the bars. They cross at the origin, and end at +-1.3 m on each axis."""
     mesh = load_mesh(ASSETS / "bars.npz")
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 

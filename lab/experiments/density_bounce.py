@@ -35,8 +35,7 @@ TOUCH = 1e-3  # height below which a vertex counts as lying on the floor [m]
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: increasing and uniform density. For a full report, both are repeated on a finer
-    mesh."""
+    """List the points: increasing and uniform density. A full report adds both on a finer mesh."""
     cells = (4,) if effort is Effort.QUICK else (4, 6)
     return [{"density": kind, "cells": count} for count in cells for kind in ("grows", "mean")]
 

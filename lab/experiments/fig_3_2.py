@@ -51,7 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the displacement and the amplitude of the mode after each step, relative to their initial
+    """Measure the displacement and the amplitude of the mode after each step, divided by the initial
     values."""
     count = MOVING + 2
     rest = np.zeros((count, 3))

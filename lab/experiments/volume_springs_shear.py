@@ -46,8 +46,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume and the forces on the top while the top moves sideways by up to the cube's
-    height."""
+    """Measure the volume, and the forces on the top while it moves sideways by up to the cube's height."""
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -69,8 +68,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the effect of nu = 0.3 on irregular meshes. A regular mesh shows how the mesh affects the
-    result."""
+    """Judge the effect of nu = 0.3 on irregular meshes. A regular mesh shows the influence of the mesh."""
     for seed in (None, 1):
         results.one(seed=seed, poisson=0.0)
     pairs = {
