@@ -1,4 +1,4 @@
-"""What a bake writes, read back by other readers, against what the world had at every frame."""
+"""Baked files, read by other readers and compared with the world at every frame."""
 
 import json
 import os

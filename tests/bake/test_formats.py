@@ -1,4 +1,4 @@
-"""What files hold, of clips made up here: no world is needed."""
+"""Contents of baked files, from made-up clips without a world."""
 
 import json
 

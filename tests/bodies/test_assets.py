@@ -1,4 +1,4 @@
-"""What bodies of one kind share: made once, never changed, and checked before any body is made of it."""
+"""Assets that bodies of one kind share: created once, immutable, and checked before a body uses them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is measured on one body: pose against SciPy, strain and stress against closed forms."""
+"""Measurements of one body: pose compared with SciPy, strain and stress with closed forms."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bodies of particles and springs in a world, beside solid ones; and pins."""
+"""Bodies of particles and springs in a world with solid bodies, and pins."""
 
 import numpy as np
 import pytest

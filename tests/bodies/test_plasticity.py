@@ -1,4 +1,4 @@
-"""Permanent change of the rest shape: yield, creep, maximum, and what a pool gives back."""
+"""Permanent change of the rest shape: yield, creep, largest change, and reset of a pool's slot."""
 
 import functools
 import math
@@ -45,8 +45,11 @@ def equivalent(values):
 
 
 def yielded(stretches, limit):
-    """Return mapping on paper: elastic stretches of the same volume, the strain deviator's direction (of the
-    logarithms) kept, whose linear strain is at the limit."""
+    """Compute the elastic stretches after return mapping, in closed form.
+
+    The volume and the direction of the deviator of the logarithmic strain are preserved. The equivalent
+    linear strain is at the limit.
+    """
     logarithms = np.log(stretches)
     mean, deviator = logarithms.mean(), logarithms - logarithms.mean()
 

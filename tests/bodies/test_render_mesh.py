@@ -1,4 +1,4 @@
-"""What a renderer gets of a body: its surface, split at sharp edges, with normals of the present shape."""
+"""Render meshes of a body: the surface, split at sharp edges, with normals of the current shape."""
 
 import numpy as np
 import pytest

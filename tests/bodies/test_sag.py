@@ -1,4 +1,4 @@
-"""Bodies that cannot bear their own weight: said when the world is built, with what would bear it."""
+"""Bodies that cannot bear their own weight: `World.build` warns, and suggests a sufficient modulus."""
 
 import re
 import warnings

@@ -1,4 +1,4 @@
-"""An artist's mesh on a body: where it is drawn as the body rests, turns, bends, is cut and torn."""
+"""An artist's mesh on a body that rests, rotates, bends, is cut or torn."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Fields outlive their world: a later one that fits into them takes them over."""
+"""Fields remain after the end of their world, and a later world that fits into them reuses them."""
 
 import gc
 

@@ -1,4 +1,4 @@
-"""The stress of a body is that of its own law: against closed forms, and against its forces by the virial."""
+"""The stress of each law, compared with closed forms and, by the virial theorem, with forces."""
 
 from typing import NamedTuple
 

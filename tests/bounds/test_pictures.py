@@ -1,4 +1,4 @@
-"""Pictures under the bounds check, of what no camera should see."""
+"""Images under the bounds check, with triangles that no camera should show."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Grids under the bounds check: made of random and degenerate shapes, and asked at any place."""
+"""Grids of random and degenerate shapes under the bounds check, evaluated at any position."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Whole worlds under the bounds check: whatever a game does, no kernel reads or writes beside its fields."""
+"""Whole worlds under the bounds check: no kernel reads or writes outside its fields."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Cages: good tetrahedra that weigh, turn, bend and vibrate as the solid that they carry."""
+"""Cages of good tetrahedra: mass, inertia, bending and vibration equal those of the enclosed solid."""
 
 import numpy as np
 import pytest
@@ -148,9 +148,12 @@ def test_the_stable_step_is_just_below_two_over_the_highest_frequency(made):
 
 @pytest.mark.soak
 def test_a_bar_along_no_axis_bends_as_a_beam_and_the_better_the_finer():
-    """Slowest bending of a free beam (Weaver, Timoshenko and Young, "Vibration problems in engineering", art.
-    5.12): w = (4.730 / L)^2 sqrt(EI / rho A), less for rotation and shear: by 1 + (4.730 r / L)^2 / 2 times
-    (1.006 + 2.974 E / kG) with r^2 = I / A and k = 10 (1 + nu) / (12 + 11 nu)."""
+    """Compare the slowest bending with that of a free beam.
+
+    The angular frequency is w = (4.730 / L)^2 sqrt(EI / rho A) (Weaver, Timoshenko and Young, "Vibration
+    problems in engineering", art. 5.12). Rotation and shear reduce it by the factor 1 + (4.730 r / L)^2 / 2
+    times (1.006 + 2.974 E / kG), with r^2 = I / A and k = 10 (1 + nu) / (12 + 11 nu).
+    """
     length, nu = 8.0, 0.3
     bar = turned(trimesh.creation.box((length, 1.0, 1.0)))
     slender = (4.730 / length) ** 2 * np.sqrt(1e6 / 1000.0 / 12.0)

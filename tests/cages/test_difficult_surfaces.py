@@ -1,4 +1,4 @@
-"""Surfaces that go wrong elsewhere become bodies that fall and rest, or are refused with the way out."""
+"""Surfaces with which other meshers fail: they become bodies, or are refused with a suggestion."""
 
 import numpy as np
 import pytest

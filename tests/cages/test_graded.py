@@ -1,4 +1,4 @@
-"""The lattice with halved cubes: good tetrahedra that fill space face by face, and are found by points."""
+"""The lattice with subdivided cubes: its good tetrahedra fill space, and points are located in them."""
 
 import numpy as np
 import pytest
@@ -42,8 +42,11 @@ def test_a_point_lies_in_the_tetrahedron_that_is_named(lattice):
 
 
 def test_tetrahedra_meet_face_to_face_without_gaps(lattice):
-    """Of a solid without cavities, vertices - edges + faces - tetrahedra is 1 (Euler). Each inner face has a
-    tetrahedron on both sides: outer faces lie in the pyramids that the outermost cubes lack."""
+    """For a solid without cavities, vertices - edges + faces - tetrahedra is 1 (Euler).
+
+    Each inner face has a tetrahedron on both sides. Outer faces lie in the pyramids that the outermost cubes
+    lack.
+    """
     mesh = mesh_of(lattice, lattice.tets)
     faces = (4 * len(mesh.tets) + len(mesh.surface)) // 2
     assert len(mesh.vertices) - len(mesh.edges) + faces - len(mesh.tets) == 1

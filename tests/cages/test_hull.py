@@ -1,4 +1,4 @@
-"""Hulls of surfaces: points on them and triangles between, and how they hang on a cage."""
+"""Hulls of surfaces: their points and triangles, and their attachment to a cage."""
 
 import numpy as np
 import pytest
@@ -72,8 +72,10 @@ def test_walls_within_belong_to_no_hull():
 
 
 def test_points_are_carried_by_weights_of_a_tetrahedron():
-    """They stay where they are, inside the cage and outside. What is too far out is moved on its way to the
-    nearest point of the cage."""
+    """The points stay in place, inside and outside the cage.
+
+    Points that are too far outside move towards the nearest point of the cage.
+    """
     rod = trimesh.creation.cylinder(0.02, 1.0, sections=8).apply_translation((0, 0, 1.2))
     parts = read_surfaces(surfaces.joined(BALL, rod))
     mesh = tetrahedra_of(read_surfaces(BALL), cells=6).mesh

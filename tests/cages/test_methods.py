@@ -1,4 +1,4 @@
-"""Meshers of others: what they make of a surface, and that their crashes are errors and nothing more."""
+"""External meshers: their meshes, and their crashes, which raise an error and do no other harm."""
 
 import inspect
 import logging

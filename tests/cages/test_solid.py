@@ -1,4 +1,4 @@
-"""Which part of space a surface encloses, against closed forms, whatever is wrong with the triangles."""
+"""The region that a surface encloses, compared with closed forms, despite defects of the triangles."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Limbs and sheets too thin for the cells: kept by smaller ones, or left out and said so."""
+"""Limbs and sheets thinner than the cells: smaller cells preserve them, or a warning reports the loss."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""`taichi-soft film`, run as a user runs it."""
+"""`taichi-soft film` as a user runs it."""
 
 import subprocess
 import sys

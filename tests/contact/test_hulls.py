@@ -1,4 +1,4 @@
-"""Bodies that touch colliders and each other by the hull of what is drawn of them."""
+"""Bodies whose contact with colliders and bodies uses the hull of their drawn surface."""
 
 import numpy as np
 import pytest
@@ -70,8 +70,11 @@ def at_rest(world, body, seconds=3.0):
 
 @pytest.mark.parametrize("leg", [0.08, 0.15])
 def test_a_body_with_thin_parts_rests_on_what_is_drawn_of_it(leg):
-    """A cage of five cells is larger than the legs, or they reach out of it. Without a hull the body hovers,
-    or sinks in, by 1.5 % of its size and more."""
+    """With a hull, the drawn surface touches the floor.
+
+    A cage of five cells is larger than the legs, or the legs protrude from it. Without a hull, the body would
+    hover or sink in by at least 1.5 % of its size.
+    """
     gaps = {}
     for hull in (None, 500):
         world = bare_world(floor=0.0, soft_contact=True)

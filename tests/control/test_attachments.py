@@ -1,4 +1,4 @@
-"""Bodies that hang from frames of the engine: where they are held, and what they pull with."""
+"""Bodies attached to frames of the engine: their positions, and the forces on the frames."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Forces that last a step, gravity per body, linear damping, force fields: Newton and closed forms."""
+"""Forces during one step, gravity per body, linear damping, force fields: Newton's laws and closed forms."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A hand on a body: it pulls as its spring says, and nothing it does tears the body."""
+"""Grabs: they pull as their spring prescribes, and never tear the body."""
 
 import numpy as np
 import pytest

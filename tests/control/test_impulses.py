@@ -1,4 +1,4 @@
-"""Impulses, velocities and jumps between steps: momentum as Newton has it, and nothing on refusal."""
+"""Impulses, velocities and teleports between steps: exact momentum, and no change after a refusal."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Materials changed while the world runs, and that nothing a game calls compiles anything any more."""
+"""Material changes at run time, and no compilation during calls of a running game."""
 
 import gc
 import sys

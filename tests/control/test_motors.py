@@ -1,4 +1,4 @@
-"""Motors: torque and force change momenta by just so much, speeds are held, and nothing is torn."""
+"""Motors: torque and force change momenta exactly, speeds are kept, and bodies are not torn."""
 
 import numpy as np
 import pytest

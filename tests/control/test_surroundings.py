@@ -1,4 +1,4 @@
-"""Gravity and friction changed while a world runs: closed forms, who wakes, what a snapshot has of them."""
+"""Changes of gravity and friction at run time: closed forms, woken bodies, and snapshots."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Taichi is started once per process, as asked, or not at all. In processes of their own."""
+"""Taichi starts once per process with the requested options, or not at all. Tests use separate processes."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Who may call: any thread, one at a time in a world; and no process that was forked after the start."""
+"""Calls from any thread, one at a time per world; calls from a process forked after the start are refused."""
 
 import asyncio
 import inspect

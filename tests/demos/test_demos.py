@@ -1,4 +1,4 @@
-"""Every demo for a few frames; each has to come out at one number."""
+"""Every demo runs for a few frames, and each must reproduce one known number."""
 
 import cv2
 import numpy as np
@@ -98,8 +98,11 @@ def test_a_cloth_hangs_from_its_pins_without_tearing_apart():
 
 
 def test_the_load_of_a_pendulum_is_its_weight_and_what_keeps_it_on_its_arc():
-    """On the way down from rest at the angle w, m v^2 / L = 2 m g (cos a - cos w): the rod is pulled with
-    m g (3 cos a - 2 cos w), and over a swing the mean of cos a is 2 E/K - 1 at the parameter sin(w/2)^2."""
+    """Compare the force in the rod of a pendulum with theory.
+
+    After a start from rest at the angle w, m v^2 / L = 2 m g (cos a - cos w) at the angle a. The force in the
+    rod is m g (3 cos a - 2 cos w). The mean of cos a over a swing is 2 E/K - 1 at the parameter sin(w/2)^2.
+    """
     load, stage = run("attach", 6.7)
     widest = np.radians(50.0)
     m = np.sin(widest / 2) ** 2
@@ -121,8 +124,11 @@ def test_all_wheels_are_driven_up_the_steps_and_stand_there():
 
 
 def test_what_is_cut_off_is_what_lay_below_the_blade_and_falls_freely():
-    """Mass by how much of each tetrahedron lies below the plane, to a fifth of a layer of them; the height
-    from the place and speed that the lower part of the bar had at the cut, until it is near the floor."""
+    """Compare the mass and the height of the lower part after the cut with closed forms.
+
+    The mass is that of the tetrahedra below the plane, to a fifth of a layer of tetrahedra. Until the part is
+    near the floor, the height follows from its position and speed at the cut.
+    """
     demo = load_demo("cut")
     stage = demo.stage()
     game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
@@ -186,8 +192,10 @@ def test_all_bodies_come_through_the_course_into_the_hollow():
 
 
 def test_the_floor_carries_the_jelly_and_the_ball_that_squashes_it():
-    """All of their weight, once they lie still; before, the ball presses the stack to less than two thirds of
-    what its own weight leaves of it. The blocks stay on each other, and the ball on them."""
+    """At rest, the floor carries the weight of all bodies, and the ball stays on the stack.
+
+    Before, the ball compresses the stack to less than two thirds of its height under its own weight.
+    """
     load, stage = run("jelly", 5.0)
     assert load == pytest.approx(1.0, abs=0.02)
     demo = load_demo("jelly")
@@ -199,8 +207,11 @@ def test_the_floor_carries_the_jelly_and_the_ball_that_squashes_it():
 
 
 def test_the_ball_brings_the_tower_down_and_every_block_stays_whole():
-    """All but the lowest one, which no blow reaches, and the one that may lie on it; the ball swings as a
-    pendulum of its length does: a quarter of its period after its release it is at its lowest."""
+    """All blocks fall except the lowest, which the ball does not hit, and possibly a block on top of it.
+
+    The ball swings like a pendulum of its length. It is at its lowest point a quarter of the period after its
+    release.
+    """
     demo = load_demo("tower")
     stage = demo.stage()
     game = EngineAdapter(stage.world, stage.step, before_step=stage.act)

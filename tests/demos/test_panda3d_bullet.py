@@ -1,4 +1,4 @@
-"""The game in Panda3D with Bullet, off screen: what its picture shows."""
+"""The game in Panda3D with Bullet, off screen: contents of its image."""
 
 import subprocess
 import sys

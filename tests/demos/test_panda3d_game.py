@@ -1,4 +1,4 @@
-"""The game in Panda3D plays by itself, off screen: what its pictures show."""
+"""The game in Panda3D plays automatically, off screen: contents of its images."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The gallery: an entry for each demo and scene, and films that play in a browser."""
+"""The gallery: an entry for each demo and scene, and films that a browser can play."""
 
 import shutil
 import sys

@@ -1,4 +1,4 @@
-"""The worlds of the gallery, played in a browser: by mouse, touch and keys, to the bits of Python."""
+"""The worlds of the gallery in a browser, played by mouse, touch and keys, agree with Python bit by bit."""
 
 import json
 import re

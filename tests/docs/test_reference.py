@@ -1,4 +1,4 @@
-"""The reference: every parameter is described, defaults are values, and examples run."""
+"""The API reference: every parameter is described, defaults are values, and examples run."""
 
 import dataclasses
 import importlib

@@ -1,4 +1,4 @@
-"""The documentation site as a reader finds it who opens it from a folder."""
+"""The documentation site, opened from a folder."""
 
 import os
 import subprocess

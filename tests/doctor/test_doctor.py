@@ -1,4 +1,4 @@
-"""The doctor: what it counts in triangles, what it says of a body, and what it mends."""
+"""The doctor: defects that it counts, its report about a body, and its repairs."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The adapter against plain stepping of a twin world and interpolation in numpy."""
+"""The adapter, compared with direct stepping of an equal world and interpolation in NumPy."""
 
 import time
 import warnings

@@ -1,4 +1,4 @@
-"""Panda3D, off screen: what is drawn, what drives it, and who pushes whom."""
+"""Panda3D, off screen: drawn bodies, colliders that follow nodes, and impulses on rigid bodies."""
 
 import re
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Solids of Panda3D and Bullet as shapes: their surfaces are where rays of the engine itself meet them."""
+"""Shapes from solids of Panda3D and Bullet: their surfaces agree with rays of the engine."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A step that a game's own function refuses is not made, and leaves the world as it was, to the bit."""
+"""If a game's callback refuses a step, the step is skipped and the world stays unchanged, bit by bit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the adapter gives a renderer: vertices and normals between the last two steps."""
+"""Render data of the adapter: vertices and normals between the last two steps."""
 
 import numpy as np
 import pytest

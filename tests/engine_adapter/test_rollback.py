@@ -1,4 +1,4 @@
-"""Late inputs: steps are undone and repeated. `test_threads.py` checks that the results are the same."""
+"""Late inputs: steps are undone and repeated. `test_threads.py` checks that the results are equal."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a world tells of its steps, against what is read from its bodies and colliders step by step."""
+"""Events of a world, compared with the states of its bodies and colliders after each step."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""The log and its listeners, told of made-up events."""
+"""The event log and its listeners, with made-up events."""
 
 import pytest
 

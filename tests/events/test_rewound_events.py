@@ -1,4 +1,4 @@
-"""What a world tells of its steps where some were undone: the same as where none ever was."""
+"""Events of a world with undone steps are equal to those of a world without undone steps."""
 
 import json
 

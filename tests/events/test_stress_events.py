@@ -1,4 +1,4 @@
-"""Watched stress, against NumPy on the positions after each step."""
+"""Stress events, compared with NumPy on the positions after each step."""
 
 import numpy as np
 import pytest

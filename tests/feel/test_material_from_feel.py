@@ -1,4 +1,4 @@
-"""A body of what was found behaves as wished, in a world and by an eigenproblem that the search never saw."""
+"""A body of the material found has the requested feel, in a world and in a separate eigenproblem."""
 
 import re
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Snapshots of bodies that were cut or torn: here, in a world that never saw the cuts, and over a rewind."""
+"""Snapshots of cut or torn bodies, restored in the same world, in another world, and over a rewind."""
 
 import json
 from dataclasses import replace

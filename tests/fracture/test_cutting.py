@@ -1,4 +1,4 @@
-"""Bodies cut in two, or open: what stays, how the parts move, what is refused."""
+"""Bodies that are cut in two or cut open: the parts, their motion, and refused cuts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bodies that tear by themselves: where, and only where, they are pulled too hard."""
+"""Bodies that tear during the simulation: only where the stress exceeds the limit."""
 
 import numpy as np
 import pytest

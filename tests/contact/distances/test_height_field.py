@@ -1,4 +1,4 @@
-"""Ground over a grid, against distances from all its triangles in NumPy float64."""
+"""Distances from height fields, compared with distances from all their triangles in NumPy float64."""
 
 import numpy as np
 import pytest

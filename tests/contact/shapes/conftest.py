@@ -1,4 +1,4 @@
-"""Grids of these tests are kept in a folder of their own."""
+"""Keep the grids of these tests in a separate folder."""
 
 import pytest
 

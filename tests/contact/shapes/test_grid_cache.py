@@ -1,4 +1,4 @@
-"""Grids kept on disk: found again, never trusted when damaged, never a reason to fail."""
+"""Grids cached on disk: they are reused, damaged files are ignored, and no cache error is fatal."""
 
 import numpy as np
 import pytest

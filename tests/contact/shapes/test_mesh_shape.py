@@ -1,4 +1,4 @@
-"""What becomes a solid, and what is refused with the way out."""
+"""Meshes that become solids, and meshes that are refused with a suggestion."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""Kernels that one process compiled are there for the next, whatever became of others meanwhile."""
+"""Kernels that one process compiles are available to the next, even if other processes crash."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Kernels of an earlier process are found again, compute the same bits, and are never confused."""
+"""Kernels of an earlier process are reused, compute identical bits, and are never confused."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Kernels compute subnormal numbers in every thread, whatever the calling thread does with them."""
+"""Kernels compute with subnormal numbers in every thread, whatever the mode of the calling thread."""
 
 import ctypes
 import platform

@@ -65,8 +65,12 @@ def stress_of(F, strain, lame_lambda, lame_mu):
 
 
 def recovery_energy(rest, corners, modulus):
-    """Of a flipped tetrahedron that finds back [J]: V M/2 |F - R|^2, R the nearest rotation. Where it is
-    flipped by less than 1/16 of its thickness, it falls less: its slope ends at zero in a straight line."""
+    """Return the energy of an inverted tetrahedron under `recover` [J]: V M/2 |F - R|^2, R the nearest
+    rotation.
+
+    If the tetrahedron is inverted by less than 1/16 of its thickness, the slope of the energy decreases
+    linearly to zero.
+    """
     F = deformation(rest, corners)
     axes, stretches, turn = np.linalg.svd(F)
     axes[:, 2] *= np.linalg.det(axes @ turn)

@@ -1,4 +1,4 @@
-"""Tetrahedra of a material with directions: against the equations in NumPy, pulled cubes, and turned ones."""
+"""Anisotropic tetrahedra, compared with the equations in NumPy, for stretched cubes and rotated cubes."""
 
 import force_oracle as oracle
 import numpy as np
@@ -55,8 +55,11 @@ def stress_in(frame, matrix, strain):
 
 
 def mean_wave_modulus(matrix):
-    """Mean of n n : C : n n over all directions n [Pa], by a quadrature that is exact for its fourth powers:
-    Lebedev's 14 points, along the axes and the diagonals of a cube."""
+    """Return the mean of n n : C : n n over all directions n [Pa].
+
+    The quadrature is exact for fourth powers: Lebedev's 14 points, along the axes and the diagonals of a
+    cube.
+    """
     axes, diagonals = np.eye(3), np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]]) / np.sqrt(3)
     along = lambda n: n @ stress_in(I3, matrix, np.outer(n, n)) @ n  # noqa: E731
     return sum(map(along, axes)) * 2 / 15 + sum(map(along, diagonals)) * 3 / 20

@@ -1,4 +1,4 @@
-"""The pairwise laws of thesis chapters 3 to 5: their forces against NumPy, and what they promise."""
+"""The pairwise laws of thesis chapters 3 to 5: forces compared with NumPy, and documented properties."""
 
 import bond_oracle as oracle
 import numpy as np
@@ -66,9 +66,11 @@ def test_a_body_at_rest_or_moved_as_a_whole_feels_nothing(law, seed):
 
 @pytest.mark.parametrize("law", BONDS)
 def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
-    """Springs push along the line between two particles. CMPM and its variants push across it too, which
-    turns the pair: a sheared body feels a torque, here up to a fiftieth of the largest force times an edge.
-    A split ring is uneven even in this even body, because it begins at one of its particles: up to a tenth.
+    """Springs act along the line between two particles, so they exert no torque.
+
+    CMPM and its variants also act perpendicular to this line, so a sheared body feels a torque. The limit for
+    this torque is 1/50 of the largest force times an edge. For a split ring it is 1/10, because the ring
+    begins at one of its particles and is therefore uneven even in this regular body.
     """
     mesh = MESHES["ball"]
     rng = np.random.default_rng(3)

@@ -1,4 +1,4 @@
-"""Damping inside a body: what it brakes, and what it must leave alone."""
+"""Damping inside a body: motions that it brakes, and motions that it must not affect."""
 
 import force_oracle as oracle
 import numpy as np

@@ -1,4 +1,4 @@
-"""Anisotropy that nobody asked for (thesis section 4.3): the same pull on the same body in 24 directions."""
+"""Unintended anisotropy (thesis section 4.3): the same stretch of the same body in 24 directions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Laws with an energy: forces are its derivative, and moving in a circle costs nothing."""
+"""Laws with an energy: forces are its derivative, and a closed path does no work."""
 
 import force_oracle as oracle
 import numpy as np

@@ -1,4 +1,4 @@
-"""How forces change: exact gradients against differences of the forces, and what conjugate gradients see."""
+"""Gradients of forces, compared with differences of the forces, and as conjugate gradients use them."""
 
 from itertools import permutations
 
@@ -229,8 +229,12 @@ def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flip
 @pytest.mark.parametrize("pose", ["pressed to half", "shaken", "inside out"])
 @pytest.mark.parametrize("law", PAIRWISE)
 def test_the_projected_system_of_springs_is_that_of_each_and_the_positive_part_of_each_volume(law, pose):
-    """A pressed spring releases nothing by turning. A volume pulls its corners with w for each part by which
-    it has grown, g as they move: of w g^T counts the symmetric part, of that the positive one, by NumPy."""
+    """Compare the positive part of the gradient with NumPy.
+
+    A compressed spring contributes nothing by rotation. A volume pulls its corners with w per relative
+    growth, and g is the growth per displacement. The gradient uses the positive part of the symmetric part of
+    w g^T.
+    """
     rng = np.random.default_rng(6)
     count = len(BALL.tets)
     E, nu = rng.uniform(1e5, 1e6, count), rng.uniform(0.1, 0.4, count)

@@ -1,4 +1,4 @@
-"""Angles between edges and the normals that CMPM and its variants take for them (thesis fig. 4.7)."""
+"""Angles between edges and the normals that CMPM and its variants use (thesis fig. 4.7)."""
 
 import bond_oracle as oracle
 import numpy as np

@@ -1,4 +1,4 @@
-"""Nothing pulls on a body that is only moved or turned, and forces turn with the body."""
+"""A rigid motion causes no forces in a body, and forces rotate with the body."""
 
 import force_oracle as oracle
 import numpy as np

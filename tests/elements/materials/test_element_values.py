@@ -1,4 +1,4 @@
-"""Material constants: what they mean to each other, which are refused, and what a user is told."""
+"""Material constants: relations between them, refused values, and messages for the user."""
 
 import numpy as np
 import pytest
