@@ -51,8 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the displacement and the amplitude of the mode after each step, divided by the initial
-    values."""
+    """Measure displacement and amplitude of the mode after each step, relative to their initial values."""
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2

@@ -38,7 +38,7 @@ def test_the_pose_of_a_body_that_only_moved_is_its_motion(name, turn):
     "stretch", [(1.3, 0.8, 1.1), (1, 1, 0), (-1.2, 0.9, 0.5), (-1, -1, -1), (1, -0.1, 1)]
 )
 def test_no_rotation_fits_better_than_the_pose(stretch):
-    """Also of flat bodies and of bodies inside out. SciPy weighs by mass too."""
+    """The bodies include flat and inverted ones. SciPy weights vertices by mass, too."""
     rest = np.add(BALL, [0.3, 0, 0.1])
     positions = (rest * stretch) @ TURNS[2].T + RANDOM.normal(0, 0.02, rest.shape)
     masses = RANDOM.uniform(0.5, 2, len(rest))

@@ -14,7 +14,7 @@ SLAB = box((1, 1, 0.1), (2, 2, 1))
 
 
 def said_of(mesh, material, **options):
-    """What a world with such a body warns of when it is built."""
+    """Return the warnings of `build` for a world with such a body."""
     world = bare_world(**options)
     world.add_body(mesh, material, position=(0, 0, 5))
     with warnings.catch_warnings(record=True) as caught:

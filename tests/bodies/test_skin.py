@@ -102,7 +102,7 @@ def bent(places):
 
 
 def test_a_bent_bar_has_no_creases_at_the_faces_of_its_tetrahedra(zoo):
-    """What is linear in each tetrahedron misses the arc by more than ten times as much."""
+    """Linear interpolation in each tetrahedron would be more than ten times as far from the arc."""
     body = zoo.bar
     cage, (skin,) = body.asset.mesh, body.asset.skins
     put(body, bent(cage.vertices))

@@ -53,7 +53,7 @@ def test_a_world_moves_the_same_in_the_fields_of_a_larger_one(monkeypatch):
 
 
 def test_fields_for_what_a_world_does_not_do_are_not_taken(monkeypatch):
-    """Nor such as are too short in any respect."""
+    """A world does not reuse fields that are too short in any dimension."""
     least = {"particles": 8, "edges": 8, "blocks": 8, "bodies": 8, "triangles": 8, "outer": 8}
     plain = Capacity(**least, parallel=False)
     for other in (

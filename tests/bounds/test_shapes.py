@@ -59,7 +59,7 @@ def test_the_grid_of_a_mesh(name):
     ("make", "fit"), [(sliver_at_a_junction, 40), (random_tetrahedra, 6), (random_blocks, 40)]
 )
 def test_grids_of_surfaces_with_slivers(make, fit):
-    """Also of thousands of times the size or none, with vertices on nodes; too thin ones may be refused."""
+    """Sizes vary by a factor of thousands, and vertices lie on nodes. Too thin surfaces may be refused."""
     init()
     taken = 0
     for seed in range(10):

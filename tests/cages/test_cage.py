@@ -64,7 +64,7 @@ def test_every_tetrahedron_is_well_shaped(made):
 
 
 def test_mass_centre_and_inertia_are_those_of_the_solid_to_one_per_cent(made):
-    """Of the solid by the divergence theorem over its surface, as trimesh has it."""
+    """The reference is the divergence theorem over the surface of the solid, computed by trimesh."""
     mesh, found = made
     weights, places = found.mesh.vertex_volumes, found.mesh.vertices
     center = weights @ places / weights.sum()

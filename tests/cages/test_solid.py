@@ -85,7 +85,7 @@ def test_the_volume_is_the_same_far_from_the_origin():
 
 
 def test_second_moments_are_those_of_the_solid():
-    """Of a ball of radius r and volume V about any axis through its middle: V r^2 / 5."""
+    """A ball of radius r and volume V has the second moment V r^2 / 5 about any axis through its centre."""
     points, volumes = solid(ball(subdivisions=5)).quadrature()
     second = np.einsum("k,ki,kj->ij", volumes, points, points)
     np.testing.assert_allclose(second, np.eye(3) * BALL.volume / 5, atol=0.012)

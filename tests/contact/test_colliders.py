@@ -542,7 +542,7 @@ REFUSED = {
 
 
 def test_grounds_come_and_go_while_the_world_runs():
-    """What lies on one stays there, whatever comes and goes beside it, as long as `sample_room` lasts."""
+    """Bodies on a ground stay in place while other grounds come and go, as long as `sample_room` lasts."""
     world = room(collider_room=5, sample_room=4 * 64 * 128)
     bodies = [world.add_body(BLOCK, FIRM, position=(x, 0, 0.27)) for x in (0.0, 20.0)]
     world.build()

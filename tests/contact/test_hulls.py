@@ -122,7 +122,10 @@ def cube_of(edge=0.6):
 
 @pytest.mark.parametrize("hull", [True, None])
 def test_no_vertex_of_a_body_at_rest_is_faster_than_gravity_makes_it_within_a_substep(hull):
-    """What bears it takes that away again. With a hull too, of which many points share vertices."""
+    """The support removes the speed that gravity adds in a step.
+
+    The test includes a hull whose points share vertices.
+    """
     asset = asset_of(cube_of(), hull)
     world = bare_world(floor=0.0, soft_contact=True)
     body = world.add_body(asset, position=(0, 0, 0.303))
@@ -243,7 +246,7 @@ FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
 
 
 def weights_of(point):
-    """Of the first tetrahedron's vertices, by its edges, which are the axes."""
+    """Return the weights of the first tetrahedron's vertices. Its edges are along the axes."""
     return np.array([1 - point.sum(), *point])
 
 

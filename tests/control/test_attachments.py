@@ -34,7 +34,10 @@ def made():
 
 
 def kept_momentum(world, body):
-    """Of the velocities as the integrator keeps them: leapfrog's are half a substep old."""
+    """Return the momentum of the velocities that the integrator stores.
+
+    For leapfrog, they are half a substep old.
+    """
     rows = np.empty((27, 3), dtype=np.float32)
     read_velocities(world._built.state, 0, 27, rows)
     return body.masses @ rows.astype(float)
@@ -258,7 +261,10 @@ def test_a_jump_that_cannot_be_is_refused_and_changes_nothing(plain):
 
 
 def test_a_removed_frame_lets_go_and_makes_room(plain):
-    """What hung from it falls as if it had been released; others hang on; the next frame takes its row."""
+    """Bodies of the removed frame fall, and bodies of other frames stay attached.
+
+    A new frame reuses the row.
+    """
     world, body = plain
     kept, frame = world.add_frame((0, 0, 1)), world.add_frame((0, 0, 2))
     held, left = body.attach([26], kept), body.attach(SIDE, frame)

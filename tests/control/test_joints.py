@@ -329,7 +329,7 @@ def test_a_thousand_times_the_mass_blows_nothing_up(joined, heavy, light, stiff)
 
 
 def test_what_is_put_elsewhere_is_drawn_together_gently(joined):
-    """By one particle of a body of 210 kg, without wind or weight to help."""
+    """One particle of a body of 210 kg is joined, without weight or wind."""
     world, big, small, *_ = joined
     big.set_material(JELLY)
     small.set_material(JELLY)

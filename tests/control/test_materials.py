@@ -81,7 +81,7 @@ def run(world, bodies):
 
 @pytest.fixture(scope="module")
 def told():
-    """What bodies built with the second material do, and those that were given it before they move."""
+    """Compare bodies built with the second material and bodies whose material changes before they move."""
     built = run(*build(3))
     world, bodies = build(2)
     for name, body in bodies.items():

@@ -150,7 +150,7 @@ def touching(spare_vertices=0, cells=(), **options):
 
 
 def frictions_of(world):
-    """Of each slot: what its body says, what contact reads."""
+    """Return the friction of each slot: the body's property, and the value that contact reads."""
     rows = world._built.state.body_surface.to_numpy()[: world.slot_count, 0]
     return {body.index: (body.friction, pytest.approx(float(rows[body.index]))) for body in world.bodies}
 

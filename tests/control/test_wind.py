@@ -10,7 +10,7 @@ AIR = 1.2
 
 
 def drag_speed(start, k, t):
-    """Of what is braked by k v |v|: v' = -k v^2."""
+    """Return the speed of a body with the drag k v |v|: v' = -k v^2."""
     return start / (1 + k * start * t)
 
 
@@ -49,7 +49,10 @@ def test_a_box_takes_on_the_speed_of_the_wind_as_drag_says(windy):
 
 
 def test_a_ball_has_half_the_drag_of_a_plate(windy):
-    """By the integral of cos^2 over its projected area; its flat triangles reflect a little less."""
+    """The factor is the mean of cos^2 over the projected area.
+
+    The flat triangles of the ball reflect slightly less.
+    """
     world, _, ball = windy
     world.set_wind((0, 5.0, 0))
     world.step(1 / 600)

@@ -49,7 +49,10 @@ def test_the_heavy_side_of_the_density_block_is_pressed_most():
 
 
 def test_the_heavy_side_of_the_density_block_bounces_last_and_least():
-    """As the thesis says of fig. 6.3. Each side by its lowest vertices, through the first bounce."""
+    """The thesis states this about fig.
+
+    6.3. Each side is measured by its lowest vertices, during the first bounce.
+    """
     stage = load_demo("density").stage()
     body = stage.actors[0].body
     x, z = body.mesh.vertices[:, 0], body.mesh.vertices[:, 2]

@@ -112,7 +112,7 @@ def drag(page, is_touch):
 
 
 def replayed(file):
-    """What the command prints of a file."""
+    """Return the output of the command that replays a file."""
     picture = file.with_suffix(".png")
     command = [sys.executable, "-m", "taichi_soft", "replay", str(file), "--out", str(picture)]
     done = subprocess.run(command, capture_output=True, text=True)

@@ -1,7 +1,8 @@
-"""A budget of milliseconds: what is far gets coarser and skips steps where they take too long, and finer when
-there is time.
+"""A budget in milliseconds: distant bodies become coarser or skip steps if steps take too long.
 
-The clock is ours: a step takes as long as the tetrahedra that move in it say.
+They become finer if there is time.
+
+The tests have their own clock. The duration of a step is proportional to the number of moving tetrahedra.
 """
 
 import warnings
@@ -34,8 +35,10 @@ def size(level):
 
 
 class Clock:
-    """Advances by the cost of a step with each pair of looks: `per_tet` for each tetrahedron, some of them
-    interrupted by others."""
+    """Clock that advances by the cost of a step between its two calls in each step.
+
+    The cost is `per_tet` for each tetrahedron that moves. Some steps take longer at random.
+    """
 
     def __init__(self):
         self.world, self.per_tet, self.now, self.is_second = None, 1e-6, 0.0, False

@@ -75,8 +75,10 @@ def world():
 
 @pytest.fixture
 def play(base, world):
-    """The world at rest, as it was, without other colliders than the floor; the scene empty but for a camera
-    that looks at the origin."""
+    """Return the world at rest, without colliders except the floor.
+
+    The scene contains only a camera that looks at the origin.
+    """
     if not hasattr(world, "at_rest"):
         world.at_rest = world.snapshot()
     world.restore(world.at_rest)
@@ -93,7 +95,7 @@ def play(base, world):
 
 
 def picture(base):
-    """What the camera sees, uint8 (height, width, 3), from the top down."""
+    """Return the camera's image, uint8 (height, width, 3), first row at the top."""
     base.graphicsEngine.render_frame()
     shot = base.win.get_screenshot()
     rows = np.frombuffer(bytes(shot.get_ram_image_as("RGB")), np.uint8)
@@ -243,7 +245,10 @@ def test_the_texture_lies_where_trimesh_has_it(base, play):
 
 
 def test_a_mesh_with_colours_of_its_own_is_drawn_in_them(base):
-    """Of its vertices, or of its material; a colour of the node with a priority stands above."""
+    """The colours are those of its vertices or of its material.
+
+    A colour of the node with a priority overrides them.
+    """
     jelly = Material(young=6e4, poisson=0.3, density=1000)
     one, other = trimesh.creation.box((0.6, 0.6, 0.6)), trimesh.creation.box((0.6, 0.6, 0.6))
     one.visual.vertex_colors = (250, 100, 0, 255)
@@ -345,7 +350,7 @@ def test_debug_lines_follow_bodies_and_colliders_and_cost_nothing_while_hidden(b
 
 
 def test_a_platform_of_the_scene_carries_a_body_along(base, play):
-    """As far as it goes; where it is not followed, the body stays where it is."""
+    """The body moves as far as the platform. Without the coupling, the body stays in place."""
     for follows in (True, False):
         play.restore(play.at_rest)
         platform = base.render.attach_new_node(core.CollisionNode("platform"))
@@ -447,7 +452,10 @@ def test_weight_times_time_is_what_crate_and_block_and_floor_exchange(base, play
 
 
 def test_a_rigid_body_gets_half_of_an_impulse_in_advance_and_gives_it_back_a_step_later(base, play):
-    """As docs/coupling.md says; in sum it gets what the soft body gave."""
+    """docs/coupling.md describes this scheme.
+
+    In total, the rigid body receives the impulse that the soft body exerts.
+    """
     rigid = bullet_world()
     crate = make_crate(base, rigid, (0.02, 0, 0.5 + EDGE / 2 + 0.05))
     coupling = BulletCoupling(play, rigid)

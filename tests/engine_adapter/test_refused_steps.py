@@ -26,7 +26,7 @@ COUNT = 4
 
 
 class RefusedError(Exception):
-    """What a game's function raises."""
+    """Error that the game's callback raises."""
 
 
 def refuse(*_):
@@ -71,7 +71,7 @@ def game(request):
 
 
 def adapters(world):
-    """By name: an adapter, and one that has to give up detail in every step."""
+    """Return adapters by name: a plain adapter, and one whose budget reduces detail in every step."""
     plain = EngineAdapter(world, STEP, rewind_ticks=3)
     hasty = EngineAdapter(world, STEP, rewind_ticks=3, budget_ms=1e-6)
     return {"plain": plain, "budget": hasty}

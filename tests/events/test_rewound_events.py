@@ -45,7 +45,7 @@ class Game:
         self.start = world.snapshot()
 
     def act(self, world):
-        """What is to be done before a step, or what was done in its place before the right inputs came."""
+        """Perform the inputs of a step: the right inputs, or the wrong inputs that are later replaced."""
         tick = world.step_count
         if self.is_wrong:
             if tick % 3 == 0:

@@ -71,8 +71,11 @@ def standing_sag(mesh, feel):
 
 
 def ringing(mesh, feel):
-    """Frequency by passages through zero of the amplitude of scipy's slowest mode, and settling time by its
-    logarithmic decrement: (wobble_hz, settle_s)."""
+    """Return frequency and settling time of the slowest mode from SciPy: (wobble_hz, settle_s).
+
+    The frequency follows from zero crossings of the amplitude, the settling time from its logarithmic
+    decrement.
+    """
     material = feel.material
     mass = lumped_masses(mesh, material.density)
     omega, mode = first_mode(assembled_stiffness(mesh, material.young, material.poisson), mass)

@@ -93,7 +93,7 @@ def cut_twice(world):
 
 
 def meshes(world):
-    """What a renderer and a game read of all bodies."""
+    """Return the data that a renderer and a game read from all bodies."""
     return [
         tuple(
             rows.tobytes()

@@ -294,7 +294,7 @@ def everything(world, *bodies):
 
 
 def test_what_does_not_fit_is_refused_and_changes_nothing():
-    """Nor does the body go on in another way, bit for bit, than one that nobody tried to cut."""
+    """After a refused cut, the body moves exactly like a body without a cut, bit by bit."""
     world, body = make(count=1, asset=bar(spare_vertices=4))
     middle = body.center_of_mass()
     start = body.positions(), body.velocities()

@@ -245,7 +245,7 @@ def test_each_tear_is_told_of_in_its_step(world, kind):
 
 
 def test_of_a_tear_that_is_undone_nothing_is_left(world):
-    """Nor of stress that was over a limit in tetrahedra of what is whole again."""
+    """Stress above the limit, in tetrahedra that are intact again, is also undone."""
     body = pulled(world, 1.2)
     world.record_events([Torn])
     body.watch_stress(0.5 * STRENGTH)

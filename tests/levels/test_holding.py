@@ -1,4 +1,4 @@
-"""Bodies whose level changes while something holds them: a hand goes on, what has no place is let go."""
+"""Changes of level while a body is held: grabs continue, and constraints without a vertex are released."""
 
 from functools import cache
 

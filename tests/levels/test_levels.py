@@ -1,4 +1,4 @@
-"""Levels of detail: cages of several sizes that are the same body, and bodies that change over in motion."""
+"""Levels of detail: cages of several sizes for one body, and changes of level during motion."""
 
 from functools import cache
 
@@ -211,7 +211,7 @@ def test_what_was_pinned_at_a_coarse_level_is_held_at_the_finest(flying):
 
 
 def test_a_push_keeps_its_force_and_its_torque():
-    """What it does in the next step is what it would have done: momentum and spin, without gravity."""
+    """A change of level preserves the momentum and spin that a force causes in the next step."""
     world = bare_world(gravity=(0, 0, 0), floor=None)
     world.reserve(ring(), 1)
     body = world.spawn(ring(), position=(0.3, 0.2, 1.0))
@@ -474,8 +474,10 @@ def test_levels_that_are_none_are_refused(monkeypatch):
 
 
 def test_what_spawns_after_a_rewind_does_not_take_over_the_level_of_who_was_there_before():
-    """Vibrations of the finest level fade at its own rate, whatever was in the slot when the snapshot was
-    taken and when it is restored."""
+    """Vibrations of the finest level decay at the rate of this level.
+
+    The levels of the slot's earlier bodies, at the snapshot and at its restoration, do not matter.
+    """
     damped = SoftBodyAsset(BAR[0], Material(8e4, 0.4, 900.0, damping_ratio=0.3)).with_coarser(BAR[1])
     world = bare_world(floor=None)
     world.reserve(damped, 1)

@@ -1,4 +1,4 @@
-"""A live world served by the command line, as a visitor finds it."""
+"""A live world that the command line serves, as visitors find it."""
 
 import re
 import subprocess
@@ -26,7 +26,7 @@ class Served:
         self.address = found.group()
 
     def end(self):
-        """As Ctrl-C does. Returns: the exit code."""
+        """Stop the command like Ctrl-C. Returns: the exit code."""
         self.process.terminate()
         code = self.process.wait(30)
         self.process.stdout.close()

@@ -1,4 +1,4 @@
-"""Shading on the page: what is round looks round, and edges of boxes stay sharp."""
+"""Shading on the page: round surfaces look round, and edges of boxes stay sharp."""
 
 import numpy as np
 import pytest

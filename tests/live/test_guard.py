@@ -1,4 +1,4 @@
-"""Who may open a live world: this machine, or who has the token; no page of another origin."""
+"""Access to a live world: from this machine or with the token, and never from a page of another origin."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Requests that wait: merged for each visitor, who take turns and have a share of the time each."""
+"""Waiting requests: merged for each visitor. Visitors alternate, and each gets a part of the time."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Scenes as scripts: another law and room for more, without a change of the scene."""
+"""Scenes as scripts: another law and larger capacities, without a change of the scene."""
 
 import io
 import math

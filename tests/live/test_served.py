@@ -1,4 +1,4 @@
-"""A live world by its own protocol: what visitors do to it, and what they cannot do."""
+"""A live world through its protocol: what visitors can do, and what they cannot do."""
 
 import contextlib
 import http.client
@@ -48,7 +48,7 @@ def script_of(visitor, folder):
 
 
 def run_script(folder, *arguments):
-    """What it prints."""
+    """Run a script, and return its output."""
     done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -1,4 +1,4 @@
-"""What the server does between worlds that come and go, whose runners are the test's own."""
+"""The server while worlds come and go, with runners that belong to the test."""
 
 import asyncio
 import multiprocessing

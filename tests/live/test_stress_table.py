@@ -1,4 +1,4 @@
-"""Stress of a world as a notebook shows it."""
+"""Display of a world's stress in a notebook."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""A world that a script steps, seen and touched from a browser."""
+"""A world that a script steps and a browser shows and moves."""
 
 import subprocess
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""A visitor without a browser: what a page says and is sent, read by the test's own code."""
+"""A visitor without a browser: messages of a page, sent and decoded by separate code."""
 
 import json
 import struct
@@ -33,7 +33,7 @@ def decoded_picture(packet):
 
 
 def decoded_drawn(packet):
-    """What is drawn: its pane, header and arrays."""
+    """Decode a drawn frame. Returns: its pane, header and arrays."""
     kind, pane, _, length = struct.unpack_from("<BBHI", packet)
     assert kind == 1
     header, at, arrays = json.loads(packet[8 : 8 + length]), 8 + length, {}

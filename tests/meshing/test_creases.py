@@ -1,4 +1,4 @@
-"""Vertices split at sharp edges: how many copies there are of each, and which triangles share them."""
+"""Vertices split at sharp edges: the number of copies of each vertex, and the triangles of each copy."""
 
 import numpy as np
 import pytest

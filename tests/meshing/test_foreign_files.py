@@ -1,4 +1,4 @@
-"""Files as other programs write them: sound ones are read, others refused with the reason and the way out."""
+"""Files from other programs: valid files are read, others are refused with a reason and a suggestion."""
 
 import contextlib
 import importlib

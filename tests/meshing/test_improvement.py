@@ -1,4 +1,4 @@
-"""Improved meshes: the same body, without the few tetrahedra that ask for tiny steps."""
+"""Improved meshes: the same body, without the few tetrahedra that require short steps."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def pair(request):
 
 
 def gradients(mesh):
-    """Of the shape functions, (m, 4, 3) [1/m]."""
+    """Return the gradients of the shape functions, (m, 4, 3) [1/m]."""
     ones = np.ones((len(mesh.tets), 4, 1))
     return np.swapaxes(np.linalg.inv(np.concatenate([ones, mesh.vertices[mesh.tets]], axis=2))[:, 1:], 1, 2)
 
@@ -63,7 +63,10 @@ def signed_volumes(mesh):
 
 
 def highest_frequency2(mesh, poisson=0.3):
-    """Of linear elasticity with lumped masses, by a dense eigenvalue problem, per E / density."""
+    """Return the square of the highest angular frequency per E / density.
+
+    The model is linear elasticity with lumped masses. The eigenvalue problem is dense.
+    """
     lam, mu = poisson / (1 + poisson) / (1 - 2 * poisson), 0.5 / (1 + poisson)
     g, volume, n = gradients(mesh), signed_volumes(mesh), len(mesh.vertices)
     stiffness, mass = np.zeros((n, 3, n, 3)), np.zeros(n)
@@ -106,7 +109,7 @@ def surface_distance(first, second):
 
 
 def euler_characteristics(mesh):
-    """Of the body and of its surface."""
+    """Return the Euler characteristics of the body and of its surface."""
     faces = {
         frozenset(face) for tet in mesh.tets.tolist() for face in (tet[1:], tet[:3], tet[::3] + tet[2:3])
     }

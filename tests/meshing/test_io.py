@@ -1,4 +1,4 @@
-"""Files: what goes out comes back, foreign files come in, bad ones are refused in one line."""
+"""Mesh files: written files are read back, files of other programs are read, invalid files are refused."""
 
 import os
 import sys

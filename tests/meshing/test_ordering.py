@@ -1,4 +1,4 @@
-"""Memory orders: permutations, the Morton curve itself, and that neighbours do come closer."""
+"""Memory orders: permutations, the Morton curve, and smaller distances of neighbours in memory."""
 
 import numpy as np
 import pytest

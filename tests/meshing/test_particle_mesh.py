@@ -1,4 +1,4 @@
-"""ParticleMesh: edges and masses kept as given, bad input refused."""
+"""ParticleMesh: edges and masses stay as given, and invalid input is refused."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""Built-in shapes: volumes by formula, topology by Euler's, angles as the docstrings state them."""
+"""Built-in shapes: volumes by formulas, topology by Euler's formula, angles as in the docstrings."""
 
 import itertools
 

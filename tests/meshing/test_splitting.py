@@ -1,4 +1,4 @@
-"""Meshes taken apart along faces: what hangs together still does, and nothing else."""
+"""Meshes split along faces: all other connections remain."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The readers of .ply, .stl and .off beside writers of the test's own, and files that are odd or damaged."""
+"""Readers of .ply, .stl and .off, compared with separate writers, and with odd or damaged files."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""TetMesh: what it works out, checked against slower or analytic ways, and everything it refuses."""
+"""TetMesh: computed properties, compared with slower or analytic methods, and refused input."""
 
 import copy
 import itertools

@@ -1,4 +1,4 @@
-"""Polygons cut into triangles, whose areas say that they cover the polygon once and nothing else."""
+"""Triangulated polygons: the sum of areas shows that triangles cover the polygon exactly once."""
 
 import numpy as np
 import pytest

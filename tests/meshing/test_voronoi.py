@@ -1,4 +1,4 @@
-"""Voronoi graphs: cells share out the volume, faces are where geometry says, and bad meshes are refused."""
+"""Voronoi graphs: cells divide the volume, faces have the correct position, and bad meshes are refused."""
 
 import numpy as np
 import pytest

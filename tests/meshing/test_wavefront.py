@@ -1,4 +1,4 @@
-"""The .obj reader beside a reader of the test's own, which takes each corner of each face by itself."""
+"""The .obj reader, compared with a separate reader that treats each corner of each face by itself."""
 
 import re
 
@@ -70,7 +70,7 @@ def faces_of(text):
 
 
 def polygon_area(points):
-    """Of a polygon in a plane: half the sum of the cross products along its edges."""
+    """Return the area of a plane polygon: half the sum of the cross products along its edges."""
     points = np.asarray(points)
     return 0.5 * np.linalg.norm(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0))
 

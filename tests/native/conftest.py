@@ -1,4 +1,4 @@
-"""The native library, and what Godot takes of it, built once for all tests."""
+"""The native library and its build for Godot, built once for all tests."""
 
 import json
 import os
@@ -90,7 +90,7 @@ def interfaces(godot4):
 
 @pytest.fixture(scope="module")
 def api(interfaces):
-    """What Godot tells extensions of itself, by version."""
+    """Return Godot's description of its interface for extensions, by version."""
     return {
         version: json.loads((folder / "extension_api.json").read_text(encoding="utf-8"))
         for version, folder in interfaces.items()

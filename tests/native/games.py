@@ -45,7 +45,7 @@ def line(call, *arguments):
 
 
 def lines_of(command, game, **options):
-    """What a player without Python prints: `command` is the program and the folder of the world."""
+    """Return the output of a player without Python. `command` is the program and the folder of the world."""
     done = subprocess.run(
         [str(each) for each in command], input="\n".join(game), capture_output=True, text=True, **options
     )

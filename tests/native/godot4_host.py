@@ -1,4 +1,4 @@
-"""A stand-in for Godot 4 that has loaded the library; what is said to it, and what it answers."""
+"""A stand-in for Godot 4 that loads the library, calls it and answers its calls."""
 
 import subprocess
 

@@ -31,7 +31,7 @@ from test_kept_bits import bits_of
 
 @dataclass(frozen=True)
 class Runner:
-    """What plays games on a platform here."""
+    """A program that plays games on a platform here."""
 
     platform: str  # for which worlds are exported
     make: Callable[[Path], list[Path | str]]  # makes the program in a folder; returns how it is called

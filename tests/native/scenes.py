@@ -1,4 +1,4 @@
-"""Worlds that are exported, each with a game that does in it what it is for: `GAMES` by name."""
+"""Worlds to export, each with a game that uses its features: `GAMES` by name."""
 
 import numpy as np
 from games import line
@@ -633,7 +633,7 @@ def solved_levels_game():
 
 
 def thesis_sphere():
-    """What docs/native.md measures a step of."""
+    """The world whose step docs/native.md measures."""
     world = bare_world(floor=0.0)
     material = Material(young=2e5, poisson=0.3, density=1000, damping=200.0)
     world.add_body(load_mesh(ASSETS / "sphere.npz"), material, position=(0.0, 0.0, 3.0))

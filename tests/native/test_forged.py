@@ -1,4 +1,4 @@
-"""Snapshots and world files whose checksums are right and whose numbers are not: refused, or harmless."""
+"""Snapshots and world files with correct checksums and wrong numbers: they are refused, or harmless."""
 
 import shutil
 import struct

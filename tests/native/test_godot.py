@@ -1,4 +1,4 @@
-"""Godot 3 plays the demo without a window: what moves, what is drawn, bits as in C, errors."""
+"""Godot 3 plays the demo without a window: motion, drawn meshes, agreement with C bit by bit, and errors."""
 
 import re
 import shutil
@@ -61,7 +61,7 @@ def scene(run):
 
 @pytest.fixture(scope="module")
 def rows(scene):
-    """What happened in each frame of the scene."""
+    """Return the measurements in each frame of the scene."""
     _, *found = scene["scene"]["rows"]
     return {name: np.array([row[name] for row in found]) for name in found[0]}
 
@@ -89,7 +89,7 @@ def test_the_block_bears_the_weight_of_the_crate(rows):
 
 
 def test_a_capsule_lies_along_z_as_in_godot(rows):
-    """What falls beside its middle, but over its end, hits it."""
+    """A body that falls next to the capsule's middle, but above its end, hits it."""
     assert rows["capsule"].max() > 1.0
 
 

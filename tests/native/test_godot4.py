@@ -62,7 +62,7 @@ def test_it_compiles_against_the_header_of_every_version(interfaces, version):
 
 
 def test_sizes_hashes_and_constructors_are_those_of_every_version(api):
-    """As src/godot4/variant.cpp has them."""
+    """The values are those in src/godot4/variant.cpp."""
     sizes = {"Variant": 24, "Vector3": 12, "Transform3D": 48, "int": 8, "float": 8, "bool": 1}
     sizes |= {"String": 8, "StringName": 8, "Array": 8}
     arrays = ("PackedByteArray", "PackedInt32Array", "PackedVector2Array", "PackedVector3Array")

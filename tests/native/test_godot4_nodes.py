@@ -147,7 +147,7 @@ def test_the_scene_has_classes_and_properties_that_are_there(api, version):
 
 
 def test_files_name_each_other(godot4):
-    """What scenes and scripts load is there, after the steps of docs/godot4.md."""
+    """Every file that a scene or script loads exists after the steps of docs/godot4.md."""
     there = {*PROJECT, "elephant.glb", "demo.softworld"}
     extension = "addons/taichi_soft/taichi_soft.gdextension"
     for path in PROJECT.keys() - {extension}:

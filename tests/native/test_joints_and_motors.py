@@ -1,4 +1,4 @@
-"""Joints, motors, gravity and friction in C: what is refused, and what a game finds of its script."""
+"""Joints, motors, gravity and friction in C: refused calls, and objects of the original script."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Levels of detail in C: what bars a change, what passes on, and what a world file may not say."""
+"""Levels of detail in C: obstacles to a change, preserved state, and invalid world files."""
 
 import shutil
 

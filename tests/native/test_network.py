@@ -1,4 +1,4 @@
-"""Rollback sessions between Python and WebAssembly: they agree to the bit, and notice when they do not."""
+"""Rollback sessions between Python and WebAssembly agree bit by bit, and detect differences."""
 
 import json
 import re

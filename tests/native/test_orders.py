@@ -1,4 +1,4 @@
-"""Games that do things in an order in which nobody would: the native library and Python still agree."""
+"""Games with unusual orders of calls: the native library and Python still agree."""
 
 import pytest
 from games import Player, line, lines_of

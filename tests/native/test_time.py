@@ -1,4 +1,4 @@
-"""How the native library cuts time into steps, and what it draws between two: as `engine_adapter` does."""
+"""Time in the native library: division into steps, and interpolation, as in `engine_adapter`."""
 
 import json
 

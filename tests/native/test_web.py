@@ -1,4 +1,4 @@
-"""Worlds in WebAssembly, by the package for JavaScript. `test_platforms.py` plays games in them."""
+"""Worlds in WebAssembly through the package for JavaScript. `test_platforms.py` plays games in them."""
 
 import json
 import re

@@ -39,8 +39,11 @@ def game(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory):
-    """A body breaks in step 12, and another later: what the world wrote by itself, its failure, and
-    whether the second was written over the first."""
+    """Let a body fail in step 12, and another later.
+
+    Return the path of the recording, the failure, the hash, and True if the second failure left the recording
+    unchanged.
+    """
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
     # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
     world = bare_world(record=5, record_to=path, retries=0)

@@ -37,8 +37,10 @@ def middle():
 
 @pytest.fixture(scope="module")
 def twin():
-    """What was seen of a world that is gone: its hash then; later a snapshot, readings, and the hashes of
-    what came after."""
+    """Return observations of a world that no longer exists.
+
+    The observations are a hash, a snapshot taken later, its readings, and the hashes of the following steps.
+    """
     world, cube = middle()
     name = world.state_hash()
     play(world, cube, 15, seed=7)
@@ -71,7 +73,7 @@ def small():
 
 
 def readings(world):
-    """What a user reads."""
+    """Return the values that a user reads."""
     bodies = world.bodies
     return [
         *(body.positions().tobytes() + body.velocities().tobytes() for body in bodies),

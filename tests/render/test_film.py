@@ -35,8 +35,10 @@ def falling_box(dt: float = 1 / 50) -> Stage:
 
 
 def test_skins_are_drawn_with_their_textures(tmp_path):
-    """A crate whose corners are blue and whose faces have a red middle: no vertex has that colour. Beside it
-    stands one without a texture, in the colour of its actor."""
+    """A crate with blue corners, and with faces that are red in the middle.
+
+    No vertex is red. Next to it is a crate without a texture, in the colour of its actor.
+    """
     crate = trimesh.creation.box()
     normals = np.repeat(crate.face_normals, 3, axis=0)
     crate.unmerge_vertices()

@@ -49,7 +49,7 @@ def test_a_step_in_pieces_is_the_step_bit_for_bit(name, stretch, monkeypatch):
 @pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="which hears Ctrl-C")
 @pytest.mark.parametrize("name", ["alone", "flat", "contact"])
 def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
-    """As Ctrl-C does it, by a signal that raises KeyboardInterrupt as soon as Python runs again."""
+    """Like Ctrl-C, a signal raises KeyboardInterrupt as soon as Python runs again."""
     world = bare_world(**OPTIONS[name])
     body = world.add_body(sphere(0.3, 6), MATERIAL, position=(0, 0, 0.5))
     hand = world.add_frame((0, 0, 1))

@@ -166,8 +166,10 @@ def test_no_rescue_goes_below_the_floor_or_adds_energy_and_one_that_fails_is_rep
 
 
 def test_what_folds_under_its_weight_comes_to_rest():
-    """Faces stretched by a third make tetrahedra too stiff for the step of the rest shape, and some stay
-    inside out. Vertices had up to 3 m/s for ever."""
+    """Faces stretched by a third make tetrahedra too stiff for the step of the rest shape.
+
+    Some tetrahedra stay inverted. Vertices must not keep moving because of them.
+    """
     world = bare_world(sleep_speed=0.02)
     for cells in (8, 10):
         asset = SoftBodyAsset.from_surface(table(), Material(5e4, 0.4, 1000), cells=cells)

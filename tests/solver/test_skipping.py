@@ -107,7 +107,7 @@ def pile(built):
 
 
 def stood_still(world, act=lambda: None):
-    """Of each body, whether a step left it where it was."""
+    """Return for each body True if a step left it in place."""
     before = [body.positions() for body in world.bodies]
     act()
     world.step(DT)

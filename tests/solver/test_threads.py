@@ -17,7 +17,7 @@ PROGRAM = Path(__file__).parents[1] / "shared" / "thread_scenes.py"
 
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory):
-    """What happens in every scene in a new process, on two threads where this one has one."""
+    """Return the results of every scene in a new process with two threads if this process has one thread."""
     threads = 2 if init().threads == 1 else 1
     out = tmp_path_factory.mktemp("threads") / "found.json"
     subprocess.run([sys.executable, str(PROGRAM), str(threads), str(out)], check=True, timeout=600)

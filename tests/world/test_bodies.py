@@ -68,7 +68,7 @@ def test_a_second_run_has_the_same_bits(together):
 
 
 def test_both_schedules_tell_the_same_story(together):
-    """Of bodies of two models: each block of tetrahedra has to find its own."""
+    """The bodies have two models: each block of tetrahedra must use its own model."""
     names = ["cube", "beam"]
     flat, per_body = (fall(names, schedule, steps=10, floor=None) for schedule in ("flat", "per_body"))
     for name in names:

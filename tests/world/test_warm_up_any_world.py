@@ -63,7 +63,7 @@ def attach(world, bodies):
 
 
 def hold(world, bodies):
-    """By all that the schedule allows."""
+    """Attach and constrain bodies in all ways that the schedule allows."""
     for body in bodies:
         body.attach([0], world.add_frame(), two_way=True)
         if len(body.surface):

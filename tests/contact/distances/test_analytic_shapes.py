@@ -61,7 +61,7 @@ def test_distances_are_exact_inside_and_outside(name, measure):
 
 
 def test_normals_are_the_gradient(name, measure):
-    """By central differences of the oracle, away from where it has a kink."""
+    """The reference is central differences of the oracle, away from its kinks."""
     shape, oracle = SOLIDS[name]
     x = points_near(2, 1000)
     x = x[np.abs(x).max(axis=1) < 1.5]

@@ -47,7 +47,7 @@ def distance_to_ground(shape, x):
 
 
 def height_over(shape, x):
-    """Of the two planes of a cell, as they are split along its diagonal."""
+    """Return the height of the surface, which consists of two triangles in each cell."""
     heights, low = np.asarray(shape.heights, dtype=np.float64), shape.bounds[0]
     uv = (x[:, :2] - low[:2]) / SPACING
     i, j = np.clip(np.floor(uv).astype(int), 0, np.array(heights.shape) - 2).T

@@ -54,7 +54,7 @@ def distance_to_triangles(mesh, x):
 
 
 def is_inside(mesh, x):
-    """By the solid angle that the triangles take up (van Oosterom and Strackee)."""
+    """True for points inside a surface, by the solid angle of the triangles (van Oosterom and Strackee)."""
     angle = np.zeros(len(x))
     for corners in mesh.triangles:
         a, b, c = (corner - x for corner in corners)
@@ -134,7 +134,7 @@ def random_blocks(rng):
 
 
 def is_in_any(vertices, tets, x):
-    """By barycentric coordinates in float64."""
+    """True for points in any tetrahedron, by barycentric coordinates in float64."""
     inside = np.zeros(len(x), dtype=bool)
     for corners in vertices[tets]:
         shares = np.linalg.solve((corners[1:] - corners[0]).T, (x - corners[0]).T)
@@ -256,7 +256,7 @@ def test_beyond_the_grid_the_faces_of_a_box_are_as_far_as_they_are(measure):
 
 
 def test_normals_are_the_direction_in_which_the_distance_rises(case, measure):
-    """By central differences within one cell, where the interpolation is smooth."""
+    """The reference is central differences within one cell, where the interpolation is smooth."""
     mesh, shape = case
     x = points_round(mesh, 5, 2000, margin=0.0)
     step = 0.02 * shape.cell

@@ -79,7 +79,7 @@ def test_a_damaged_file_is_computed_and_written_anew(damage, computed, cache_fol
 
 
 def test_a_file_of_another_mesh_is_not_taken(computed, cache_folder):
-    """Of the same size: only its name is wrong."""
+    """The other mesh has the same size. Only the name of its file is wrong."""
     MeshShape(CUBE, cell=CELL)
     (file,) = cache_folder.iterdir()
     other = file.read_bytes()

@@ -42,7 +42,7 @@ def has_subnormals():
 
 @contextmanager
 def taking_them_for_zero():
-    """As a library may have left a thread: with the bits of x86 for it set."""
+    """Set the x86 bits with which a thread treats subnormal numbers as zero, as a library may have done."""
     c, environment, before = ctypes.CDLL(None), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
     c.fegetenv(before)
     c.fegetenv(environment)

@@ -10,7 +10,7 @@ import numpy as np
 
 
 def signed_volume(x):
-    """Of one tetrahedron (4, 3)."""
+    """Return the signed volume of one tetrahedron (4, 3)."""
     return np.linalg.det(x[1:] - x[0]) / 6
 
 
@@ -100,7 +100,7 @@ def cmpm(mesh, p, q, x, face):
 
 
 def rest_length(mesh, p, q):
-    """Of an edge."""
+    """Return the rest length of an edge."""
     return np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
 
 
@@ -222,9 +222,9 @@ def tilted_plane(mesh, p, q, x, b=2.0):
 
 
 def frame(law, mesh, p, q, x, face):
-    """What a law of chapter 4 compares on an edge: r, n, the length at rest (1 for directions) and the area.
+    """Return what a law of chapter 4 compares on an edge: r, n, rest length (1 for directions), and area.
 
-    None where the law makes no bond of it; `face` is that of `cmpm`.
+    Return None if the law has no bond on this edge. `face` is the area that `cmpm` uses.
     """
     if law == "cmpm":
         return None if face is None else cmpm(mesh, p, q, x, face)

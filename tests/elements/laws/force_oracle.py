@@ -65,8 +65,9 @@ def stress_of(F, strain, lame_lambda, lame_mu):
 
 
 def recovery_energy(rest, corners, modulus):
-    """Return the energy of an inverted tetrahedron under `recover` [J]: V M/2 |F - R|^2, R the nearest
-    rotation.
+    """Return the energy of an inverted tetrahedron under `recover` [J].
+
+    The energy is V M/2 |F - R|^2, with the nearest rotation R.
 
     If the tetrahedron is inverted by less than 1/16 of its thickness, the slope of the energy decreases
     linearly to zero.

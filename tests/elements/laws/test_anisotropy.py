@@ -95,7 +95,7 @@ def forces_by_numpy(mesh, material, x, law, strain, flips):
 @settings(max_examples=4)
 @given(seed=seeds, name=st.sampled_from(["tet", "sphere"]), amount=st.sampled_from([0.01, 0.2, 0.6, 3.0]))
 def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, name, amount):
-    """Also flipped; they sum to zero and turn nothing."""
+    """The tetrahedra include inverted ones. The forces exert no total force and no torque."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES[name]
     material = any_material(mesh, rng)
@@ -214,7 +214,7 @@ def test_a_pulled_orthotropic_cube_has_the_moduli_it_was_given(law, axis, turn):
 @settings(max_examples=2)
 @given(seed=seeds, mirrored=st.booleans())
 def test_exact_gradients_equal_differences(law, strain, flips, seed, mirrored):
-    """Also of laws whose rotation turns with the vertices."""
+    """The laws include those whose material rotation depends on the vertices."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES["tet"]
     material = any_material(mesh, rng)
@@ -262,9 +262,11 @@ def test_the_projected_system_is_symmetric_and_never_negative(law, strain, flips
 @pytest.mark.parametrize("stretches", [(1.3, 0.9, 0.7), (1.2, 0.8, 0.03), (1.2, 1.1, -0.8)])
 @pytest.mark.parametrize(("law", "strain", "flips"), [mode for mode in MODES if mode[0] == "virial"])
 def test_the_projected_system_holds_the_rotation_and_counts_what_pulls(law, strain, flips, stretches):
-    """V [M B_i^T C B_j M^T + (g_i . T g_j) I] of F = R U, with M M^T = R cof(U) R^T, or det(U) I where the
-    strain is linear, and T the positive part of S cof(U)^2 / det(U), det(U) at least 1/20. What comes back
-    from inside out has the modulus that brings it back."""
+    """The system is V [M B_i^T C B_j M^T + (g_i . T g_j) I] with F = R U.
+
+    M M^T = R cof(U) R^T, or det(U) I if the strain is linear. T is the positive part of S cof(U)^2 / det(U),
+    with det(U) at least 1/20. An inverted tetrahedron that recovers has the modulus of its recovery.
+    """
     rng = np.random.default_rng(6)
     mesh = oracle.ONE_TET
     material = any_material(mesh, rng)

@@ -38,7 +38,10 @@ def expected_forces(law, name, x, E, nu, G):
     amount=st.sampled_from([0.02, 0.1, 0.25]),
 )
 def test_forces_equal_the_equations_in_numpy(law, seed, name, amount):
-    """Of a body of many materials, deformed at random and turned, to 1e-10 of the largest."""
+    """The body has many materials, is deformed at random and rotated.
+
+    The tolerance is 1e-10 of the largest force.
+    """
     mesh = MESHES[name]
     rng = np.random.default_rng(seed)
     count = len(mesh.tets)

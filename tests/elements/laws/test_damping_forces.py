@@ -17,7 +17,7 @@ amounts = st.floats(0, 2)
 
 
 def damping_forces(mesh, material, x, v, model):
-    """What the velocities add to the forces."""
+    """Return the part of the forces that is due to velocities."""
     moving = internal_forces(mesh, material, x, v, damping_model=model)
     still = internal_forces(mesh, material, x, damping_model=model)
     return moving - still

@@ -82,7 +82,7 @@ def test_forces_are_those_of_the_equations(law, seed, name):
 @settings(max_examples=10)
 @given(seed=seeds)
 def test_forces_are_minus_the_gradient_of_the_energy(law, seed):
-    """By central differences of the energy, written in NumPy, in five random directions."""
+    """The reference is central differences of the energy in NumPy, in five random directions."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES["box"]
     material = oracle.uneven_material(mesh, rng)

@@ -210,7 +210,7 @@ def test_recover_brings_every_axis_of_a_flip_nearer_to_its_length_at_rest(law, s
 @settings(max_examples=10)
 @given(seed=seeds, nu=st.floats(0, 0.45))
 def test_the_force_on_a_flip_that_recovers_is_the_slope_of_an_energy(thinnest, seed, nu):
-    """By central differences: it drives no tetrahedron round in circles."""
+    """The reference is central differences. A force with an energy does no work on a closed path."""
     rng = np.random.default_rng(seed)
     stretches = [*rng.uniform(thinnest + 0.1, 2.0, 2), -thinnest]
     x = REST @ (oracle.rotation(rng) @ np.diag(stretches) @ oracle.rotation(rng)).T

@@ -1,4 +1,4 @@
-"""Random bodies on random courses, 30 of them, and the report about them."""
+"""Thirty random bodies on random courses, and the report about them."""
 
 from dataclasses import replace
 
@@ -78,7 +78,7 @@ def test_a_body_knotted_by_an_impact_above_mach_two_comes_to_rest():
 
 
 def test_a_case_ends_the_same_alone(outcomes):
-    """As the command repeats it: other bodies of a world change nothing."""
+    """The command repeats a case alone. Other bodies in a world do not affect the outcome."""
     alone = next(iter(run_cases([make_case(SEED, 3)])))
     among = outcomes[3]
     assert (alone.rest_at, alone.out, alone.inside, alone.speed) == (

@@ -1,4 +1,4 @@
-"""Cells of the sweep: which there are, and that each gets the verdict that it deserves."""
+"""Cells of the sweep: their selection, and the verdict on each of them."""
 
 import json
 from dataclasses import replace

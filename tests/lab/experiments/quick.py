@@ -1,4 +1,4 @@
-"""Experiments run for tests: all points at quick effort, each measured once, and their findings by claim."""
+"""Run experiments for tests: measure all points of a quick report once, and return the findings by claim."""
 
 import copy
 import json

@@ -1,4 +1,4 @@
-"""Decay, waves, regions of stability and orders: against closed forms, and verdicts that can turn."""
+"""Decay, waves, stability and orders: compared with closed forms, and verdicts that depend on the numbers."""
 
 import numpy as np
 import pytest

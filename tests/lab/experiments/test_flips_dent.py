@@ -1,4 +1,4 @@
-"""A hard impact turns tetrahedra inside out."""
+"""A hard impact inverts tetrahedra."""
 
 import copy
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Pictures of measured positions: what is in them, and where."""
+"""Images of measured positions: their contents and layout."""
 
 import numpy as np
 import pytest

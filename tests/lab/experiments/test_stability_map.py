@@ -1,4 +1,4 @@
-"""The dropped sphere over Young's modulus and Poisson's ratio."""
+"""The dropped sphere for many Young's moduli and Poisson's ratios."""
 
 import copy
 

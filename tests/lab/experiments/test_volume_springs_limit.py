@@ -1,4 +1,4 @@
-"""What grows in springs that keep volume: rates against a motion that is integrated in NumPy."""
+"""Growth rates in springs that preserve volume, compared with a motion integrated in NumPy."""
 
 import numpy as np
 import pytest

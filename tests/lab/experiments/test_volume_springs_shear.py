@@ -1,4 +1,4 @@
-"""Figures 5.1 and 5.2: slopes against the linearised springs of eq. 5.2 and 5.5, written out in NumPy."""
+"""Figures 5.1 and 5.2: slopes compared with the linearised springs of eq. 5.2 and 5.5 in NumPy."""
 
 from dataclasses import replace
 from itertools import combinations

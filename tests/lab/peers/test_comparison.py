@@ -1,4 +1,4 @@
-"""What engines are measured by: the reference, the two numbers, the halving of steps, and the film."""
+"""The comparison of engines: the reference, both measures, the halving of steps, and the film."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def test_the_masses_of_vertices_add_up_to_density_times_volume():
 
 
 def test_the_forces_of_the_reference_are_the_gradient_of_its_energy():
-    """By central differences, of a block that is bent, stretched and turned."""
+    """The reference is central differences for a block that is bent, stretched and rotated."""
     drop = Drop(mesh=box((1, 1, 1), (1, 1, 1)))
     body = Reference(drop, 10)
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""The same small drop in every engine: laws of nature that hold for any of them."""
+"""One small drop in every engine: laws of nature that hold for all engines."""
 
 import sys
 from functools import cache

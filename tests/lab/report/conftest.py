@@ -1,4 +1,4 @@
-"""Experiments that cost nothing, and where they are computed."""
+"""Experiments that compute nothing, and workers to run them."""
 
 import sys
 from pathlib import Path
@@ -20,7 +20,7 @@ def measured(tmp_path, monkeypatch):
 
 
 def compute_here(tasks, *, workers, arch, time_limit):
-    """As `compute_all`, in this process."""
+    """Compute tasks like `compute_all`, but in this process."""
     for task in tasks:
         try:
             yield task, run.Outcome(task.function(task.point))

@@ -1,4 +1,4 @@
-"""Experiments that cost nothing, for worker processes too."""
+"""Experiments that compute nothing, importable by worker processes."""
 
 import os
 from pathlib import Path

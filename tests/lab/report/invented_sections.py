@@ -1,5 +1,4 @@
-"""Sections that no experiment made: every verdict, plots and pictures of every kind, tables short and long,
-points that failed."""
+"""Made-up sections: every verdict, all kinds of plots and images, short and long tables, failed points."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""`python -m lab report`, with experiments that cost nothing."""
+"""`python -m lab report`, with experiments that compute nothing."""
 
 import shlex
 import warnings

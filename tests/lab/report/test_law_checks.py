@@ -1,4 +1,4 @@
-"""The table of all laws: its numbers are those of the experiments, over what theory says."""
+"""The table of all laws: numbers of the experiments, divided by their theoretical values."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The report's files: whole, true to the numbers, and safe for any text. What is shown is invented."""
+"""Files of the report: complete, equal to the numbers, and safe for any text. The contents are made up."""
 
 import base64
 import csv

@@ -1,4 +1,4 @@
-"""Experiments of which the points are measured, kept, taken up again and concluded."""
+"""Experiments whose points are measured, stored, resumed and concluded."""
 
 import io
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Sections and verdicts on a terminal of 80 columns. What is shown is invented."""
+"""Sections and verdicts on a terminal of 80 columns. The contents are made up."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""What is computed at a point of a test, in any process."""
+"""Functions that tests compute at points, in any process."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Functions that worker processes find too."""
+"""Functions that worker processes can import."""
 
 import sys
 from pathlib import Path

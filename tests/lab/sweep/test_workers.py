@@ -1,4 +1,4 @@
-"""Processes of this machine: what goes wrong with a point stays its own."""
+"""Worker processes on this machine: an error at one point affects no other point."""
 
 import os
 import signal

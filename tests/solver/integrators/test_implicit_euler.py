@@ -306,7 +306,10 @@ def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_abo
 
 
 def test_a_stiff_bar_that_bends_falls_as_fast_as_a_soft_one():
-    """By g h^2 n (n + 1) / 2 in n steps of h: products with a stiff matrix must not drown what all share."""
+    """After n steps of h, the fall is g h^2 n (n + 1) / 2.
+
+    Products with a stiff matrix must not hide the common motion.
+    """
     mesh, steps = box((4.0, 1.0, 1.0), (8, 2, 2)), 30
     for young in (1e6, 1e9):
         world, body = make_world(mesh, Material(young, 0.3, 1000.0, damping_ratio=0.0))

@@ -71,7 +71,7 @@ def test_free_fall_follows_the_sum_of_its_steps(flight, integrator, substeps):
 
 
 def test_leapfrog_falls_the_same_whatever_the_substep(flight):
-    """Also where the substep changes on the way: the half steps join without a gap."""
+    """The substep may also change during the fall: consecutive half steps fit together."""
     world, body = flight(CUBE, JELLY, gravity=(0, 0, -G))
     for dt, substeps in ((0.01, 2), (0.02, 5), (0.003, 1), (0.01, 8)) * 3:
         world.step(dt, substeps)
